@@ -43,19 +43,21 @@ nightly: check types warm bench $(VENV)/.ready-nightly ## everything: an hour or
 	@$(MAKE) --no-print-directory coverage-guard control faults
 
 mutants: $(READY) ## ten minutes to an hour: of the changed conditions of the guard at most a tenth may go unnoticed by its unit tests
-	@$(NICE) $(BIN)/python -m tests.mutants --report docs/quality/mutants.md
+	@$(NICE) $(BIN)/python -m tests.mutants --report runs/mutants.md
 
 coverage-guard: $(READY) ## every branch of the guard, by its unit tests alone
 	@NUMBA_DISABLE_JIT=1 $(BIN)/pytest tests/unit/bridge/guard -p no:cacheprovider --cov=bridge.guard --cov-branch --cov-report=term-missing --cov-fail-under=100
 
 control: $(READY) ## the controller on the whole bank, beside its rivals; fails where a bar is missed
-	@$(BIN)/stickslip bench control --report runs/control.html --json runs/control.json
+	@$(BIN)/python -m bench control --report runs/control.html --json runs/control.json
 
-faults: $(READY) ## every fault of deploy/faults in simulated time: docs/quality/faults.md
-	@$(BIN)/stickslip bench faults --report docs/quality/faults.md
+faults: $(READY) ## every fault of deploy/faults in simulated time: runs/faults.md
+	@mkdir -p runs
+	@$(BIN)/python -m bench faults --report runs/faults.md
 
-soak: $(READY) ## one hour of a loop: memory, lost blocks, latency over time: docs/quality/soak.md
-	@$(BIN)/stickslip soak --hours 1 --report docs/quality/soak.md
+soak: $(READY) ## one hour of a loop: memory, lost blocks, latency over time: runs/soak.md
+	@mkdir -p runs
+	@$(BIN)/stickslip soak --hours 1 --report runs/soak.md
 
 warm: $(READY)
 	@$(BIN)/python -m tests.warm_up
@@ -71,25 +73,26 @@ types: $(READY) ## the strict check, 100 s of CPU; `make check` has the 6 s of t
 	@$(BIN)/pyright
 
 docs: $(READY) ## the pages as a site in site/, which works from a disk; a dead link is an error
+	@$(BIN)/python -m docs.generate
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
-reference: $(READY) ## after a change of commands, effects, faults or file formats
+reference: $(READY) ## the generated pages of docs/reference, and deploy/zenoh after a change of the roles on the bus
 	@$(BIN)/python -m docs.generate
 
 readme: $(READY) ## after a change of what the commands of the README print
 	@$(BIN)/python -m docs.readme
 
 bench: $(VENV)/.ready-nightly ## a quarter of an hour, with the machine to itself
-	@$(BIN)/python -m tests.bench
+	@$(BIN)/python -m tests.speed
 
 bench-quick: $(READY) ## three minutes: no vibrated rig, Radau, MuJoCo, effects; one diagnosis
-	@$(BIN)/python -m tests.bench --quick
+	@$(BIN)/python -m tests.speed --quick
 
 blind: $(READY) ## hours; what has a result is not done again: make blind CASES=20 SEED=1 OUT=runs/blind GENERATOR=plant
 	@test -e $(BLIND) || $(BIN)/python -m tests.blind make --cases $(CASES) --seed $(SEED) --out $(BLIND) \
 		--key $(BLIND).key.json --generator $(GENERATOR)
-	@$(BIN)/stickslip blind run $(BLIND)
-	@$(BIN)/stickslip blind score $(BLIND) --key $(BLIND).key.json --baselines --json $(BLIND).json --report $(BLIND).html
+	@$(BIN)/python -m bench blind run $(BLIND)
+	@$(BIN)/python -m bench blind score $(BLIND) --key $(BLIND).key.json --baselines --json $(BLIND).json --report $(BLIND).html
 
 real: $(READY) ## some minutes; needs the public logs in ../shared/data: make real OUT=runs/real ARGS="--known"
 	@$(BIN)/python -m tests.real --out $(or $(OUT),runs/real) $(ARGS)
@@ -132,6 +135,7 @@ proto: $(READY) ## after a change of bridge/wire/stickslip.proto
 
 schemas: $(READY) ## after a change of a format
 	$(BIN)/stickslip schema --out deploy/schemas
+	$(BIN)/python -m bench.schemas
 
 clean:
 	rm -rf $(VENV) runs

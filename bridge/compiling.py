@@ -1,4 +1,4 @@
-"""Compilation of kernels: the number of kernels left, on stderr, and the guard by which a signal ends a command at once."""
+"""Compilation of kernels: progress on stderr, and a context in which a signal ends the command at once."""
 
 import sys
 from collections.abc import Callable, Generator
@@ -7,14 +7,14 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from bridge.plain import say
 
 PROGRESS = "compiling kernels, once for this version: "  # followed by `12 of 163 left`
-_LINES = 8  # for all kernels, where stderr is no terminal
+_LINES = 8  # lines for all kernels, if stderr is not a terminal
 _BAR = 20  # characters
 # Set by a command: within this context a signal ends the process at once. Without it signals wait for the end of a compilation.
 guard: Callable[[], AbstractContextManager[None]] = nullcontext
 
 
 class Progress:
-    """One line that is rewritten, on a terminal; a few lines elsewhere."""
+    """Progress: one line that is rewritten, on a terminal; a few lines elsewhere."""
 
     def __init__(self) -> None:
         self._on_terminal = sys.stderr is not None and sys.stderr.isatty()  # pyright: ignore[reportUnnecessaryComparison]
@@ -63,7 +63,7 @@ _work = _Work()
 
 
 def expect(kernels: set[object]) -> None:
-    """Add these kernels to those that are to be compiled."""
+    """Add kernels to the ones to be compiled."""
     _work.total |= kernels
 
 
@@ -71,15 +71,15 @@ def note_done(kernels: set[object]) -> None:
     """Count these kernels as compiled or loaded."""
     _work.done |= kernels
     if kernels & _work.total:
-        _work.show(max(len(_work.total - _work.done), 1))  # the last one still waits for its machine code
+        _work.show(max(len(_work.total - _work.done), 1))  # the last kernel still waits for its machine code
 
 
 @contextmanager
 def compiling(module: str = "") -> Generator[str]:
-    """A context in which kernels are compiled or loaded: guarded, and with progress; gives the module of the outermost context.
+    """Guard the compilation or loading of kernels and show its progress; yields the module of the outermost context.
 
     Args:
-        module: of these kernels, where it is known.
+        module: of these kernels, if known.
 
     """
     _work.depth += 1

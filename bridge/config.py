@@ -14,20 +14,20 @@ from bridge.faults import Fault
 from bridge.files import check_file
 from bridge.plain import say
 
-_LARGEST_BYTES = 2 << 20  # of a TOML file; the largest that people write, of hundreds of runs, have some 100 kB
-_DEEPEST = 32  # parts of a key or brackets one in the other; files of this project need 5
-_MOST_PROBLEMS = 20  # that are told of one table
+_LARGEST_BYTES = 2 << 20  # of a TOML file; hand-written files of hundreds of runs have about 100 kB
+_DEEPEST = 32  # parts of a key, or nested brackets; files of this project need 5
+_MOST_PROBLEMS = 20  # reported for one table
 _QUOTED = re.compile(r'"[^"\\\n]*(?:\\.[^"\\\n]*)*"|\'[^\'\n]*\'')
 _DOTS = re.compile(r"[ \t]*\.[ \t]*")
 _CHAIN = re.compile(r"[\w-]+(?:\.[\w-]+)*")
-_TOLD: set[str] = set()  # lines about keys that are gone, each told once by a process
+_REPORTED: set[str] = set()  # lines about removed keys; a process prints each only once
 
 
 class Strict(BaseModel):
     """Base of every configuration table: no unknown keys, no conversion between types, immutable."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-    gone: ClassVar[dict[str, str]] = {}  # keys of older files, and what replaces them: read, told, and left out
+    gone: ClassVar[dict[str, str]] = {}  # removed keys and their replacements: accepted with a message, then ignored
 
     @model_validator(mode="before")
     @classmethod
@@ -36,23 +36,23 @@ class Strict(BaseModel):
             return table
         for key in cls.gone.keys() & table.keys():
             line = f"stickslip: {key}: is not used any more; {cls.gone[key]}"
-            if line not in _TOLD:
-                _TOLD.add(line)
+            if line not in _REPORTED:
+                _REPORTED.add(line)
                 say(line)
         return {key: value for key, value in table.items() if key not in cls.gone}
 
 
-# two numbers; not strict, as TOML has only arrays and pydantic's strict mode refuses an array for a tuple
+# two numbers; not strict, as pydantic's strict mode refuses an array of TOML as a tuple
 Two = Annotated[tuple[float, float], Field(strict=False)]
 
-# Similarity (`difflib`) of two keys from which one is taken for the other misspelt. Smaller: other keys of the table count, such
-# as viscous_damping_Ns_per_m for contact_damping_Ns_per_m with 0.79. Larger: a wrong letter in a short key is not seen.
+# Similarity (`difflib`) from which an unknown key counts as a misspelling of a known one. Smaller: distinct keys match, such as
+# viscous_damping_Ns_per_m and contact_damping_Ns_per_m with 0.79. Larger: a wrong letter in a short key is missed.
 _MISSPELT = 0.8
 _COMMA = re.compile(r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?")
 
 T = TypeVar("T", bound=Strict)
 
-# of a value in a line of a fault: a file may hold a text of megabytes, or tables 1000 deep, which Python's own repr cannot show
+# short form of a value in a message: a file may hold megabytes of text, or tables 1000 deep, on which Python's repr fails
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 200
 in_short = _SHORT.repr
@@ -60,39 +60,44 @@ in_short = _SHORT.repr
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Read one TOML file. Raises Fault CONFIG when it cannot be read or is not TOML."""
-    check_file(path, "CONFIG", "give the path of a TOML file")  # also no pipe, which nobody may ever write into
+    check_file(
+        path, "CONFIG", "give the path of a TOML file"
+    )  # refuses a pipe too, as reading one without a writer never ends
     text = ""
     try:
         with path.open("rb") as file:
             data = file.read(_LARGEST_BYTES + 1)
         if len(data) > _LARGEST_BYTES:
             rule = f"{path.stat().st_size / 1e6:.0f} MB: must be at most {_LARGEST_BYTES >> 20} MiB"
-            raise Fault("CONFIG", f"{path}: {rule}; keep measured data in files beside it")
-        text = data.decode("utf-8-sig")  # Notepad marks what it saves as UTF-8
+            raise Fault("CONFIG", f"{path}: {rule}; keep measured data in other files")
+        text = data.decode("utf-8-sig")  # Notepad writes a byte order mark
         _refuse_depth(path, text)
         return tomllib.loads(text)
     except OSError as error:
         raise Fault("CONFIG", f"{path}: cannot be read: {error.strerror}; give the path of a TOML file") from None
     except UnicodeDecodeError as error:
         raise Fault("CONFIG", f"{path}: is not UTF-8 from byte {error.start + 1} on; save it as UTF-8") from None
-    except (ValueError, RecursionError) as error:  # also Python's own limits: 5000 digits, brackets 1000 deep
+    except (
+        ValueError,
+        RecursionError,
+    ) as error:  # ValueError: also a number of 5000 digits; RecursionError: brackets 1000 deep
         raise Fault("CONFIG", f"{path}: not valid TOML: {error}{_decimal_comma(text, str(error))}") from None
 
 
 def _refuse_depth(path: Path, text: str) -> None:
-    """Raise Fault CONFIG for a dotted key of more parts than any table is deep: reading it takes seconds, or ends in an error.
+    """Raise Fault CONFIG for a dotted key of too many parts, which would take seconds to read or fail.
 
-    Brackets one in the other are bounded by the reader itself.
+    The reader itself bounds nested brackets.
     """
     keys = _DOTS.sub(".", _QUOTED.sub("q", text))
-    if any(found[0].count(".") >= _DEEPEST for found in _CHAIN.finditer(keys)):
+    if any(chain[0].count(".") >= _DEEPEST for chain in _CHAIN.finditer(keys)):
         raise Fault(
             "CONFIG", f"{path}: has a key of more than {_DEEPEST} parts: must be at most {_DEEPEST}; shorten it"
         )
 
 
 def _decimal_comma(text: str, error: str) -> str:
-    """The remedy where the line that a TOML error names gives a number with a decimal comma; else nothing."""
+    """The remedy, if the line named by a TOML error holds a number with a decimal comma; else empty."""
     at = re.search(r"at line (\d+)", error)
     line = text.split("\n")[int(at[1]) - 1] if at else ""
     comma = re.search(rf"=\s*({_COMMA.pattern})", line)
@@ -126,7 +131,7 @@ def with_overrides(table: dict[str, Any], settings: Iterable[str]) -> dict[str, 
 
 
 def blamed(fault: Fault, source: str, settings: Sequence[str]) -> Fault:
-    """The fault of a table that is sound without `settings`: each line names those it is about in place of `source`."""
+    """The fault of a table that is valid without `settings`: each line names the settings concerned instead of `source`."""
     lines: list[str] = []
     for line in fault.line.splitlines():
         names = {setting: setting.partition("=")[0].strip().rpartition(".")[2] for setting in settings}
@@ -144,19 +149,19 @@ def validate(model: type[T], table: dict[str, Any], source: str) -> T:
         problems = _without_misspelt(error.errors())
         lines = [_line(model, source, problem) for problem in problems[:_MOST_PROBLEMS]]
         if len(problems) > _MOST_PROBLEMS:
-            lines.append(f"{source}: and {len(problems) - _MOST_PROBLEMS} more of such")
+            lines.append(f"{source}: and {len(problems) - _MOST_PROBLEMS} more problems")
         raise Fault("CONFIG", "\n".join(lines)) from None
 
 
 def _without_misspelt(problems: Sequence[Any]) -> list[Any]:
-    """The problems, but for keys that are missing because they are misspelt: the unknown key beside them says so."""
+    """The problems without missing keys that are misspelt: the unknown key in the same table is reported already."""
     unknown = [problem["loc"] for problem in problems if problem["type"] == "extra_forbidden"]
 
     def misspelt(table: tuple[str | int, ...], name: str) -> bool:
-        beside = [other[-1] for other in unknown if other[:-1] == table]
-        return bool(get_close_matches(name, beside, 1, _MISSPELT))
+        siblings = [other[-1] for other in unknown if other[:-1] == table]
+        return bool(get_close_matches(name, siblings, 1, _MISSPELT))
 
-    return [one for one in problems if one["type"] != "missing" or not misspelt(one["loc"][:-1], one["loc"][-1])]
+    return [item for item in problems if item["type"] != "missing" or not misspelt(item["loc"][:-1], item["loc"][-1])]
 
 
 def _line(model: type[Strict], source: str, problem: Any) -> str:
@@ -164,7 +169,7 @@ def _line(model: type[Strict], source: str, problem: Any) -> str:
     key = ".".join(path) or "(file)"
     kind: str = problem["type"]
     if kind == "extra_forbidden":
-        known = _keys_beside(model, path)
+        known = _sibling_keys(model, path)
         near = get_close_matches(path[-1], known, 1, _MISSPELT)
         remedy = f"perhaps {near[0]}; " if near else ""
         shown = in_short(problem["input"])
@@ -192,7 +197,7 @@ def _line(model: type[Strict], source: str, problem: Any) -> str:
     return f"{source}: {key} = {in_short(problem['input'])}: {rule}; change the value"
 
 
-def _keys_beside(model: type[Strict], path: list[str]) -> list[str]:
+def _sibling_keys(model: type[Strict], path: list[str]) -> list[str]:
     return sorted(_fields(_model_at(model, path[:-1])))
 
 

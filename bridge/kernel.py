@@ -24,7 +24,7 @@ Record = Any
 
 _settings: Any = numba.config  # pyright: ignore[reportPrivateImportUsage]
 _settings.CACHE_DIR = os.environ[FOLDER] = str(usable_folder())  # for this process and its children
-# colouring thousands of messages that numba alone reads takes 3 % of a compilation
+# highlighting thousands of internal error messages takes 3 % of a compilation
 _settings.DISABLE_ERROR_MESSAGE_HIGHLIGHTING = True
 _settings.CACHE_LOCATOR_CLASSES = "bridge.kernel_cache.SourcesLocator"
 
@@ -32,8 +32,8 @@ _settings.CACHE_LOCATOR_CLASSES = "bridge.kernel_cache.SourcesLocator"
 def _named_by_content(layout: Any) -> tuple[str, tuple[str]]:
     """The name of a layout in the symbols of compiled kernels.
 
-    Numba takes a number there that each process counts anew (`Record.mangling_args`). So two processes may keep kernels for two
-    lengths of a block under one symbol, and a third one that loads both runs the one on the samples of the other.
+    Numba uses a number there that each process counts from 0 (`Record.mangling_args`). Two processes may then cache kernels for
+    two block lengths under one symbol, and a third process that loads both would run a kernel on samples of the wrong length.
     """
     return "Record", (hashlib.sha256(str(layout).encode()).hexdigest()[:16],)
 
@@ -43,7 +43,7 @@ _layouts.mangling_args = property(_named_by_content)
 
 
 def _written_once(layout: Any, write: Callable[[Any], str] = _layouts.__repr__) -> str:
-    """The text of a layout, kept with it: numba asks for it 9000 times for the controller, 8 % of its compilation."""
+    """The text of a layout, cached: numba asks for it 9000 times for the controller, 8 % of its compilation."""
     kept: dict[str, str] = layout.__dict__
     if "text" not in kept:
         kept["text"] = write(layout)
@@ -52,8 +52,8 @@ def _written_once(layout: Any, write: Callable[[Any], str] = _layouts.__repr__) 
 
 _layouts.__repr__ = _written_once
 
-# As it loads its first kernel, numba imports SciPy's linear algebra to see whether it could compile a product of matrices: 0.3 s
-# of CPU in every process that controls, simulates or replays. Where numba compiles such a product it imports it all the same.
+# On loading its first kernel, numba imports SciPy's linear algebra to check whether it could compile a matrix product: 0.3 s of
+# CPU in every process that controls, simulates or replays. A kernel with a matrix product still triggers the import.
 _linear_algebra: Any = importlib.import_module("numba.np.linalg")
 _ask: Any = _linear_algebra.ensure_blas
 _linear_algebra.ensure_blas = lambda: None
@@ -62,7 +62,7 @@ _linear_algebra.ensure_blas = _ask
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile `function`, as a part of each kernel that calls it. With `NUMBA_DISABLE_JIT=1` it runs interpreted: equal bits.
+    """Compile `function`, once in each kernel that calls it. With `NUMBA_DISABLE_JIT=1` it runs interpreted, with equal bits.
 
     `fastmath` stays off and kernels use `math.*` on scalars: fast maths and numpy's vector maths both change the last bit, and
     replay guarantees equal bits. With numpy's rules for division (1 / 0 is infinite) numba checks no divisor.
@@ -72,16 +72,16 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def shared_kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """As `kernel`, and compiled once for all kernels that call it: for a step that runs in several loops.
+    """As `kernel`, but compiled once for all kernels that call it: for a step that runs in several loops.
 
-    A call costs some 50 ns more than the call of a `kernel`. The function must be found in its module under its own name.
+    A call takes about 50 ns longer than a call of a `kernel`. The module must hold the function under the function's name.
     """
     compiled: Any = function if _settings.DISABLE_JIT else SharedKernel(function)
     return compiled
 
 
 def unlocked_kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """As `kernel`, and other threads of Python go on while it runs: for calls of a millisecond and more."""
+    """As `kernel`, but without Python's lock (GIL), so that other threads run: for calls of 1 ms and more."""
     compiled: Any = function if _settings.DISABLE_JIT else Kernel(function, unlocked=True)
     return compiled
 

@@ -1,4 +1,4 @@
-"""Where compiled kernels are kept, when one is compiled anew, and which of several processes compiles it."""
+"""The cache of compiled kernels: its folder, its renewal, and one compilation for several processes."""
 
 import atexit
 import errno
@@ -37,16 +37,16 @@ def _named(module: str, root: Path) -> Iterator[Path]:
 @functools.cache
 def _imported(path: Path, root: Path) -> set[Path]:
     """Source files of this project that `path` imports."""
-    found: set[Path] = set()
+    files: set[Path] = set()
     for source, names, module in _IMPORT.findall(path.read_text(encoding="utf-8")):
-        found.update(_named(source or module, root))
+        files.update(_named(source or module, root))
         for name in re.findall(r"\w+", names):
-            found.update(_named(f"{source}.{name}", root))
-    return found
+            files.update(_named(f"{source}.{name}", root))
+    return files
 
 
 def _closure(path: Path, root: Path) -> set[Path]:
-    """A source file and all that it imports, and they, and so on."""
+    """A source file and all files that it imports, directly and indirectly."""
     seen, ahead = {path}, [path]
     while ahead:
         new = _imported(ahead.pop(), root) - seen
@@ -57,10 +57,10 @@ def _closure(path: Path, root: Path) -> set[Path]:
 
 @functools.cache
 def sources_digest(path: Path, root: Path = ROOT) -> str:
-    """A hash over a source file and over all files of the project below `root` that it imports, and they, and so on.
+    """A hash of a source file and of all files of the project below `root` that it imports, directly and indirectly.
 
-    Numba renews a cached kernel when the kernel's own file changes, but not when a kernel that it calls changes. Without this
-    hash, plant/core.py would run the old contact after an edit of plant/contact.py.
+    Numba recompiles a cached kernel after a change of the kernel's file, but not after a change of a kernel that it calls:
+    without this hash, plant/core.py would run the old contact after an edit of plant/contact.py.
     """
     digest = hashlib.sha256()
     for source in sorted(_closure(path, root)):
@@ -69,28 +69,28 @@ def sources_digest(path: Path, root: Path = ROOT) -> str:
 
 
 class SourcesLocator(UserProvidedCacheLocator):
-    """Tells numba that a kernel is another one when any source changes that it can hang on."""
+    """Makes numba recompile a kernel after a change of any source file that it depends on."""
 
     def get_source_stamp(self) -> bytes:
-        """The hash of the sources of the function's file."""
+        """The hash of the function's file and its imports."""
         return sources_digest(Path(self._py_file).resolve()).encode()
 
 
 def mark_of(what: str, path: Path, root: Path = ROOT) -> str:
-    """The name of the file that says that the kernels of `what` are kept, which hang on the source file `path`.
+    """The name of the mark file that confirms that the kernels of `what`, in the source file `path`, are cached.
 
-    Numba keeps those of two copies of this project apart, so each copy below its own `root` has marks of its own.
+    Numba separates the kernels of two copies of this project, so the marks depend on `root`.
     """
     place = hashlib.sha256(str(root).encode()).hexdigest()[:8]
     return f"{what}-{place}-{sources_digest(path, root)}"
 
 
 def compile_once(what: str, load: Callable[[], object]) -> None:
-    """Call `load`, which calls kernels for the first time. Of several processes one compiles them, and the others wait.
+    """Call `load`, which calls kernels for the first time. Of several processes one compiles, and the others wait.
 
     Args:
-        what: whose kernels they are, in words that make a file name.
-        load: compiles the kernels, or loads them where they are kept.
+        what: owner of the kernels, as a part of a file name.
+        load: compiles the kernels, or loads them from the cache.
 
     """
     folder = Path(os.environ[FOLDER])
@@ -114,44 +114,44 @@ def compile_once(what: str, load: Callable[[], object]) -> None:
 
 
 def _is_ours(folder: Path) -> bool:
-    """Whether nobody else may write there: a kernel is code, and whoever can put a file there has it run in our name."""
-    seen = folder.stat()
-    return seen.st_uid == os.geteuid() and not seen.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    """Whether only this user may write there: kernels are code, so a writer could run code as this user."""
+    status = folder.stat()
+    return status.st_uid == os.geteuid() and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
 def _private(folder: Path) -> Path:
-    """A folder of our own inside one that others may write to. Raises OSError where it is not ours either."""
-    own = folder / f"stickslip-{os.geteuid()}"
-    if not own.exists():
-        own.mkdir(mode=0o700)
+    """A private folder inside a folder that others may write to. Raises OSError if it is not this user's."""
+    private = folder / f"stickslip-{os.geteuid()}"
+    if not private.exists():
+        private.mkdir(mode=0o700)
         say(
-            f"stickslip: {folder}: is another user's, or others may write there: compiled kernels are code, so they are kept in "
-            f"{own}, which is yours alone"
+            f"stickslip: {folder}: is another user's, or others may write there: compiled kernels are code, so they are stored "
+            f"in the private folder {private}"
         )
-    if own.is_symlink() or not _is_ours(own):
-        raise OSError(errno.EPERM, "others may write there, and to the folder of your own in it")
-    return own
+    if private.is_symlink() or not _is_ours(private):
+        raise OSError(errno.EPERM, "others may write to it, and to its private subfolder")
+    return private
 
 
 def usable_folder() -> Path:
-    """The folder for compiled kernels; where none can be written, a temporary one until this process ends."""
+    """The folder for compiled kernels; if it is not writable, a temporary one until this process ends."""
     # not `Path.home`, which fails for a user without a home
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     folder = Path(os.environ.get(FOLDER) or Path(home) / "stickslip")
     try:
-        if str(folder).startswith("~"):  # not expanded: a folder of that name would be made where the command is called
-            raise OSError(errno.ENOENT, "its home is not known")
+        if str(folder).startswith("~"):  # not expanded: a folder named `~` would be created in the working directory
+            raise OSError(errno.ENOENT, "the home folder is unknown")
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         if not _is_ours(folder):
             folder = _private(folder)
         tempfile.TemporaryFile(dir=folder).close()
     except OSError as error:
-        own = tempfile.mkdtemp(prefix="stickslip-kernels-")
-        atexit.register(shutil.rmtree, own, ignore_errors=True)
+        temporary = tempfile.mkdtemp(prefix="stickslip-kernels-")
+        atexit.register(shutil.rmtree, temporary, ignore_errors=True)
         line = (
-            f"stickslip: {folder}: {error.strerror}: compiled kernels cannot be kept, so every command compiles them anew, "
-            f"which takes up to a minute; set {FOLDER} to a folder that can be written to"
+            f"stickslip: {folder}: {error.strerror}: compiled kernels cannot be stored, so every command compiles them again, "
+            f"which takes up to 1 min; set {FOLDER} to a writable folder"
         )
         say(line)
-        return Path(own)
+        return Path(temporary)
     return folder

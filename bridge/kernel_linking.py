@@ -1,10 +1,10 @@
-"""How kernels that call each other become machine code, each of them once.
+"""Compilation of kernels that call each other, each of them only once.
 
-Numba optimises each function with all that it calls, gives it machine code and wrappers for Python and C, and keeps these on
-disk. Each caller does all of that again, so that a kernel six calls deep is optimised six times. Here a kernel that kernels call
-is lowered to LLVM's representation and no further: a part. The kernel that Python calls is optimised with all its parts,
-once. A shared kernel is machine code that its callers call by address, as they call `math.sin`; no caller compiles it again.
-That halves the time of compilation (docs/decisions/31-kernels-are-linked-by-us.md).
+Numba optimises each function with all its callees, generates machine code and wrappers for Python and C, and caches them on disk.
+Each caller repeats all of that, so a kernel six calls deep is optimised six times. Here a kernel that other kernels call is only
+lowered to LLVM's representation: a part. The kernel that Python calls is optimised once, with all its parts. A shared kernel is
+machine code that its callers call by address, like `math.sin`; no caller compiles it again.
+This halves the time of compilation (docs/decisions/31-kernels-are-linked-by-us.md).
 """
 
 import copy
@@ -59,7 +59,7 @@ class _Part(_Library):
 
 
 class _ByAddress:
-    """In the place of the code of a shared kernel: nothing is linked in, and the kernel is loaded before its callers."""
+    """Placeholder for the code of a shared kernel: nothing is linked in, and the kernel is loaded before its callers."""
 
     def __init__(self, load: Callable[[], object]) -> None:
         self.load = load
@@ -138,20 +138,20 @@ class SharedKernel(_CPUDispatcher):
 
 def _called_by(function: Any) -> set[object]:
     """The functions of a kernel and of all kernels below it in the call tree; found by their names."""
-    found, ahead = set[object](), [function]
+    functions, ahead = set[object](), [function]
     while ahead:
         caller = ahead.pop()
-        found.add(caller)
+        functions.add(caller)
         names = caller.__code__.co_names
         values = [caller.__globals__.get(name) for name in names]
         modules = [value for value in values if inspect.ismodule(value)]
         values += [getattr(module, name, None) for module in modules for name in names]
-        ahead += [value.py_func for value in values if isinstance(value, _KINDS) and value.py_func not in found]
-    return found
+        ahead += [value.py_func for value in values if isinstance(value, _KINDS) and value.py_func not in functions]
+    return functions
 
 
 def _of_any_value(args: Any, kws: Any) -> tuple[Any, Any]:
-    """Types of arguments, without the values that the caller's source has for some: numba compiles a kernel for each value."""
+    """Types of arguments without the literal values of the caller: numba would compile a kernel for each value."""
     return tuple(map(types.unliteral, args)), {name: types.unliteral(kind) for name, kind in kws.items()}
 
 
@@ -165,5 +165,5 @@ def _kernels_in(module: str) -> set[object]:
 
 
 def _load(module: str, name: str, args: tuple[Any, ...]) -> None:
-    """Load a shared kernel, or compile it where the cache lacks it, before the kernels that call it are loaded."""
+    """Load or compile a shared kernel before its callers are loaded."""
     getattr(importlib.import_module(module), name).compile(args)

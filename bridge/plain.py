@@ -1,22 +1,22 @@
-"""Text from files as a terminal may show it: what could command the terminal is written out instead."""
+"""Text from files, safe for a terminal: control characters are written as their codes."""
 
 import re
 import sys
 from collections.abc import Callable
 
-# C0 but for tab and the line's end, DEL, C1, and the marks that turn the direction of writing or cannot be seen: each can hide or
-# forge what a person reads, and an escape code can do more (rename the window, answer in the person's name)
-_COMMANDS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff]")
+# C0 except tab and newline, DEL, C1, and invisible characters or marks of writing direction: they can hide or forge text, and an
+# escape code can rename the window or type input
+_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff]")
 
-# Lines on stderr that the parent of a process reads. It waits for a compilation:
+# Lines on stderr for the parent of a process: the process waits for a compilation,
 ANOTHER_COMPILES = "another process compiles the kernels of "
-# it has loaded all that it needs, and waits for the other processes:
+# or it has loaded its kernels and waits for the other processes
 LOADED = "loaded"
 
 
 def plain(text: str) -> str:
-    """The text with every control character as its number in hexadecimal."""
-    return _COMMANDS.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+    """The text with every control character as its hexadecimal code."""
+    return _CONTROL.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
 def say(line: str) -> None:
@@ -24,9 +24,9 @@ def say(line: str) -> None:
     print(plain(line), file=sys.stderr, flush=True)
 
 
-# What a process tells a person of its life: what (waiting, joined, running, ended) and a text.
+# Reports a step in the life of a process: its name (waiting, joined, running, ended) and a text.
 Tell = Callable[[str, str], None]
 
 
 def untold(_what: str, _text: str) -> None:
-    """Nobody looks."""
+    """Discard the report."""

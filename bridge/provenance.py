@@ -1,4 +1,4 @@
-"""What made a page or a picture: version, command line, date, and the SHA-256 of each file that it shows."""
+"""The origin of a page or a picture: version, command line, date, and the SHA-256 of each input file."""
 
 import hashlib
 import html
@@ -13,24 +13,24 @@ from typing import NamedTuple
 
 from bridge.plain import plain
 
-# the words after `stickslip` of the command that runs; None where the functions are called without one
+# arguments of the running `stickslip` command; None if the functions are called without a command
 COMMAND: ContextVar[Sequence[str] | None] = ContextVar("command", default=None)
-_SHOWN_DIGITS = 12  # of a hash in a line for a person; the metadata of a picture have all 64
+_SHOWN_DIGITS = 12  # of a hash in visible text; the metadata of a picture hold all 64
 _EPOCH = "SOURCE_DATE_EPOCH"  # https://reproducible-builds.org/specs/source-date-epoch
 
 
 class Input(NamedTuple):
-    """A file that a page or a picture shows; `sha256` is what `sha256sum` prints."""
+    """An input file of a page or a picture; `sha256` in hexadecimal, as `sha256sum` prints it."""
 
     name: str
     sha256: str
 
 
 class Provenance(NamedTuple):
-    """What made a page or a picture."""
+    """The origin of a page or a picture."""
 
     version: str
-    command: str  # as it was typed; empty where there was none
+    command: str  # as typed; empty without a command
     date: datetime  # UTC, whole seconds
     inputs: list[Input]
 
@@ -41,7 +41,7 @@ class Provenance(NamedTuple):
 
     def in_words(self) -> str:
         """One line for the foot of a page or a picture."""
-        files = [f"{one.name} (SHA-256 {one.sha256[:_SHOWN_DIGITS]}...)" for one in self.inputs]
+        files = [f"{file.name} (SHA-256 {file.sha256[:_SHOWN_DIGITS]}...)" for file in self.inputs]
         made = f"stickslip {self.version}, {self.date_text}"
         return "; ".join([made, *([self.command] if self.command else []), *files])
 
@@ -50,15 +50,18 @@ class Provenance(NamedTuple):
         line = f"Made by stickslip {self.version}, {self.date_text}"
         if self.command:
             line += f": <code>{html.escape(self.command)}</code>"
-        files = "".join(f"<br>{html.escape(one.name)}: SHA-256 <code>{one.sha256}</code>" for one in self.inputs)
+        files = "".join(f"<br>{html.escape(file.name)}: SHA-256 <code>{file.sha256}</code>" for file in self.inputs)
         style = (
             "margin-top: 2em; border-top: 1px solid #d5d8dc; font-size: 0.85em; color: #566573; overflow-wrap: anywhere"
         )
         return f'<footer style="{style}">{line}.{files}</footer>'
 
     def whole(self) -> str:
-        """The same with whole hashes, for metadata."""
-        parts = [*([self.command] if self.command else []), *(f"{one.name} sha256:{one.sha256}" for one in self.inputs)]
+        """Command and files with whole hashes, for metadata."""
+        parts = [
+            *([self.command] if self.command else []),
+            *(f"{file.name} sha256:{file.sha256}" for file in self.inputs),
+        ]
         return "; ".join(parts)
 
     def metadata(self, suffix: str, title: str) -> dict[str, str | datetime]:
@@ -77,11 +80,11 @@ class Provenance(NamedTuple):
 
 
 def provenance(inputs: Iterable[Path] = ()) -> Provenance:
-    """What makes a page or a picture of these files now; the date is that of SOURCE_DATE_EPOCH where it is set.
+    """The origin of a page or a picture made now from these files; SOURCE_DATE_EPOCH overrides the date.
 
-    Raises OSError where a file cannot be read.
+    Raises OSError if a file cannot be read.
     """
-    # 20 ms that a command without a page or a picture does not need
+    # imported here: 20 ms, which a command without a page or a picture saves
     from importlib.metadata import PackageNotFoundError, version  # noqa: PLC0415
 
     try:
@@ -95,13 +98,13 @@ def provenance(inputs: Iterable[Path] = ()) -> Provenance:
 
 
 def shown_name(text: str) -> str:
-    """A name or a command without bytes that are not UTF-8 and without control characters, which an SVG cannot hold."""
+    """A name or a command with codes in place of control characters and bytes outside UTF-8, which SVG does not allow."""
     return plain(os.fsencode(text).decode(errors="backslashreplace"))
 
 
 def _now() -> datetime:
     seconds = os.environ.get(_EPOCH, "")
-    if re.fullmatch(r"[0-9]{1,11}", seconds):  # with more digits it is no date
+    if re.fullmatch(r"[0-9]{1,11}", seconds):  # more digits are beyond the year 9999
         return datetime.fromtimestamp(int(seconds), UTC)
     return datetime.now(UTC).replace(microsecond=0)
 

@@ -1,4 +1,4 @@
-"""Units and numbers: the unit of a column, read from its name; quantities in words."""
+"""Units and numbers: the unit in the name of a column; quantities as text."""
 
 import math
 import re
@@ -19,9 +19,9 @@ _UNITS = (
 )
 
 
-def counted(number: SupportsInt, one: str, many: str = "") -> str:
-    """A number of things: `1 gap`, `2 gaps`; `many` is the plural where it is not `one` with an s."""
-    return f"{number} {one if number == 1 else many or f'{one}s'}"
+def counted(number: SupportsInt, singular: str, plural: str = "") -> str:
+    """A number of things: `1 gap`, `2 gaps`; `plural` is needed only if it is not `singular` with an s."""
+    return f"{number} {singular if number == 1 else plural or f'{singular}s'}"
 
 
 def unit_of(name: str) -> str:
@@ -32,17 +32,17 @@ def unit_of(name: str) -> str:
 _UNIT = re.compile(r"^(?:(.*?)_)?((?:Ns2|Ns|N|mps2|mps|m2|m|s|kg|Hz|rad)(?:_per_(?:N|m2|m|s))?|per_s)$")
 _SYMBOLS = {"mps2": "m/s²", "mps": "m/s", "Ns2": "N s²", "Ns": "N s", "m2": "m²", "per": "1"}
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
-_PERSONS = {"coulomb", "stribeck"}
+_SCIENTISTS = {"coulomb", "stribeck"}
 _WITHOUT_PREFIX = {"", "%", "kg", "rad", "1/s"}
 
 
 def signal_name(column: str) -> str:
-    """A column in words: `mass_accel_mps2` is `mass acceleration`."""
+    """The name of a column as words: `mass_accel_mps2` is `mass acceleration`."""
     return name_and_unit(column)[0].replace("accel", "acceleration")
 
 
 def name_and_unit(name: str) -> tuple[str, str]:
-    """A parameter in words, and its unit: `gap_m` is ("gap", "m").
+    """A parameter as words, and its unit: `gap_m` is ("gap", "m").
 
     `ratio` alone is a relative change in percent; other numbers without a unit have the unit "".
     `phase_rad of run-02.csv` is ("phase in run-02.csv", "rad").
@@ -53,19 +53,19 @@ def name_and_unit(name: str) -> tuple[str, str]:
         return f"{word} in {file}", unit
     if name == "ratio":
         return "relative change", "%"
-    found = _UNIT.match(name)
-    if found is None:
+    match = _UNIT.match(name)
+    if match is None:
         return _words(name), ""
-    top, _, bottom = found[2].partition("_per_")
+    top, _, bottom = match[2].partition("_per_")
     if top.startswith("per_"):
         top, bottom = "per", top.removeprefix("per_")
     unit = _SYMBOLS.get(top, top) + (f"/{_SYMBOLS.get(bottom, bottom)}" if bottom else "")
-    return _words(found[1] or name), unit
+    return _words(match[1] or name), unit
 
 
 def _words(name: str) -> str:
-    """Parts of a name as words; those after a person are capital."""
-    return " ".join(part.capitalize() if part in _PERSONS else part for part in name.split("_"))
+    """Parts of a name as words; names of scientists have a capital."""
+    return " ".join(part.capitalize() if part in _SCIENTISTS else part for part in name.split("_"))
 
 
 def quantity(value: float, unit: str) -> str:
@@ -93,20 +93,20 @@ def times(value: float | None) -> str:
 
 
 def interval(pair: tuple[float, float] | None) -> str:
-    """Two shares as text, `95 % to 98 %`; empty where there is no interval."""
+    """Two shares as text, `95 % to 98 %`; empty without an interval."""
     if pair is None or not (math.isfinite(pair[0]) and math.isfinite(pair[1])):
         return ""
     return f"{percent(pair[0])} to {percent(pair[1])}"
 
 
 def band(edges_Hz: tuple[float, float]) -> str:
-    """A band as text, `0 to 20 Hz`; `above 20 Hz` where the upper end is not finite."""
+    """A band as text, `0 to 20 Hz`; `above 20 Hz` if the upper end is not finite."""
     low_Hz, high_Hz = edges_Hz
     return f"{low_Hz:g} to {high_Hz:g} Hz" if math.isfinite(high_Hz) else f"above {low_Hz:g} Hz"
 
 
 def prefixed(size: float, unit: str) -> tuple[float, str]:
-    """A factor, and the unit with its prefix, which bring a number of this size between 1 and 1000."""
+    """The factor and the prefixed unit that bring a number of this size between 1 and 1000."""
     if unit == "%":
         return 100.0, unit
     if unit in _WITHOUT_PREFIX or not math.isfinite(size) or size == 0.0 or 0.1 <= size < 1000.0:
@@ -116,7 +116,7 @@ def prefixed(size: float, unit: str) -> tuple[float, str]:
 
 
 def decimals_of(width: float) -> int:
-    """Decimals for a number whose interval is `width` wide: two digits of the width, as more have no meaning."""
+    """Decimals for a number whose interval is `width` wide: two digits of the width."""
     return min(max(1 - math.floor(math.log10(width)), 0), 6)
 
 

@@ -1,10 +1,13 @@
-"""What a person touches: the `stickslip` command. The only package that knows both the controller and the plant.
+"""The `stickslip` command. The only package that imports both the controller and the plant.
 
-cli         all commands            commands/   one file a group of commands
-run/        a run, on the bus or in one process; a log replayed
-bank/       the bench of the controller: many made rigs, judged by what truly happens on them
-fleet/      many rigs diagnosed, each once, and which of them share a gap
-judge/      what came of a run, in numbers and words
+cli         all commands            commands/   one file per group of commands
+run/        a run, on the bus or in one process; replay of a log
+fleet/      diagnosis of many rigs, each once, and the rigs that share a gap
+judge/      the verdict on a run, in numbers and words
 figures/    a log as a figure               review/     a log as a page
-paper/      the paper redone
+paper/      the paper recomputed
+faults/     catalogue of faults
+live/       a running rig, live
+look/       `stickslip look`
+entry       entry point of the `stickslip` command
 """

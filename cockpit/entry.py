@@ -1,44 +1,45 @@
-"""Where the `stickslip` command begins."""
+"""Entry point of the `stickslip` command."""
 
 import atexit
 import logging
 import os
 import sys
 
-from cockpit.cli import app
+import typer
+
+from cockpit.cli import app as stickslip
 from cockpit.run.child_process import guarded, prepare_stdout
 
 
-def main() -> None:
-    """Entry point of the `stickslip` command."""
-    # for joblib, which starts its workers with `python -m`: the folder of the person who calls would be searched first, and
-    # may hold a plant.py or numpy.py of that person's own
+def main(app: typer.Typer = stickslip) -> None:
+    """Run the command line of `app` and end the process; `python -m bench` passes another app."""
+    # joblib starts its workers with `python -m`, which would import a plant.py or numpy.py from the current folder first
     os.environ["PYTHONSAFEPATH"] = "1"
     os.environ["MPLBACKEND"] = (
-        "Agg"  # pictures are files; matplotlib refuses to start where the variable names none it knows
+        "Agg"  # pictures are only written to files; matplotlib fails at import if the variable holds an unknown name
     )
-    # Of the 90 ms that numpy's import takes on two cores, 35 start the second thread of linear algebra, and two threads add in
-    # another order than one. diagnosis/processes.py gives a diagnosis one thread wherever it is called from.
+    # numpy's import takes 90 ms on two cores; 35 ms of them start the second thread of linear algebra. Two threads also add in
+    # another order than one. diagnosis/processes.py sets one thread for a diagnosis that is called from other programs.
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    os.environ["PYDANTIC_DISABLE_PLUGINS"] = "1"  # to look for some takes 10 ms, of which a stop has none to spare
-    # a picture looks the same where a read-only home keeps no cache of its fonts, of which matplotlib warns in two lines
+    os.environ["PYDANTIC_DISABLE_PLUGINS"] = "1"  # the search for plugins takes 10 ms, which would delay a stop
+    # a read-only home holds no font cache; matplotlib warns of it in two lines, but the picture is the same
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     prepare_stdout()
-    status = 1  # of an exception that no command catches
+    status = 1  # for an exception that no command catches
 
     def end() -> None:
         sys.stdout.flush()
         os._exit(status)
 
-    # The first function that is registered runs last, and the interpreter is not dismantled: a thread of Arrow that frees a
-    # table's bytes after that began aborts the process. Both cores busy, 7 of 48 commands that read a CSV ended by SIGABRT.
+    # Registered first, so it runs last, and ends the process before the interpreter is torn down: an Arrow thread that frees a
+    # table during the teardown aborts the process. With both cores busy 7 of 48 commands that read a CSV ended by SIGABRT.
     atexit.register(end)
-    status = guarded(_status)
+    status = guarded(lambda: _status(app))
     sys.exit(status)
 
 
-def _status() -> int:
-    """Exit status of the command line; help and version are guarded as results are."""
+def _status(app: typer.Typer) -> int:
+    """Exit status of the command line; help and version end here too, so that a closed stdout is handled for them as well."""
     try:
         app()
     except SystemExit as end:

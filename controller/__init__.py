@@ -1,25 +1,25 @@
-"""The supervisory controller: listens to a rig, tells stick, slip and smooth sliding apart, keeps v_a at or above v_d.
+"""The supervisory controller: reads a rig's sensors, detects stick, slip and smooth sliding, keeps v_a at or above v_d.
 
 config         the controller file, checked
 records        the derived numbers (`PARAMS`) and all memory (`STATE`)
-announced      what the rig has announced of v_d
-estimate/      windows, motion, contact, learning: what drive and slide do
+announced      v_d as the rig has announced it
+estimate/      windows, motion, contact, learning: the motion of drive and slide
 vibration      the measured v_a
 frequency      the cheapest allowed frequency
 modes          going from one mode to another
 needs/         at which speeds vibration is needed, how much, whether at all, and when none helps
 policy         the wanted v_a
 amplitude      the wanted amplitude, by the learnt gain and delay of the exciter
-trips/         what is taken for a fault of a sensor or the exciter, and what is done then
+trips/         faults of sensors and exciter, and the response to them
 limits         the allowed vibration
 core           one step of all of these
 telemetry      the state for plots and the memory for replay
 node, app      the controller as a participant of the bus; the process
 freshness      whether blocks come in time; stalls of the controller itself
-doubts         faults of the messages that it receives; rig_header: whether it can control the rig
-replay         the controller on the frames of a log, piece by piece; replay_steps: its steps compared with those of the log
+replay         the controller on the frames of a log, piece by piece; replay_steps: its steps compared with the log's
 codes          modes, states, reasons and limits as numbers
 loop_design    margins of the amplitude loop where its delay is off
+message_faults faults of the messages that it receives; rig_header: whether it can control the rig
 
     v_d  drive velocity [m/s]          s    1 - v_s / v_d, the force rate (dF_d/dt) / (k_d v_d) [-]
     v_s  velocity of the slide [m/s]   k_d  stiffness of the drive [N/m]

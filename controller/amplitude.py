@@ -1,9 +1,9 @@
 """The commanded amplitude for a wanted v_a: by the exciter's gain, learnt from the delivered v_a.
 
-The measured v_a is compared with all that was commanded within the longest loop delay that the loop is made for. Only what none
-of these commands explains is the gain's doing and teaches it (set membership: the delay is unknown but bounded). So whatever the
-delay is, and however it changes, what is learnt never passes the true gain, and the command follows from it without an integrator
-behind the delay. A gain that was never measured starts at a tenth of the rigid mount's stroke, as a mount may resonate tenfold.
+The measured v_a is compared with all commands within the longest loop delay that the loop is designed for. The gain is learnt
+only from a v_a that none of these commands explains (set membership: the delay is unknown but bounded). So the learnt gain never
+passes the true gain, for any delay and any change of it, and the command needs no integrator behind the delay. A gain that was
+never measured starts at a tenth of the rigid mount's stroke, as a mount may resonate tenfold.
 """
 
 import math
@@ -23,8 +23,8 @@ _UNKNOWN_DELAY_S = 0.05  # loop delay until it is measured: the longest that the
 SETTLE_S = 0.004  # of vibration until a first gain is believed
 LEARN_S = 0.01  # time constant of the learnt gain
 MOST_DELAY_S = 0.05  # loop delay that the loop is made for. Longer: a gain that changes while v_d does is learnt later
-TAIL = 3.0  # time constants of the demodulator's low-pass after which what was commanded before is gone
-SLOTS = 18  # in which the extremes of what was commanded are kept, so that a look at them takes as many steps at any block length
+TAIL = 3.0  # time constants of the demodulator's low-pass after which earlier commands have no effect
+SLOTS = 18  # of extremes of the command; a fixed number, so that a scan costs the same at any block length
 _HEARD = 5.0  # sigmas of the silent accelerometer from which a vibration counts as heard
 _LEAST_HEARD_MPS = 1e-7  # below it no accelerometer hears a vibration of some kHz
 _MEAN_STEPS = 50  # silent blocks that the noise is a mean of
@@ -34,7 +34,7 @@ _FEW_STEPS = 10  # up to which the blocks before a vibration arrives count as si
 _UNSURE_STEPS = 5.0
 _LOUDER, _MUCH_LOUDER = 1.3, 2.0  # measured over wanted v_a at which the command is corrected, or cut, at once
 LOUD_S = 0.003  # for which it is louder
-SILENCE_S = 0.1  # of commands of zero until the base is taken to stand still
+SILENCE_S = 0.1  # of zero commands until the base counts as at rest
 _LARGEST_LOG_GAIN = 4.6  # a factor of 100 either way
 _WEAK_S = 0.05  # until a piezo is called weak, and until no longer
 _ALARM_RATIO = 1.05  # v_a / v_d below which a vibration is too weak
@@ -42,7 +42,7 @@ _ALARM_RATIO = 1.05  # v_a / v_d below which a vibration is too weak
 
 @kernel
 def note_sent(p: Record, s: Record) -> None:
-    """Remember what this step commands and wants [m/s]."""
+    """Remember the commanded and the wanted v_a of this step [m/s]."""
     s.sent_m[s.steps % REMEMBERED] = s.allowed_m
     sent_mps, slot = TWO_PI * s.allowed_Hz * s.allowed_m, s.steps // p.slot_steps % p.slots
     anew = s.steps % p.slot_steps == 0
@@ -75,9 +75,7 @@ def listen(p: Record, s: Record, late: bool) -> None:
     A block that comes `late` shows a v_a that was commanded longer ago than is known: nothing is learnt from it. Soon after a
     stall no gain is learnt, as the rig may not vibrate again yet; too much v_a is cut all the same.
     """
-    if (
-        s.guard_state == CHECKING
-    ):  # what vibrates are the tones of the rig's check: they teach nothing of what is commanded
+    if s.guard_state == CHECKING:  # the rig's check vibrates with its tones, which are no answer to a command
         s.silent_steps, s.heard_steps, s.loud_steps, s.even_steps = 0, 0, 0, 0
         s.expected_mps, s.in_phase_mps2, s.quadrature_mps2 = 0.0, 0.0, 0.0
         return
@@ -116,7 +114,7 @@ def listen(p: Record, s: Record, late: bool) -> None:
 
 @kernel
 def _learn(p: Record, s: Record, i: int, most_mps: float) -> None:
-    """Learn the gain of a candidate from what no command of the last loop delays explains; `most_mps` is the largest of them."""
+    """Learn a candidate's gain from a v_a that no recent command explains; `most_mps` is the largest of these commands."""
     now_mps = s.vibration_velocity_mps
     if s.expected_mps <= 0.0 or now_mps <= 0.0:
         return
@@ -135,7 +133,7 @@ def _learn(p: Record, s: Record, i: int, most_mps: float) -> None:
 
 @kernel
 def _note_silence(s: Record) -> None:
-    """Learn the noise of the accelerometer of a base that stands still."""
+    """Learn the accelerometer's noise while the base is at rest."""
     s.noise_steps = min(s.noise_steps + 1, _MEAN_STEPS)
     s.noise_mps += (s.fast_mps - s.noise_mps) / s.noise_steps
 
@@ -171,7 +169,7 @@ def _hold_down(p: Record, s: Record, i: int, most_mps: float) -> None:
 
 @kernel
 def amplitude(p: Record, s: Record) -> None:
-    """Set the wanted amplitude [m] for the wanted v_a, and say whether the piezo is too weak for it."""
+    """Set the wanted amplitude [m] for the wanted v_a, and decide whether the piezo is too weak for it."""
     velocity_mps = s.wanted_velocity_mps
     s.cut_steps = max(s.cut_steps - 1, 0)
     if velocity_mps <= 0.0 or s.cut_steps > 0:
@@ -186,7 +184,7 @@ def amplitude(p: Record, s: Record) -> None:
         s.wanted_m = model_m * math.exp(-s.log_gain[s.candidate])
     else:
         delay_s = _UNKNOWN_DELAY_S if s.loop_delay_steps < 0 else (s.loop_delay_steps + 1) * p.block_s + SETTLE_S
-        if s.heard_steps == 0:  # what is heard is believed first: as much again is on its way
+        if s.heard_steps == 0:  # no growth once v_a is measured: commands of the last loop delay still act later
             s.growth = min(s.growth * _GROWTH ** (p.block_s / delay_s), 1.0)
         s.wanted_m = model_m * s.growth
     s.wanted_m = banded(p, s, s.wanted_m, model_m)

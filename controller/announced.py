@@ -1,4 +1,4 @@
-"""What the rig has announced of the drive's velocity: a ring of the newest in the controller's memory."""
+"""The drive velocity that the rig has announced: a ring of the newest announcements in the controller's memory."""
 
 import math
 from typing import Final

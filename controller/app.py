@@ -9,7 +9,7 @@ from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.clock import time
 from bridge.wire.complaints import FOREIGN
-from bridge.wire.event_codes import is_told
+from bridge.wire.event_codes import is_listed
 from bridge.wire.inbox import WAITING
 from bridge.wire.payloads import parsed
 from bridge.wire.session import LEASE_S
@@ -26,20 +26,20 @@ from bridge.wire.topics import (
 )
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
 from controller.config import ControllerConfig
-from controller.doubts import Doubts
 from controller.freshness import Events, Freshness
+from controller.message_faults import MessageFaults
 from controller.node import ControllerNode
 from controller.rig_header import RigAgain, refuse_another_rig
 
 _PLANT_LOST_S = 1.0  # silence after which a plant that has left the bus counts as lost
 _GIVEN_UP_S = 30.0  # without a rig this process ends then, as long as one waits for a rig at the start
 _HEADER_S = 1.0  # longest wait for the header of the rig; a rig without one delays the start by all of it
-_TOLD_S = 1.0  # longest wait for a plant at the start; a rig without a liveliness token delays it by all of that
+_TOKEN_WAIT_S = 1.0  # longest wait for a plant at the start; a rig without a liveliness token costs all of it
 _AT_ONCE_S = 0.05  # time for a second controller of the same moment to appear, and the period of looking again
-_SAID_AGAIN_S = 0.4  # between two answers to one command of an operator, which comes every 0.5 s until it is answered
-_MOST_SAID = 16  # answers to operators a second; commands beyond are applied without an answer
+_ANSWER_EVERY_S = 0.4  # between two answers to one command, which is repeated every 0.5 s until answered
+_MOST_ANSWERS = 16  # answers to operators a second; commands beyond are applied without an answer
 _LONGEST_WHO = 200  # letters of a name
-_UNSEEN = "is its transducer at the end of its range, or loose? without v_d nothing is vibrated"
+_UNSEEN = "is its transducer at the end of its range, or loose? without v_d there is no vibration"
 # Wait for another controller to leave. Shorter: a frozen controller refuses this one, though its lease is about to end. Longer: a
 # second controller is refused later.
 _OTHER_GONE_S = LEASE_S + 0.2
@@ -53,7 +53,7 @@ def run(
     stop: threading.Event,
     tell: Tell = untold,
 ) -> int:
-    """Answer every block on the bus until the plant ends its run or `stop` is set; how many steps.
+    """Answer every block on the bus until the plant ends its run or `stop` is set; return the number of steps.
 
     `tell`: reports the life of this process to the operator.
 
@@ -89,7 +89,7 @@ def _refuse_a_second(bus: Bus, endpoint: str) -> None:
     time see each other's claims: the controller with the higher claim yields.
     """
     mine, others = bus.claim()
-    bus.wait_for(["plant"], _TOLD_S)  # by then the bus has told of all others, apart from those of the same moment
+    bus.wait_for(["plant"], _TOKEN_WAIT_S)  # by then all others are known, except a controller that starts now
     time.sleep(_AT_ONCE_S)
     since_s = time.monotonic()
     while (rivals := others()) or bus.alive("controller"):
@@ -108,7 +108,7 @@ class ControllerProcess:
         bus: its session.
         lockstep: whether each block waits for its command.
         inbox: where its messages wait; by default a new one.
-        tell: reports the life of this process, and the events that are more than news, to the operator.
+        tell: reports the life of this process and its important events to the operator.
 
     """
 
@@ -130,17 +130,17 @@ class ControllerProcess:
         self._inbox = inbox or Inbox(WAITING)
         self._send: dict[str, Callable[[bytes], None]] = {}
         self._events = 0
-        self._doubts = Doubts(node, self._inbox, self.event)
-        self._said_s: dict[str, float] = {}  # answers to operators within the last second, and when
-        self._end_said_s: float | None = None
+        self._doubts = MessageFaults(node, self._inbox, self.event)
+        self._reported_s: dict[str, float] = {}  # answers to operators within the last second, and when
+        self._end_sent_s: float | None = None
         self._restarts = 0
         self._rig_again = RigAgain(self._rig_header, config)
         self._rig_came = 0
         self._rig_lost = ""  # the reason, from RIG_LOST until blocks come again
         self._blocks = Freshness(config.block_s, config.limits.stale_after_s)
         self._unreadable = False  # NOT_FINITE was published, and no FRESH since
-        self._unreadable_told_s = -1.0
-        self._numbers_again = 0  # blocks in a row whose samples are numbers, since the last one that had another
+        self._unreadable_reported_s = -1.0
+        self._numbers_again = 0  # blocks in a row with finite samples only
 
     def prepare(self) -> None:
         """Open the publishers and listen to plant and operator."""
@@ -159,7 +159,7 @@ class ControllerProcess:
         event = wire.Event(sequence=self._events, t_ns=self._node.t_ns, source="controller", code=code, text=text)
         self._events += 1
         self._send[CONTROLLER_EVENT.name](event.SerializeToString())
-        if is_told(code):
+        if is_listed(code):
             self._tell(code, text)
 
     def loop(self, stop: threading.Event, granted: str) -> None:
@@ -172,14 +172,14 @@ class ControllerProcess:
         finally:
             self._fade_out()
             self._publish(self._blocks.paused())
-            self._doubts.complaints.tell_when_due(all_of_it=True)
+            self._doubts.complaints.report_when_due(all_of_it=True)
         node = self._node
         self.event("END", f"steps={node.steps} duplicates={node.duplicates} dropped={self._inbox.dropped}")
 
     @property
     def _ended(self) -> bool:
         """Whether the rig sent END and left the bus. END alone may be forged, so it is ignored while the rig stays."""
-        return self._end_said_s is not None and not self._bus.alive("plant")
+        return self._end_sent_s is not None and not self._bus.alive("plant")
 
     def _answer(self, stop: threading.Event, granted: str) -> None:
         self._rig_came = self._bus.came("plant")
@@ -266,40 +266,40 @@ class ControllerProcess:
         self._report_unreadable()
         self._publish(node.news())
         if node.slide_accel_unread:
-            text = "a sample is no number; the controller goes on without this channel"
+            text = "a sample is not a number; the controller continues without this channel"
             self._doubts.complaints.note("NOT_FINITE", f"{SENSORS.name} mass_accel_mps2", text)
         if node.slipped_unmoved:
-            text = f"block {node.last_block}: a slip, while the drive position stands: {_UNSEEN}"
+            text = f"block {node.last_block}: a slip, but the drive position is constant: {_UNSEEN}"
             self._doubts.complaints.note("DRIVE_UNSEEN", SENSORS.name, text)
         if node.restarts != self._restarts:
             self._restarts = node.restarts
-            text = f"block {node.last_block} after block {before}: taken up again, windows begin anew"
+            text = f"block {node.last_block} after block {before}: the controller continues with empty windows"
             self.event("RIG_RESTARTED", text)
             self._rig_again.begin()
-        if self._rig_lost:  # why is published again, as the link was down when it was lost
+        if self._rig_lost:  # with the reason again: RIG_LOST may not have passed the broken link
             self._tell("joined", "the rig again")
-            self.event("RIG_BACK", f"blocks come again, from block {node.last_block} on; {self._rig_lost}")
+            self.event("RIG_BACK", f"blocks arrive again, from block {node.last_block} on; {self._rig_lost}")
             self._rig_lost = ""
-        if self._end_said_s is not None and time.monotonic() - self._end_said_s > _PLANT_LOST_S:
-            self._end_said_s = None
-            self._doubts.complaints.note(FOREIGN, PLANT_EVENT.name, "END, but the rig is there and goes on: ignored")
+        if self._end_sent_s is not None and time.monotonic() - self._end_sent_s > _PLANT_LOST_S:
+            self._end_sent_s = None
+            self._doubts.complaints.note(FOREIGN, PLANT_EVENT.name, "END, but the rig still runs: ignored")
 
     def _take_rig_event(self, event: wire.Event) -> None:
         if event.code == "END":
-            self._end_said_s = time.monotonic()
+            self._end_sent_s = time.monotonic()
         elif event.code == "START" and self._lockstep and event.text != "lockstep":
-            line = f"{PLANT_EVENT.name}: START says {event.text!r}: must say 'lockstep' to a controller --lockstep, which waits"
+            line = f"{PLANT_EVENT.name}: START {event.text!r}: must be 'lockstep', as a controller --lockstep waits"
             raise Fault(
                 "CONFIG", f"{line} for ever where blocks stop coming; leave --lockstep away, or give it to the rig too"
             )
 
     def _report_unreadable(self) -> None:
-        """Report samples that are no numbers, and their end once blocks of numbers last."""
+        """Report blocks with NaN or infinite samples, and FRESH once blocks were finite for `stale_after_s`."""
         if self._node.unreadable:
             self._numbers_again = 0
-            if not self._unreadable and time.monotonic() > self._unreadable_told_s + 1.0:
-                self._unreadable, self._unreadable_told_s = True, time.monotonic()
-                text = f"block {self._node.last_block} holds a sample that is no number: ramping to zero"
+            if not self._unreadable and time.monotonic() > self._unreadable_reported_s + 1.0:
+                self._unreadable, self._unreadable_reported_s = True, time.monotonic()
+                text = f"block {self._node.last_block} holds a sample that is not a number: ramping to zero"
                 self.event("NOT_FINITE", text)
         elif self._unreadable:
             self._numbers_again += 1
@@ -313,16 +313,16 @@ class ControllerProcess:
         if word.action not in wire.Operator.Action.values():
             raise Fault("BAD_MESSAGE", f"{OPERATOR.name}: action = {word.action}: not known")
         self._node.operator(word.action)
-        if self._node.rig_tells and self._blocks.is_fresh:  # a rig with a guard reports it
+        if self._node.rig_reports and self._blocks.is_fresh:  # a rig with a guard reports it
             return
-        said = f"{wire.Operator.Action.Name(word.action)} by {word.who[:_LONGEST_WHO] or 'somebody'}"
+        report = f"{wire.Operator.Action.Name(word.action)} by {word.who[:_LONGEST_WHO] or 'an unnamed operator'}"
         now_s = time.monotonic()
-        if now_s - self._said_s.get(said, -_SAID_AGAIN_S) < _SAID_AGAIN_S:
+        if now_s - self._reported_s.get(report, -_ANSWER_EVERY_S) < _ANSWER_EVERY_S:
             return
-        self._said_s = {text: at_s for text, at_s in self._said_s.items() if now_s - at_s < 1.0}
-        if len(self._said_s) < _MOST_SAID:
-            self._said_s[said] = now_s
-            self.event("OPERATOR", said)
+        self._reported_s = {text: at_s for text, at_s in self._reported_s.items() if now_s - at_s < 1.0}
+        if len(self._reported_s) < _MOST_ANSWERS:
+            self._reported_s[report] = now_s
+            self.event("OPERATOR", report)
 
     def _send_rest(self, arrival_ns: int) -> None:
         lateness_ns = time.perf_counter_ns() - arrival_ns if arrival_ns else 0

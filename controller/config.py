@@ -17,14 +17,14 @@ MODES: tuple[Mode, ...] = get_args(Mode)
 
 
 class EstimatorConfig(Strict):
-    """What the estimate of stick, slip and smooth sliding may use. Everything else is measured."""
+    """Inputs of the estimate of stick, slip and smooth sliding. Everything else is measured."""
 
     use_force: bool = Field(default=True, description="false: the rig has no force sensor; positions decide.")
     use_slide_position: bool = Field(
         default=True, description="false: the rig has none; force and drive_stiffness_N_per_m decide."
     )
-    # a transducer that drifts by 0.5 um in a second is one that warms up, and no axis feeds at 30 um a minute
-    least_feed_mps: Positive = Field(default=5e-7, description="Drive velocity up to which the drive stands.")
+    # 0.5 um/s is the drift of a transducer that warms up; no axis feeds that slowly (30 um a minute)
+    least_feed_mps: Positive = Field(default=5e-7, description="Drive speed up to which the drive counts as at rest.")
 
 
 class PolicyConfig(Strict):
@@ -67,13 +67,13 @@ class AmplitudeConfig(Strict):
     filter_s: Positive = Field(default=0.005, description="Time constant of the demodulated amplitude.")
     gain_band: Annotated[float, Field(ge=1.1, le=3.0)] = Field(
         default=1.4,
-        description="Factor by which the exciter's gain may change either way. The stroke is never more than this times what "
-        "the known gain asks for; beyond it the accelerometer is doubted.",
+        description="Factor by which the exciter's gain may change either way. It also limits the stroke, relative to the stroke "
+        "at the known gain; beyond it the accelerometer is doubted.",
     )
     known_gain: Positive | None = Field(
         default=None,
-        description="Delivered over commanded v_a of the exciter as it is mounted, the same at every frequency. Not given: as "
-        "measured when it first vibrates.",
+        description="Delivered over commanded v_a of the mounted exciter, the same at every frequency. Not given: measured "
+        "at the first vibration.",
     )
     accel_bandwidth_Hz: Positive = Field(
         default=10000.0,
@@ -95,7 +95,7 @@ class LimitsConfig(Strict):
     frequency_max_Hz: Positive = 5000.0
     # the carrier of the displacement transducers is 4.8 kHz: a vibration near it beats with it
     forbidden_Hz: Annotated[list[Two], Field(max_length=MOST_BANDS)] = Field(
-        default=[(4600.0, 5000.0)], description="Bands [low, high] in which nothing is vibrated."
+        default=[(4600.0, 5000.0)], description="Bands [low, high] without vibration."
     )
     travel_m: Two | None = Field(
         default=None,
@@ -171,7 +171,7 @@ MOST_CANDIDATES = 64  # frequencies to choose from; more: finer steps, more memo
 # Lowest candidate over the contact resonance. Smaller: the v_a / v_d that stops stick-slip depends on the damping. Larger: fewer
 # frequencies are left. From about 2 up, v_a / v_d = 1.05 stops stick-slip for any damping.
 _ABOVE_RESONANCE = 2.2
-_LEAST_GAP_HZ = 2.0  # between bands: a frequency in a band moves to 1 Hz beside it, which must not lie in the next band
+_LEAST_GAP_HZ = 2.0  # between bands: a frequency in a band moves to 1 Hz outside, which must not lie in the next band
 
 
 def forbidden_bands_Hz(limits: LimitsConfig) -> list[tuple[float, float]]:

@@ -12,14 +12,14 @@ from controller.estimate.contact import contact
 from controller.estimate.learning import begin, forces, spring, stiffness
 from controller.estimate.motion import drive_velocity
 from controller.estimate.spikes import find_spikes, learn_bends, sum_without
-from controller.estimate.windows import BINS, DRIVE, FORCE, MOST_FRESH, SLIDE, begin_anew, note_steps, push
+from controller.estimate.windows import BINS, DRIVE, FORCE, MOST_FRESH, SLIDE, clear_windows, note_steps, push
 from controller.limits import allow
 from controller.needs.need import way_of
 from controller.policy import decide
 from controller.trips.band import begin_known, note_check
 from controller.trips.doubts import end_trips
 from controller.trips.stall import is_judged, note_stall
-from controller.trips.watch import restrain, told_reason, watch
+from controller.trips.watch import reported_reason, restrain, watch
 from controller.vibration import measure, skip
 
 _STEPS_LOOK = 16  # blocks for one look at the resolution, which does not change
@@ -72,7 +72,7 @@ def step(
             listen(p, s, events & LATE != 0)
             force_N = _look(p, s, block)
             if not is_judged(s):
-                s.even_steps = 0  # what was commanded lately is not what this block shows
+                s.even_steps = 0  # this block does not show the latest commands
             watch(p, s, block)
             decide(p, s, t_ns, force_N, p.block_s)
             restrain(p, s)
@@ -88,7 +88,7 @@ def step(
     c.amplitude_m = s.allowed_m
     c.mode = s.mode
     c.limit = s.limit
-    c.reason = told_reason(s)
+    c.reason = reported_reason(s)
     c.run = s.run
 
     t: Record = trace[0]
@@ -129,7 +129,7 @@ def step(
 
 @kernel
 def _begin(p: Record, s: Record) -> None:
-    """What of the memory is not zero at the start."""
+    """Set the memory that is not zero at the start."""
     begin(p, s)
     begin_known(p, s)
     s.followed, s.confirmed, s.went_m[:] = -1, 1.0, -1.0
@@ -165,10 +165,10 @@ def _mean(p: Record, s: Record, block: Record, first: int, samples: int) -> tupl
 
 @kernel
 def _bridge(p: Record, s: Record, block: Record) -> None:
-    """Fill the windows evenly over lost blocks; begin anew where more are lost than the shortest windows remember."""
+    """Fill the windows evenly over lost blocks; empty them where more are lost than the shortest windows remember."""
     bins = s.missing_blocks * (p.samples_per_block // p.bin_samples)
     if bins > _MOST_BRIDGED_BINS or s.pushed[0] < BINS:
-        begin_anew(s)
+        clear_windows(s)
         return
     # from the mean of the last window to the mean of as many samples: single samples would bend the windows by their noise
     force_N, slide_m, drive_m = 0.0, 0.0, 0.0

@@ -28,7 +28,7 @@ TWO_PI = 2.0 * math.pi
 def _allowed_frequency(p: Record, frequency_Hz: float) -> float:
     """The nearest frequency inside the range and outside every forbidden band, upwards first [Hz]."""
     result = min(max(frequency_Hz, p.frequency_min_Hz), p.frequency_max_Hz)
-    for i in range(p.bands):  # the bands are 2 Hz or more apart, so 1 Hz beside a band lies in no other
+    for i in range(p.bands):  # the bands are 2 Hz or more apart, so 1 Hz outside a band lies in no other
         low, high = p.band_Hz[i, 0], p.band_Hz[i, 1]
         if low <= result <= high:
             if high < p.frequency_max_Hz:
@@ -92,7 +92,7 @@ def allow(p: Record, s: Record, events: int, wanted_Hz: float, wanted_m: float) 
 
 @kernel
 def _of_trips(s: Record) -> int:
-    """What holds the amplitude back because of what is doubted."""
+    """The limit on the amplitude that a doubt causes."""
     if s.doubted & DRIVE:
         return NO_DRIVE
     if s.wanted_m == 0.0:

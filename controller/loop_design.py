@@ -1,4 +1,4 @@
-"""The margins of the amplitude loop, where the loop's delay is not what the controller takes it for.
+"""The margins of the amplitude loop when the loop's delay differs from the assumed delay.
 
 The loop runs once a block in the logarithm of v_a, where the exciter's unknown gain is an additive constant:
 
@@ -6,14 +6,14 @@ The loop runs once a block in the logarithm of v_a, where the exciter's unknown 
     r[k]    = ln y[k] - ln e[k]                           measured over expected v_a, both behind the same low-pass
     g[k+1]  = g[k] + a (r[k] - g[k])                      a = learn share
 
-What is expected is what was commanded `assumed` blocks before, so with the true delay r is the gain itself and nothing feeds back
-(a Smith predictor; Smith 1957). A delay that is off leaves the open loop
+The expected v_a is the command `assumed` blocks before, so with the true delay r is the gain itself and nothing feeds back
+(a Smith predictor; Smith 1957). A wrong delay leaves the open loop
 
     L(z) = a / (z - 1 + a) * F(z) * (z^-delay - z^-assumed)
 
 whose size is about the delay's error over the time constant of learning, 10 ms, whatever the delay itself. The controller
-learns less than that: nothing of what some delay up to 50 ms explains (`amplitude`). So these are margins from below, and where
-the delay is off by more than they allow the loop still does not swing.
+learns less than that: only the part that no delay up to 50 ms explains (`amplitude`). So these margins are lower bounds, and the
+loop does not oscillate even if the delay is off by more.
 
 This is a design tool. The controller never imports python-control, which takes a second to load.
 """

@@ -10,7 +10,7 @@ _RETRY_S = 60.0  # until a vibration that could not help is tried again; doubles
 
 @kernel
 def enter(s: Record, mode: int, reason: int) -> None:
-    """Set mode and reason; another mode begins anew what is counted in it."""
+    """Set mode and reason; a change of mode resets the counters of the mode."""
     if s.mode != mode:
         s.mode = mode
         s.mode_s = 0.0

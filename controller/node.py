@@ -5,7 +5,7 @@ from typing import Any
 from bridge.faults import Fault
 from bridge.kernel_cache import compile_once
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.block_numbers import BlockNumbers, Verdict
+from bridge.wire.block_numbers import BlockNumbers, NumberCheck
 from bridge.wire.messages import ANNOUNCE as ANNOUNCE_LAYOUT
 from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
 from bridge.wire.messages import TRACE as TRACE_LAYOUT
@@ -20,13 +20,13 @@ from controller.records import build
 from controller.telemetry import SNAPSHOT_EVERY, STATE_EVERY, plotted, snapshot
 from controller.trips.age import MARGIN_NS, Age
 from controller.trips.stall import SETTLED_S
-from controller.trips.tell import TripTeller
+from controller.trips.trip_events import TripEvents
 
-_ANEW_BLOCKS = 1024  # that count as lost before the first block of a rig that was restarted: every window begins anew
+_RESTART_BLOCKS = 1024  # counted as lost before the first block of a restarted rig, which empties every window
 _MOST_GAP_BLOCKS = 1 << 20  # lost blocks that are counted at once; more do not fit into a trace
 # Blocks in a row of one wrong length from which the rig's blocks have that length, and no clock jumped
 _WRONG_LENGTHS = 3
-_FASTEST_MPS = 100.0  # of a drive; an announcement beyond it is no velocity
+_FASTEST_MPS = 100.0  # of a drive; faster announcements are refused
 
 
 class ControllerNode:
@@ -41,9 +41,9 @@ class ControllerNode:
     """
 
     def __init__(self, config: ControllerConfig, lockstep: bool = False) -> None:
-        self.duplicates = 0  # blocks that came again, or after they were given up
-        self.restarts = 0  # times that the rig began anew
-        self.clock_jump_ns = 0  # of the last block: its t_ns against what its number says
+        self.duplicates = 0  # blocks repeated, or too late: already counted as a gap
+        self.restarts = 0  # restarts of the rig
+        self.clock_jump_ns = 0  # of the last block: t_ns minus the time by its number
         self.steps = 0
         self.t_ns = 0  # of the last frame
         self._params, self._state = build(config)
@@ -60,11 +60,11 @@ class ControllerNode:
         self._wrong_lengths_ns: list[int] = []
         self._operator_events = 0
         self._announced = 0  # the bit ANNOUNCED where announcements came since the last frame
-        self._teller = TripTeller()
+        self._teller = TripEvents()
         self.age = Age()
         self._lockstep = lockstep
         self.slide_accel_unread = False  # the slide's accelerometer shows no numbers
-        self.slipped_unmoved = False  # in the last step a slip began while the drive position stood
+        self.slipped_unmoved = False  # in the last step a slip began at a constant drive position
 
     @property
     def amplitude_m(self) -> float:
@@ -72,8 +72,8 @@ class ControllerNode:
         return float(self._state[0]["allowed_m"])
 
     @property
-    def rig_tells(self) -> bool:
-        """Whether the rig has a guard, which takes a person's words and says so."""
+    def rig_reports(self) -> bool:
+        """Whether the rig has a guard, which applies the operator's commands and reports them."""
         return int(self._state[0]["guard_state"]) != wire.NO_GUARD
 
     @property
@@ -88,7 +88,7 @@ class ControllerNode:
 
     @property
     def strays(self) -> int:
-        """Blocks whose numbers are of no rig that is known."""
+        """Blocks whose numbers fit no known rig."""
         return self._numbers.strays
 
     @property
@@ -117,26 +117,24 @@ class ControllerNode:
         self._operator_events = obeyed(self._operator_events, action)
 
     def announcement(self, payload: bytes) -> None:
-        """Take what the rig announces of its drive; it is part of the next frame. Raises Fault BAD_MESSAGE."""
-        said = ANNOUNCE_LAYOUT.read(payload, ANNOUNCE.name)[0]
-        if not abs(said.drive_velocity_mps) <= _FASTEST_MPS:
-            line = (
-                f"{ANNOUNCE.name}: drive_velocity_mps = {said.drive_velocity_mps:g}: must be at most {_FASTEST_MPS:g}"
-            )
+        """Take the rig's announcement of its drive velocity for the next frame. Raises Fault BAD_MESSAGE."""
+        message = ANNOUNCE_LAYOUT.read(payload, ANNOUNCE.name)[0]
+        if not abs(message.drive_velocity_mps) <= _FASTEST_MPS:
+            line = f"{ANNOUNCE.name}: drive_velocity_mps = {message.drive_velocity_mps:g}: must be at most {_FASTEST_MPS:g}"
             raise Fault("BAD_MESSAGE", f"{line} either way; announce m/s")
-        if said.holds_from_ns < said.t_ns:
-            line = f"{ANNOUNCE.name}: holds_from_ns = {said.holds_from_ns}: must not be before t_ns = {said.t_ns}"
-            raise Fault("BAD_MESSAGE", f"{line}; announce what is to come")
-        take_announcement(self._state[0], said.holds_from_ns, said.drive_velocity_mps)
+        if message.holds_from_ns < message.t_ns:
+            line = f"{ANNOUNCE.name}: holds_from_ns = {message.holds_from_ns}: must not be before t_ns = {message.t_ns}"
+            raise Fault("BAD_MESSAGE", f"{line}; announce the future velocity")
+        take_announcement(self._state[0], message.holds_from_ns, message.drive_velocity_mps)
         self._announced = ANNOUNCED
 
     def rig_was_away(self) -> None:
-        """The rig left the bus and came back: blocks that count from 0 again are those of a new run."""
+        """Note that the rig left the bus and came back: blocks that count from 0 again belong to a new run."""
         self._numbers.sender_was_away()
         self._seals = False
 
     def block(self, payload: bytes, arrival_ns: int = 0, answered_ns: int = 0) -> Outgoing | None:
-        """Consume a sensor block; return the command that answers it, or None for a block that is late, repeated or a stranger's.
+        """Consume a sensor block; return the command that answers it, or None for a late, repeated or foreign block.
 
         Send the command first; then `rest` gives the other messages of the step.
 
@@ -152,20 +150,20 @@ class ControllerNode:
         sequence, t_ns = sequence_and_time(payload, SENSORS.message)
         expected = self._numbers.expected
         verdict = self._numbers.judge(sequence, arrival_ns)
-        if verdict is Verdict.AGAIN:
+        if verdict is NumberCheck.AGAIN:
             self.duplicates += 1  # late or repeated: the controller has counted this block as a gap already
             return None
-        if verdict is Verdict.STRAY:
+        if verdict is NumberCheck.STRAY:
             return None
-        if verdict is Verdict.ANEW:
+        if verdict is NumberCheck.ANEW:
             self.restarts += 1
-            gap_blocks, self.clock_jump_ns = _ANEW_BLOCKS, 0
+            gap_blocks, self.clock_jump_ns = _RESTART_BLOCKS, 0
         else:
             lost = sequence - expected if expected is not None and self.steps else 0
             gap_blocks = min(lost, _MOST_GAP_BLOCKS)
             if expected is not None:
                 self._check_clock(t_ns - self.block_t_ns, lost)
-        if verdict is Verdict.ANEW or self.clock_jump_ns:
+        if verdict is NumberCheck.ANEW or self.clock_jump_ns:
             self.age.forget()
         if not self._lockstep:
             self.age.note(answered_ns, t_ns)
@@ -177,7 +175,7 @@ class ControllerNode:
     def _refuse_changed(self, payload: bytes) -> None:
         """Raise Fault BAD_MESSAGE for a block that was changed on its way; a rig that gave one checksum gives all."""
         if not is_whole(payload):
-            line = f"{SENSORS.name}: checksum: is not that of the block's bytes, which were changed on their way"
+            line = f"{SENSORS.name}: checksum: does not match the block's bytes, which were changed in transit"
             raise Fault("BAD_MESSAGE", f"{line}; look at link and adapter")
         self._seals = True
 

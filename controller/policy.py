@@ -59,20 +59,21 @@ TWO_PI = 2.0 * math.pi
 ON_DEMAND, WHILE_MOVING, START_ONLY, SETTLE = range(len(MODES))
 
 _STICK_STEP, _SLIP_STEP = 0.08, 0.4  # by which the ratio rises at a stick, and at a slip or a surge
-_STARTS_S, _WOUND, _AHEAD = 0.2, 0.5, 1.25  # of a move; of the force at which it slides; of the ratio meanwhile
-_BEGINS_S = 0.02  # of a move in which the spring is looked at
-_RISING = 1.05  # held over measured v_d up to which the drive does not slow down
+# The start of a move; the force over the sliding force from which the spring is wound up; the factor on the ratio until then.
+_STARTS_S, _WOUND, _AHEAD = 0.2, 0.5, 1.25
+_BEGINS_S = 0.02  # first part of a move, in which the spring's force decides whether it is wound up
+_RISING = 1.05  # held over measured v_d; above, the drive slows down
 _ABOVE_SLIDE = 1.1  # v_a over v_s of a slide that is late
-_TURNING_S = 0.05  # that a drive stands at most where it turns
-_STARTING_S = 0.15  # of a vibration in which the contact still lets go of what it held
+_TURNING_S = 0.05  # longest rest of a drive at a reversal
+_STARTING_S = 0.15  # of a vibration; slips until then release the force stored before it
 # Of the expected stick, after which the force is 5 % up: from then on it contradicts that none is needed
 _REAL_STICK = 0.25
-_CALM_SHARE = 6.0  # sticks, as long as expected, without an event until the vibration counts as one that helps
+_CALM_SHARE = 6.0  # expected stick lengths without an event until the vibration counts as helpful
 _LEAST_CALM_S, _MOST_CALM_S = 0.5, 4.0
 _LOOK_STEPS = 16  # blocks for one look at which windows show a swing
-_LEAST_SLIDING = 0.5  # v_s over v_d of a slide whose swing tells something
+_LEAST_SLIDING = 0.5  # v_s over v_d; a slower slide gives no information on the swing
 _EVEN = 0.1  # share of v_d by which the slide is off where it follows
-# Memory of a swing: two periods of the slowest that the spring does not level out; 10 s at most, as energy is lost meanwhile.
+# Memory of a swing: two periods of the slowest swing that the spring does not level out; 10 s at most, as it costs energy.
 _PERIODS, _LONGEST_S = 2.0, 10.0
 _SEEING_S = 2.0  # without being blind until it counts as seeing
 _HELPLESS = 3  # events at the limit, at one frequency, until another is tried, then until it cannot help
@@ -131,9 +132,9 @@ def decide(p: Record, s: Record, t_ns: int, force_N: float, block_s: float) -> N
 
 @kernel
 def _still_sliding_mps(s: Record) -> float:
-    """Velocity of a slide that is late to follow its drive: a v_a that falls below it does not hold the slide any more.
+    """Velocity of a slide that still slows down after its drive: v_a must not fall below it, or the slide is lost.
 
-    A slide that is late only slows down. One that becomes faster is let go by the vibration itself: more lets go of more.
+    Only a decrease counts: a slide that speeds up is released by the vibration itself, and more v_a would release more.
     """
     if s.steady_s > STEADY_S or s.mode != EXCITE or s.mode_s < STEADY_S:
         s.late_mps = math.inf
@@ -147,7 +148,7 @@ def _held_ratio(p: Record, s: Record, way: int, force_N: float, speed_mps: float
     """The ratio in EXCITE. v_d is measured a window late, so a drive that speeds up needs more."""
     if s.steady_s > STEADY_S or s.held_mps > _RISING * speed_mps:
         return s.ratio[way]
-    # more of it only where the spring is not wound up yet: a slide that is held by less runs ahead
+    # more v_a only until the spring is wound up: then the slide would run ahead
     if s.moved_s <= _BEGINS_S:
         s.wound = 1 if s.direction * force_N >= _WOUND * s.slid_N[way] else 0
     starts = s.moved_s < _STARTS_S and s.wound == 0
@@ -156,9 +157,9 @@ def _held_ratio(p: Record, s: Record, way: int, force_N: float, speed_mps: float
 
 @kernel
 def _look_ahead_s(p: Record, s: Record) -> float:
-    """Time from a command to v_a: of a drive that stands to the largest amplitude, of one that moves the loop delay alone.
+    """Time from a command to v_a: loop delay, and for a drive at rest also the slew to the largest amplitude.
 
-    More v_a before its v_d lets go of a slide that is held by less.
+    A moving drive gets no more, as an early v_a would release a slide that a smaller v_a holds.
     """
     if s.moving == 1:
         return (max(s.loop_delay_steps, 0) + 1) * p.block_s
@@ -237,7 +238,7 @@ def _hold(p: Record, s: Record, way: int, force_N: float, speed_mps: float, bloc
     s.waiting_s = max(s.waiting_s - block_s, 0.0)
     forget_failures(s, block_s)
     changed = s.steady_s < STEADY_S  # a slide that lags behind, or runs on after, a change of the drive
-    # a slide that never slid evenly yet still winds up its spring, but for one that the exciter cannot let go
+    # before its first even sliding a slide may stick because its spring still winds up, except at the exciter's limit
     sticks = s.stick_began == 1 and (s.even_s > 0.0 or s.at_limit == 1)
     begun = (s.slip_began == 1 or sticks) and not changed
     if s.mode_s > starting_s and s.slip_began == 1 and changed and s.waiting_s == 0.0:
@@ -276,7 +277,7 @@ def _hold(p: Record, s: Record, way: int, force_N: float, speed_mps: float, bloc
 
 @kernel
 def _note_swing(p: Record, s: Record, force_N: float, speed_mps: float, block_s: float, settle_s: float) -> None:
-    """Remember the swing of friction that makes v_s swing, but for what the ratio itself or a wobble of it does."""
+    """Remember the swing of friction that makes v_s swing, without the swing caused by the ratio or its wobble."""
     share = min(block_s / min(max(_PERIODS * TWO_PI * settle_s, _LEAST_CALM_S), _LONGEST_S), 1.0)
     if s.steps % _LOOK_STEPS == 0 or s.swing_level < 0:
         s.swing_level = windows_for(p, s, speed_mps)
@@ -317,7 +318,7 @@ def _more(p: Record, s: Record, way: int, by: float) -> None:
 
 @kernel
 def _note_roughness(s: Record, speed_mps: float, block_s: float) -> None:
-    """Add up (v_s / v_d - 1)^2, which tells whether a vibration makes the motion worse."""
+    """Add up (v_s / v_d - 1)^2, which shows whether a vibration makes the motion worse."""
     if s.level < 0 or s.moving == 0:
         return
     off = s.sliding_mps / speed_mps - 1.0

@@ -24,7 +24,7 @@ from controller.trips import band, confirmed, delivered, doubts, frozen, spring
 
 _BIN_S = 1e-4  # shortest bin: a window of four sees the slips of a drive of 50 N/um
 _TICK_S = 1e-3  # the contact is judged so often, whatever the length of a block
-_LONGEST_WINDOW_S = 3.3  # a feed of 0.5 um/s stands out of 0.5 um of noise in 0.1 s; drift makes longer windows useless
+_LONGEST_WINDOW_S = 3.3  # a feed of 0.5 um/s exceeds 0.5 um of noise in 0.1 s; drift makes longer windows useless
 
 
 def _divisor(count: int, wanted: float) -> int:
@@ -83,19 +83,19 @@ STATE = np.dtype(
             "noise",
             "f8",
             (ROWS, LEVELS),
-        ),  # of a slope: sigma, or that of a shorter window carried on, and the resolution; 0: unknown
-        ("law_mps", "f8", (LEVELS,)),  # sigma of the slope of x_s + F / k_d - x_d, which is 0 but for noise
+        ),  # of a slope: sigma, or the sigma of a shorter window extrapolated, and the resolution; 0: unknown
+        ("law_mps", "f8", (LEVELS,)),  # sigma of the slope of x_s + F / k_d - x_d, which is 0 without noise
         ("agreements", "i8", (LEVELS,)),  # that it was learnt from
         ("pushed", "i8", (LEVELS,)),
         ("differences", "i8", (LEVELS,)),  # that sigma was learnt from
         ("resolution", "f8", (ROWS,)),
-        # samples that stand alone
+        # spikes: single samples far from their neighbours
         ("bends", "f8", (ROWS,)),  # from sample to sample, mean; 0: unknown
         ("most_bend", "f8", (ROWS,)),  # more bends a spike
         ("tail", "f8", (ROWS, 2)),  # last two samples of the block before; no numbers: unknown
         ("spiked", "i8"),  # whether any channel has a spike in this block
         ("spike_at", "i8", (ROWS,)),  # sample of it; -1: none
-        ("spike", "f8", (ROWS,)),  # what takes its place
+        ("spike", "f8", (ROWS,)),  # its replacement
         ("spike_step", "i8", (ROWS,)),  # of the last one
         # motion
         ("drive_velocity_mps", "f8"),
@@ -107,7 +107,7 @@ STATE = np.dtype(
         ("steady_s", "f8"),  # since v_d last changed
         ("moved_s", "f8"),  # since the drive started or turned
         ("stood_s", "f8"),
-        ("rested", "i8"),  # 1 where the slide must have stood when the drive started or turned
+        ("rested", "i8"),  # 1 if the slide must have been at rest when the drive started or turned
         ("measured", "i8"),
         ("moving", "i8"),
         ("direction", "i8"),
@@ -165,8 +165,8 @@ STATE = np.dtype(
         ("waiting_s", "f8"),
         ("swing", "f8"),  # share of v_d by which the slide was off while vibrating, forgotten in time
         ("even_s", "f8"),  # with little of it, in this mode
-        ("swung", "f8"),  # mean square of what v_s swings by, over v_d
-        ("swung_least", "f8"),  # the least of it since a fade began that asks; infinite in one that follows an answer
+        ("swung", "f8"),  # mean square of the swing of v_s, over v_d
+        ("swung_least", "f8"),  # the least of it since a trial fade began; infinite in a fade after a wobble
         ("fade", "f8"),  # ratio of a vibration that fades
         ("fade_from_N", "f8"),
         ("fade_per_s", "f8"),
@@ -181,7 +181,7 @@ STATE = np.dtype(
         ("swing_level", "i8"),  # windows that show a swing; -1 for none
         ("wound", "i8"),  # whether the spring was wound up at the begin of this move
         ("slid_N", "f8", (_WAYS,)),  # force at which the vibrated slide followed
-        ("top", "f8"),  # largest share of v_d by which it was ahead, forgotten in time; -1 for a slide that stands
+        ("top", "f8"),  # largest share of v_d by which it was ahead, forgotten in time; -1 for a slide at rest
         ("settle_left_s", "f8"),
         ("settle_mps", "f8"),
         ("helpless", "i8"),
@@ -215,7 +215,7 @@ STATE = np.dtype(
         ("most_sent_mps", "f8", (SLOTS,)),
         ("most_wanted_mps", "f8", (SLOTS,)),
         ("expected_mps", "f8"),
-        ("noise_mps", "f8"),  # of the base that stands still, mean
+        ("noise_mps", "f8"),  # of the base at rest, mean
         ("noise_steps", "i8"),  # that it is known from
         ("silent_steps", "i8"),
         ("listening", "i8"),
@@ -231,27 +231,27 @@ STATE = np.dtype(
         ("doubted", "i8"),  # bits of `controller.trips.doubts`
         ("known_gain", "f8", (MOST_CANDIDATES,)),  # delivered over commanded v_a, and the steps that it is a mean of
         ("known_steps", "i8", (MOST_CANDIDATES,)),
-        ("checked_blocks", "i8"),  # that told a tone of the loop check
+        ("checked_blocks", "i8"),  # blocks with a tone of the loop check
         ("tone_Hz", "f8", (MOST_CANDIDATES, 2)),  # of it below and above a candidate; 0: none
         ("tone_gain", "f8", (MOST_CANDIDATES, 2)),  # delivered over commanded v_a there
-        ("gain_other_s", "f8"),  # for which it is told that the check measured another gain than is configured
+        ("gain_other_s", "f8"),  # for which GAIN_OTHER is still reported
         ("banded", "i8"),  # whether the band holds the amplitude back
         ("even_steps", "i8"),  # for which the command that is heard has been even
         ("followed", "i8"),  # candidate of the next
         ("followed_gain", "f8"),  # as measured, over a second
         ("low_steps", "i8"),
-        ("high_steps", "i8"),  # of too much v_a; below 0: told, and so long until it is over
-        ("rest_mps2_2", "f8"),  # mean square beside the sine, over a second
+        ("high_steps", "i8"),  # of too much v_a; below 0: reported, until so many steps without it
+        ("rest_mps2_2", "f8"),  # mean square of the rest without the sine, over a second
         ("rest_steps", "i8"),  # for which there is far more of it
         ("kept_mps", "f8", (ROWS,)),  # of slide and drive, when they last kept the spring's law
         ("kept_N_per_m", "f8"),  # stiffness then
         ("broken_steps", "i8"),  # for which the law is broken
-        ("broken_drive", "i8"),  # of them, those in which the drive is what changed, less the others
-        ("broken_slide", "i8"),  # and those in which the slide goes faster than the rest explains
+        ("broken_drive", "i8"),  # of them, steps in which the drive changed, minus the others
+        ("broken_slide", "i8"),  # of them, steps in which the slide is faster than drive and spring explain
         ("shaken_s", "f8"),  # for which the drive has moved under vibration
         ("confirmed", "f8"),  # share of v_d that slide and force confirm, with its margin
         ("apart_s", "f8"),  # for which they do not
-        ("apart_by", "i8"),  # row of what changed then; below 0: not known
+        ("apart_by", "i8"),  # row of the signal that changed then; below 0: unknown
         ("agreed_mps", "f8", (ROWS,)),  # along the drive's direction, when they last did
         ("stiffest_N_per_m", "f8"),  # largest stiffness learnt
         ("went_m", "f8", (2,)),  # by the drive's place in the last two blocks; below 0: unknown
@@ -268,7 +268,7 @@ STATE = np.dtype(
         ("unbelieved_s", "f8"),  # for which slips count as noise
         ("quiet_s", "f8"),  # since the last stall of the computer or the link
         ("stalling_s", "f8"),  # for which blocks have not been compared with commands, because of such stalls
-        ("noise_told_s", "f8"),  # for which it is told that noise became larger
+        ("noise_told_s", "f8"),  # for which grown noise is still reported
         ("slide_accel_unread", "i8"),  # whether the slide's accelerometer shows no numbers
         ("outside", "i8"),  # whether the drive is outside of its travel
         ("first_sample", "f8", (doubts.CHANNELS,)),
@@ -285,7 +285,7 @@ STATE = np.dtype(
         ("free_steps", "i8"),  # steps since a limit last changed the command
         ("stopped", "i8"),
         ("stale", "i8"),
-        # what the rig has announced of the drive: `controller.announced`
+        # announced drive velocity: `controller.announced`
         ("announced_from_ns", "i8", (MOST_ANNOUNCED,)),
         ("announced_mps", "f8", (MOST_ANNOUNCED,)),
         ("announced_count", "i8"),

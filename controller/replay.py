@@ -28,7 +28,7 @@ from controller.replay_steps import (
     NO_ANNOUNCEMENT,
     NO_BLOCK,
     NO_COMMAND,
-    Difference,
+    ReplayDifference,
     StepComparer,
 )
 
@@ -50,7 +50,7 @@ class Replay(NamedTuple):
 
     compared: int  # steps
     skipped: int  # steps of the log that cannot be rebuilt: their block or their memory is not in the log
-    difference: Difference | None
+    difference: ReplayDifference | None
 
     @property
     def identical(self) -> bool:
@@ -113,7 +113,7 @@ class Replayer:
 
     def __init__(self, changes: list[Change], from_s: float = 0.0, whole: bool = False) -> None:
         built = [build(change.config) for change in changes]
-        params, from_ns = np.concatenate([one for one, _ in built]), np.array([change.t_ns for change in changes])
+        params, from_ns = np.concatenate([pair[0] for pair in built]), np.array([change.t_ns for change in changes])
         self._from_s, self._from_ns = from_s, round(from_s * 1e9)
         self._whole = whole
         self._memory = built[0][1]
@@ -128,12 +128,12 @@ class Replayer:
         self._before: wire.Snapshot | None = None  # the last one before `from_s`
         self._newest_step = -1  # of a snapshot
         self._phase: Callable[[int], bool] = self._start
-        self._lost_from = 0  # step; the memory is that of a snapshot at or after it
+        self._lost_from = 0  # step; the memory comes from a snapshot at or after it
         self._compared = self._skipped = 0
         self._newest = 0  # steps of the newest piece, the other topics of which may follow
 
     def add(self, topic: str, records: Records) -> None:
-        """Take messages of a streaming topic; those of other topics are skipped."""
+        """Take messages of a streaming topic; messages of other topics are skipped."""
         waiting = self._tables.get(topic)
         if waiting is None or not len(records):
             return
@@ -198,9 +198,9 @@ class Replayer:
     @staticmethod
     def _refuse_two(first: Any, second: Any) -> None:
         at_s, again_s = 1e-9 * int(first["t_ns"]), 1e-9 * int(second["t_ns"])
-        line = f"/trace: step {first['sequence']} is there at {at_s:.3f} s and again at {again_s:.3f} s"
+        line = f"/trace: step {first['sequence']} is recorded at {at_s:.3f} s and again at {again_s:.3f} s"
         why = "the controller was started again, or two answered"
-        raise Fault("BAD_LOG", f"{line}: {why}; record every controller in a log of its own")
+        raise Fault("BAD_LOG", f"{line}: {why}; record every controller in a separate log")
 
     # each phase takes the number of steps for which no message can follow, and returns whether another phase follows
 
@@ -296,7 +296,7 @@ def replay(run: RunData, changes: list[Change], from_s: float = 0.0) -> Replay:
         changes: configurations in order of time; the first holds from the start.
         from_s: only steps from this time on are compared.
 
-    Raises Fault BAD_LOG where two controllers answered, as their steps cannot be told apart.
+    Raises Fault BAD_LOG where two controllers answered, as their steps are mixed.
 
     """
     replayer = Replayer(changes, from_s, whole=True)

@@ -20,7 +20,7 @@ NO_COMMAND: Final = 1  # bits of the messages that were missing for steps that w
 NO_ANNOUNCEMENT: Final = 2
 
 
-class Difference(NamedTuple):
+class ReplayDifference(NamedTuple):
     """The first place where a replay differs from the log."""
 
     table: str  # command or trace
@@ -90,8 +90,8 @@ def _steps(
         gap_blocks: Any = np.int64(t.gap_blocks)
         if t.sequence != s.steps:
             return i, GAP if i < sure else WAITS, compared, block_at + 1, lacks
-        found = _place(sensors, block_at + 1, t.block) if events & BLOCK != 0 else max(block_at, 0)
-        if found < 0:
+        place = _place(sensors, block_at + 1, t.block) if events & BLOCK != 0 else max(block_at, 0)
+        if place < 0:
             why = AGAIN if t.block < first_block else NO_BLOCK if i < sure else WAITS
             return i, why, compared, block_at + 1, lacks
         command_at = _place(logged_command, command_at + 1, t.sequence)
@@ -102,7 +102,7 @@ def _steps(
         if lacking != 0 and i >= sure:
             return i, WAITS, compared, block_at + 1, lacks
         lacks |= lacking
-        block_at = found if events & BLOCK != 0 else block_at
+        block_at = place if events & BLOCK != 0 else block_at
         while s.announced_count < announced:
             announced_now: Record = announce[s.announced_count]
             take_announcement(s, announced_now.holds_from_ns, announced_now.drive_velocity_mps)
@@ -110,8 +110,8 @@ def _steps(
         while change > 0 and t.t_ns < params_from_ns[change]:
             change -= 1
         # a step without a block does not read its place
-        own, block = params[change : change + 1], sensors[found : found + 1]
-        step(own, state, block, events, gap_blocks, t.t_ns, command, trace)
+        settings, block = params[change : change + 1], sensors[place : place + 1]
+        step(settings, state, block, events, gap_blocks, t.t_ns, command, trace)
         if t.t_ns < compared_from_ns:
             continue
         compared += 1
@@ -145,7 +145,7 @@ class StepComparer:
         memory: npt.NDArray[Any],
         compared_from_s: float,
     ) -> None:
-        self.difference: Difference | None = None
+        self.difference: ReplayDifference | None = None
         self._controller = params, params_from_ns, memory
         self._from_ns = compared_from_s * 1e9
         self._answer = TRACE.blank(), COMMAND.blank()
@@ -176,18 +176,18 @@ class StepComparer:
             )
         return taken
 
-    def _found(self, table: str, layout: Layout, logged: Records, again: Records) -> Difference | None:
+    def _found(self, table: str, layout: Layout, logged: Records, again: Records) -> ReplayDifference | None:
         """The first field of a message with a bit that differs."""
         step = self._answer[0][0]
         for name in (field.name for field in layout.message.DESCRIPTOR.fields if field.name != _OF_A_CLOCK):
             if logged[name].tobytes() != again[name].tobytes():
                 numbers = int(step["sequence"]), int(step["block"]), float(step["t_ns"]) * 1e-9
-                return Difference(table, *numbers, name, float(logged[name][0]), float(again[name][0]))
+                return ReplayDifference(table, *numbers, name, float(logged[name][0]), float(again[name][0]))
         return None
 
 
 def _mask(layout: Layout) -> npt.NDArray[np.uint8]:
-    """Which bytes of a message are compared, [size]: those of its fields, except for the field of a clock."""
+    """Which bytes of a message are compared, [size]: the bytes of its fields, except for the field of a clock."""
     mask = np.zeros(layout.size, np.uint8)
     for name, (kind, first, *_) in (layout.dtype.fields or {}).items():
         mask[first : first + kind.itemsize] = 0 if name == _OF_A_CLOCK else 0xFF

@@ -1,4 +1,4 @@
-"""Whether a rig is one that this controller can control, by what the rig says of itself before the first block."""
+"""Checks from the rig's header, before the first block, that this controller fits the rig."""
 
 import contextlib
 import json
@@ -15,8 +15,8 @@ from controller.config import ControllerConfig
 def refuse_another_rig(header: wire.Header | None, config: ControllerConfig) -> None:
     """Raise Fault where a rig's blocks cannot be those that the controller was configured for.
 
-    BAD_MESSAGE: another schema version; CONFIG: blocks of another length or number of samples. A rig that says nothing of itself
-    is taken at its blocks.
+    BAD_MESSAGE: another schema version; CONFIG: blocks of another length or number of samples. A rig without a header is
+    accepted; its blocks are checked as they arrive.
     """
     if header is None:
         return
@@ -34,10 +34,10 @@ def refuse_another_rig(header: wire.Header | None, config: ControllerConfig) -> 
 
 
 class RigAgain:
-    """Asks a rig that began anew what it is, beside the loop, which waits for no answer.
+    """Reads the header of a restarted rig in a thread, as the loop must not wait.
 
     Args:
-        ask: what the rig says of itself; None where it says nothing. It may take a second.
+        ask: returns the rig's header, or None. It may take a second.
         config: of the controller.
 
     """

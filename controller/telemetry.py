@@ -1,4 +1,4 @@
-"""What the controller tells besides commands and traces: the state for plots, and its whole memory for replay."""
+"""Messages besides commands and traces: the state for plots, and the controller's whole memory for replay."""
 
 from typing import Any
 

@@ -11,7 +11,7 @@ from contextlib import suppress
 from typing import NamedTuple
 
 from bridge.log.finding import Finding
-from diagnosis.evidence.folder import Evidence, Run
+from diagnosis.evidence.folder import Evidence, MeasuredRun
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.retuning import retuned_rig
 from diagnosis.gap.excerpt import excerpt
@@ -29,14 +29,16 @@ from diagnosis.report.relations_block import in_a_line, with_relations
 from diagnosis.report.without_fits import HOLD, LONGER, comparable, unfitted, without_fits
 from diagnosis.result import Diagnosis
 from diagnosis.verdict.by_latent import with_latent
-from diagnosis.verdict.by_relations import Closed, in_view_of
+from diagnosis.verdict.by_relations import ClosedByRelations, with_relations_verdict
 from diagnosis.verdict.confirmation import borne_out
 from diagnosis.verdict.held_out import HeldOut
-from diagnosis.verdict.judge import Verdict, although_outside
-from diagnosis.verdict.selection import Contest, Known, Progress
+from diagnosis.verdict.judge import Verdict, with_outside
+from diagnosis.verdict.selection import Contest, Hints, Progress
 
-_FOR_FITS = 0.7  # share of the time that the fits may take; the held-out runs, the next experiment and the pictures take the rest
-_NO_FIT = Finding("budget", "fits", "none was made: names and shares are those of relations and friction alone")
+_FOR_FITS = (
+    0.7  # share of the time budget for the fits; the rest is for held-out runs, the next experiment and pictures
+)
+_NO_FIT = Finding("budget", "fits", "none was made: names and shares come from relations and friction alone")
 _CUT_SHORT = Finding("budget", "fits", "ended before every effect was tried: this is the best answer by then")
 
 
@@ -49,7 +51,7 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1, budget_s: fl
         evidence: the rig as described and the measured runs.
         progress: called with a text on the state of the work, and the share that is done (0 to 1).
         jobs: processes.
-        budget_s: seconds after which the answer is what is known by then; None: all the time it takes.
+        budget_s: seconds after which the best answer so far is returned; None: no limit.
 
     """
     with one_thread():
@@ -57,7 +59,7 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1, budget_s: fl
 
 
 class _Seen(NamedTuple):
-    """What is known before any fit."""
+    """The runs, and the results of the steps before any fit."""
 
     runs: list[Prepared]
     relations: Relations
@@ -70,14 +72,16 @@ def _diagnosed(evidence: Evidence, progress: Progress, jobs: int, budget_s: floa
     runs = prepare(evidence)
     relations = relations_of(evidence.rig, runs)
     seen = _Seen(runs, relations, decision_of(relations, evidence.rig), latent_of(evidence.rig, runs))
-    for told in (in_a_line(seen.decision), latent_line(seen.latent)):
-        if told:
-            progress(told, 0.02)
+    for line in (in_a_line(seen.decision), latent_line(seen.latent)):
+        if line:
+            progress(line, 0.02)
     done = None
     if comparable(runs):
         done = _by_fits(evidence, seen, progress, jobs, (began, began + budget_s))
     if done is None:
-        verdict = with_latent(in_view_of(unfitted(), seen.decision, [], Closed(None, None)), seen.latent, None)
+        verdict = with_latent(
+            with_relations_verdict(unfitted(), seen.decision, [], ClosedByRelations(None, None)), seen.latent, None
+        )
         verdict = with_vibration_findings(verdict, evidence.runs)
         done = without_fits(verdict, runs, LONGER if comparable(runs) else HOLD, began)
         done = done._replace(findings=(*evidence.findings, _NO_FIT))
@@ -120,7 +124,9 @@ def _by_fits(
         findings = (_CUT_SHORT,)
     nearest = outcome.gone or outcome.verdict.runner_up
     closes = _closed(outcome.held_out, nearest)
-    verdict = in_view_of(outcome.verdict, seen.decision, [*contest.singles, *contest.pairs], Closed(nearest, closes))
+    verdict = with_relations_verdict(
+        outcome.verdict, seen.decision, [*contest.singles, *contest.pairs], ClosedByRelations(nearest, closes)
+    )
     verdict = with_latent(verdict, seen.latent, outcome.held_out)
     verdict = with_vibration_findings(verdict, evidence.runs)
     outcome = outcome._replace(verdict=verdict, best=verdict.named or contest.rig.fit)
@@ -138,12 +144,12 @@ def _closed(held_out: HeldOut | None, fit: Fit | None) -> float | None:
     return None
 
 
-def _known(seen: _Seen) -> Known:
-    shown = {cause for one in seen.relations.answered for cause in one.chosen.causes if cause not in OUTSIDE}
-    return Known(frozenset(shown), bool(seen.decision.outside))
+def _known(seen: _Seen) -> Hints:
+    shown = {cause for answered in seen.relations.answered for cause in answered.chosen.causes if cause not in OUTSIDE}
+    return Hints(frozenset(shown), bool(seen.decision.outside))
 
 
-def with_vibration_findings(verdict: Verdict, runs: Sequence[Run]) -> Verdict:
+def with_vibration_findings(verdict: Verdict, runs: Sequence[MeasuredRun]) -> Verdict:
     """The verdict in view of vibration that no model makes: in the force signal, or of the base at other frequencies.
 
     With such a vibration, "no gap" becomes "unexplained"; with a base at other frequencies, so does an effect of the piezo alone.
@@ -154,5 +160,5 @@ def with_vibration_findings(verdict: Verdict, runs: Sequence[Run]) -> Verdict:
 
     """
     if any(run.distortion for run in runs):
-        return although_outside(verdict, PIEZO_EFFECTS)
-    return although_outside(verdict) if any(run.pick_up for run in runs) else verdict
+        return with_outside(verdict, PIEZO_EFFECTS)
+    return with_outside(verdict) if any(run.pick_up for run in runs) else verdict

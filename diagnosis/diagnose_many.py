@@ -27,7 +27,7 @@ from diagnosis.result import Diagnosis
 
 Progress = Callable[[str, float], None]
 Diagnose = Callable[[Evidence, Progress, int], Diagnosis]
-# For joblib's tracker, a process of its own: a worker that is ended amid its jobs leaves folders that it removes, and warns of.
+# For joblib's tracker process: it removes the folders of a worker that was ended at work, and warns of each.
 _NO_WARNING = "ignore:resource_tracker:UserWarning"
 _CLUSTER_WAIT_S = 5  # time for the scheduler to answer, and again for a first worker; too short fails on a busy network
 
@@ -48,20 +48,20 @@ class FolderResult(NamedTuple):
 
 
 def find_sources(folders: list[Path]) -> list[EvidenceFolder]:
-    """The evidence folders among `folders`, each once, in order. A folder without a manifest stands for those in it."""
-    found: dict[Path, None] = {}
+    """The evidence folders among `folders`, each once, in order. A folder without a manifest is searched for evidence folders."""
+    sources: dict[Path, None] = {}
     for folder in folders:
         try:
             holds = (folder / MANIFEST).is_file()
             inside = sorted(path.parent.resolve() for path in folder.glob(f"*/{MANIFEST}"))
         except OSError:
             holds, inside = False, list[Path]()
-        # a folder without any evidence stays in the list: reading it raises a fault that says what is missing
+        # a folder without any evidence stays in the list: reading it raises a fault that names the missing manifest
         given = [folder.resolve()] if holds or not inside else inside
-        found.update(dict.fromkeys(given))
-    names = [folder.name for folder in found]
-    unique = [folder if names.count(folder.name) > 1 else Path(folder.name) for folder in found]
-    return [EvidenceFolder(shown(name), folder) for name, folder in zip(unique, found, strict=True)]
+        sources.update(dict.fromkeys(given))
+    names = [folder.name for folder in sources]
+    unique = [folder if names.count(folder.name) > 1 else Path(folder.name) for folder in sources]
+    return [EvidenceFolder(shown(name), folder) for name, folder in zip(unique, sources, strict=True)]
 
 
 def real_diagnose(evidence: Evidence, progress: Progress, jobs: int, budget_s: float | None = None) -> Diagnosis:
@@ -81,8 +81,8 @@ def diagnose_many(
 ) -> Generator[FolderResult]:
     """Yield the result of every source, in the order in which they finish.
 
-    A folder has one process. Last folders, where they are at most half as many as the processes, come when all others are
-    done, and share the processes: two folders on eight have four each.
+    A folder has one process. If the last folders are at most half as many as the processes, they start when all others are
+    done, and share the processes: two folders on eight processes have four each.
 
     A folder that cannot be diagnosed, or that kills its worker again and again, yields a fault and stops no other folder. Closing
     the generator, or Ctrl-C, ends the local workers; a cluster drops the folders that it has not begun.
@@ -127,7 +127,7 @@ def _several(sources: list[EvidenceFolder], task: _Task, workers: "_Workers") ->
                 del waiting[outcome.source.name]
                 yield outcome
         except workers.breakdowns:
-            # Which folder killed its worker is not known: all that may have been under way are done again, one by one.
+            # The folder that killed its worker is not known: all folders that may have been under way are repeated, one by one.
             for source in list(waiting.values())[: workers.dispatched]:
                 yield _alone(source, task, workers)
                 del waiting[source.name]
@@ -176,7 +176,8 @@ class _Workers(NamedTuple):
 def _cluster_security(cluster: str, certs: str) -> Any:
     """Dask's `Security` for a scheduler at tls://; None for one of this computer alone.
 
-    Whoever owns a scheduler, or stands between it and us, runs code here and there. Raises Fault NOT_SECURE for any other.
+    A scheduler, or an attacker on the network between it and this computer, can run code on both. Raises Fault NOT_SECURE for
+    any other address.
     """
     scheme, _, place = cluster.partition("://")
     if scheme == "tcp":
@@ -187,11 +188,11 @@ def _cluster_security(cluster: str, certs: str) -> Any:
         raise Fault("NOT_SECURE", f"{line}; {remedy}, and use --cluster tls://{place} --certs FOLDER")
     from distributed.security import Security  # noqa: PLC0415
 
-    own = certificates.checked(certificates.CLUSTER, certificates.folder(certs))
+    files = certificates.checked(certificates.CLUSTER, certificates.folder(certs))
     return Security(
-        tls_ca_file=str(own.authority),
-        tls_client_cert=str(own.certificate),
-        tls_client_key=str(own.key),
+        tls_ca_file=str(files.authority),
+        tls_client_cert=str(files.certificate),
+        tls_client_key=str(files.key),
         require_encryption=True,
     )
 
@@ -210,7 +211,7 @@ def _workers(jobs: int, cluster: str, certs: str) -> Generator[_Workers]:
     except ImportError:
         line = "--cluster: needs the package distributed, which is not installed; pip install 'stickslip[cluster]'"
         raise Fault("CONFIG", line) from None
-    if not re.fullmatch(r"(tcp|tls)://.+:\d+", cluster):  # Dask would try for 10 s, and say so with a traceback
+    if not re.fullmatch(r"(tcp|tls)://.+:\d+", cluster):  # Dask would try for 10 s and print a traceback
         raise Fault("CONFIG", f"--cluster {cluster}: must be tcp://HOST:PORT; write for example tcp://127.0.0.1:8786")
     security = _cluster_security(cluster, certs)
     try:

@@ -14,7 +14,7 @@ R = TypeVar("R")
 def one_thread() -> threadpool_limits:
     """A context in which linear algebra has one thread.
 
-    More threads add in another order, and a fit amplifies a change in the last bit (docs/method/fits.md).
+    More threads add in another order, and a fit amplifies a change in the last bit (docs/method/diagnosis.md).
     """
     return threadpool_limits(limits=1)
 

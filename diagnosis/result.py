@@ -3,14 +3,11 @@
 from pathlib import PurePath
 from typing import Any, Literal, NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
+from bridge.arrays import Floats
 from bridge.log.finding import Finding
 
-Floats = npt.NDArray[np.floating[Any]]
 FORMAT = "diagnosis/2"
-PARAMETERS = "parameters alone"  # the baseline among what is compared on the held-out runs
+PARAMETERS = "parameters alone"  # the baseline in the comparison on the held-out runs
 
 
 class Estimate(NamedTuple):
@@ -104,7 +101,7 @@ class Picture(NamedTuple):
 
 
 class Share(NamedTuple):
-    """Share of what a relation shows on the held-out runs: the mean square that the baseline leaves there is 1."""
+    """Share of a relation's residual on the held-out runs: the mean square that the baseline leaves there is 1."""
 
     signal: str  # spring relation, motion relation, drive relation, exciter, base
     what: str  # a cause, "noise" or "unexplained"
@@ -112,20 +109,20 @@ class Share(NamedTuple):
     interval_90: tuple[float, float] | None  # None for noise
     null_90: (
         float | None
-    )  # what the same noise without that cause would show in 9 of 10; None for noise and unexplained
+    )  # share that the same noise without that cause stays below in 9 of 10 draws; None for noise and unexplained
 
     @property
     def beyond_chance(self) -> bool:
-        """Whether the whole interval lies above what chance shows."""
+        """Whether the whole interval lies above the share that chance reaches."""
         return self.interval_90 is not None and self.null_90 is not None and self.interval_90[0] > self.null_90
 
 
 class Remainder(NamedTuple):
-    """What no known cause explains, where it is largest."""
+    """The largest residual that no known cause explains."""
 
     share: float | None  # of that relation on the held-out runs; None without such runs
     where: str  # the relation
-    what: str  # over which variable, or in bursts; empty where nothing stands out
+    what: str  # the variable that it depends on, or "in bursts"; empty without a pattern
     size: float  # rms
     noise: float  # rms
     unit: str
@@ -136,9 +133,9 @@ class RelationRow(NamedTuple):
 
     relation: str
     unit: str
-    described: float  # what the rig as described leaves
-    refitted: float  # what the rig without effects leaves, refitted
-    left: float  # with the causes of the relation
+    described: float  # residual of the rig as described
+    refitted: float  # residual of the rig without effects, refitted
+    left: float  # residual with the causes of the relation
     noise: float
     causes: tuple[str, ...]
 
@@ -208,19 +205,19 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
             **diagnosis.gap._asdict(),
             "runs": [_name(run) for run in diagnosis.gap.runs],
             "interval_90": _listed(diagnosis.gap.interval_90),
-            "compared": [{**one._asdict(), "interval_90": _listed(one.interval_90)} for one in diagnosis.gap.compared],
+            "compared": [{**row._asdict(), "interval_90": _listed(row.interval_90)} for row in diagnosis.gap.compared],
         },
         "next_experiment": diagnosis.next_experiment._asdict(),
         "rig": [parameter._asdict() for parameter in diagnosis.rig],
         "findings": [finding._asdict() for finding in diagnosis.findings],
         "compared_features": diagnosis.compared_features,
         "elapsed_s": round(diagnosis.elapsed_s, 2),
-        "shares": [{**one._asdict(), "interval_90": _listed(one.interval_90)} for one in diagnosis.shares],
+        "shares": [{**share._asdict(), "interval_90": _listed(share.interval_90)} for share in diagnosis.shares],
         "remainder": None if diagnosis.remainder is None else diagnosis.remainder._asdict(),
-        "relations": [{**one._asdict(), "causes": list(one.causes)} for one in diagnosis.relations],
-        "left_out": [one._asdict() for one in diagnosis.left_out],
+        "relations": [{**relation._asdict(), "causes": list(relation.causes)} for relation in diagnosis.relations],
+        "left_out": [omitted._asdict() for omitted in diagnosis.left_out],
         "cannot_show": list(diagnosis.cannot_show),
-        "numbers": [{**one._asdict(), "interval_90": list(one.interval_90)} for one in diagnosis.numbers],
+        "numbers": [{**number._asdict(), "interval_90": list(number.interval_90)} for number in diagnosis.numbers],
     }
 
 

@@ -1,4 +1,4 @@
-"""The constants by which the diagnosis decides, read from its source: value, what each does, where it was counted."""
+"""The constants by which the diagnosis decides, read from its source: value, effect, page of the count."""
 
 import ast
 import re
@@ -32,8 +32,8 @@ def constants() -> Iterator[Constant]:
 def sections() -> Iterator[tuple[str, list[list[str]]]]:
     """Each room with the cells of its rows."""
     for room in _ROOMS:
-        own = [one for one in constants() if one.file.startswith(f"{room}/")]
-        yield room, [[f"`{one.name}`", one.file, f"`{one.value}`", one.says, one.counted] for one in own]
+        rows = [row for row in constants() if row.file.startswith(f"{room}/")]
+        yield room, [[f"`{row.name}`", row.file, f"`{row.value}`", row.says, row.counted] for row in rows]
 
 
 def _of_module(path: Path) -> Iterator[Constant]:
@@ -47,7 +47,7 @@ def _of_module(path: Path) -> Iterator[Constant]:
             continue
         says = _comment(lines, node.lineno - 1, node.end_lineno or node.lineno)
         names = [name.id for name in ast.walk(target) if isinstance(name, ast.Name)]
-        pages = {*_COUNTED.findall(says), *(page for page, told in method.items() if _tells(told, names, path.name))}
+        pages = {*_COUNTED.findall(says), *(page for page, body in method.items() if _tells(body, names, path.name))}
         counted = ", ".join(f"[{page}](../method/{page}.md)" for page in sorted(pages))
         yield Constant(file, ", ".join(names), ast.unparse(value), says, counted)
 
@@ -56,8 +56,8 @@ def _tells(page: str, names: list[str], module: str) -> bool:
     """Whether a page has a heading on one of the constants, below the heading of the module."""
     for part in re.split(r"^## ", page, flags=re.MULTILINE)[1:]:
         if part.startswith(f"{module}\n"):
-            headings = re.findall(r"^### (.*)$", part, flags=re.MULTILINE)
-            return any(re.search(rf"(?<![A-Z_]){re.escape(name)}(?![A-Z_])", one) for one in headings for name in names)
+            heads = re.findall(r"^### (.*)$", part, flags=re.MULTILINE)
+            return any(re.search(rf"(?<![A-Z_]){re.escape(name)}(?![A-Z_])", head) for head in heads for name in names)
     return False
 
 
@@ -68,16 +68,16 @@ def _assigned(node: ast.stmt) -> tuple[ast.expr | None, ast.expr | None]:
         target, value = node.target, node.value
     else:
         return None, None
-    names = [one.id for one in ast.walk(target) if isinstance(one, ast.Name)]
+    names = [name_node.id for name_node in ast.walk(target) if isinstance(name_node, ast.Name)]
     return (target, value) if all(name.upper() == name for name in names) else (None, None)
 
 
 def _is_number(value: ast.expr) -> bool:
     """Whether a value is a number, a few numbers, or an expression of them, and short enough to be read."""
-    leaves = [one for one in ast.walk(value) if isinstance(one, ast.Constant)]
-    texts = any(isinstance(one.value, str) for one in leaves)
-    names = {one.id for one in ast.walk(value) if isinstance(one, ast.Name)}
-    numbers = any(isinstance(one.value, (int, float)) and not isinstance(one.value, bool) for one in leaves)
+    leaves = [leaf for leaf in ast.walk(value) if isinstance(leaf, ast.Constant)]
+    texts = any(isinstance(leaf.value, str) for leaf in leaves)
+    names = {leaf.id for leaf in ast.walk(value) if isinstance(leaf, ast.Name)}
+    numbers = any(isinstance(leaf.value, (int, float)) and not isinstance(leaf.value, bool) for leaf in leaves)
     return numbers and not texts and names <= {"math", "np", "KNEE"} and len(ast.unparse(value)) <= _LONGEST
 
 

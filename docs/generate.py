@@ -1,4 +1,4 @@
-"""Pages of docs/reference that are made from the code: `make reference` writes them, tests/unit/test_docs.py compares them."""
+"""Pages of docs/reference that are generated from the code by `make docs`; they are not in git."""
 
 import inspect
 import json
@@ -19,18 +19,18 @@ from diagnosis.evidence.import_table import ImportMap
 from diagnosis.evidence.manifest import Manifest
 from docs import constants, zenoh_files
 from plant.effects.library import EFFECTS
-from plant.effects.row import Form
+from plant.effects.row import Formula
 from plant.pairs import PAIRS
 
 FOLDER = Path(__file__).parent / "reference"
-_MADE = "<!-- Made by `make reference`; change the code instead. -->\n"
+_MADE = "<!-- Made by `make docs`; change the code instead. -->\n"
 _SYMBOLS = """\
 Symbols: `F_c`, `F_s` Coulomb and static friction; `v_s` Stribeck velocity; `v_r` velocity in the contact; `x` position of
 the slide; `s_e` where the drive would be without ripple; `e` extension of the drive's spring; `k_d`, `h_d` stiffness and
 damping of the drive; `F_d` drive force; `F_f` friction; `age` time at rest; `t` time of the run; `f` frequency of the
 vibration; `w(a) = sin a + second_sin sin 2a + second_cos cos 2a`, `a` with the phase."""
 _EFFECTS_INTRO = f"""\
-What a real rig does and the ideal rig does not. An effect is a mechanism, a form is one formula for it. Each is off unless a
+Differences between a real rig and the ideal rig. An effect is a mechanism, a form is one formula for it. Each is off unless a
 rig file has its table `[effects.NAME]`, with `form` (the first one if left out) and the form's parameters; off is
 bit-identical to the ideal rig. The diagnosis tries every form of every effect. `tests/truth/test_effects_*` holds each
 formula against a closed form or SciPy.
@@ -40,22 +40,22 @@ _FAULTS_INTRO = (
     "`stickslip explain CODE` prints the same, and `stickslip explain WORD` a [word of a log](#words-of-a-log)."
 )
 _WORDS_INTRO = """\
-What the numbers of the columns `mode`, `state`, `reason` and `limit` of a log and of its tables mean.
+Meaning of the numbers in the columns `mode`, `state`, `reason` and `limit` of a log and of its tables.
 `stickslip explain reason` prints a column, `stickslip explain PIEZO_WEAK` a word."""
-_LETTERS_SAID = "; ".join(f"{letter}, {said}" for letter, said in LETTERS.items() if letter)
+_LETTER_MEANINGS = "; ".join(f"{letter}, {meaning}" for letter, meaning in LETTERS.items() if letter)
 _EVENTS_INTRO = f"""\
-What plant, controller and recorder say on the bus and in a log. The letter is that of NAMUR NE 107: {_LETTERS_SAID}.
+Events that plant, controller and recorder publish on the bus and in a log. The letter follows NAMUR NE 107: {_LETTER_MEANINGS}.
 A run with an event of letter F is not good. `stickslip explain GAP` prints one, `stickslip explain event` all of them."""
 _FILES_INTRO = """\
 Keys of the TOML files, with their defaults and ranges. A misspelt key or a value out of range is an error that names file,
 key, rule and remedy. Units are in the names."""
 _GONE_INTRO = """\
-Keys of older scenarios. They are still read, so that an old file works, and do nothing: a line on stderr says what holds
-instead."""
+Keys of older scenarios. They are still read, so that an old file works, but ignored: a line on stderr names the
+replacement."""
 _FILES: tuple[tuple[str, str, type[Strict]], ...] = (
     (
         "Scenario",
-        "`deploy/scenarios/*.toml`, `--scenario FILE`. The keys below `rig` are also those of a rig file.",
+        "`deploy/scenarios/*.toml`, `--scenario FILE`. The keys below `rig` are the keys of a rig file.",
         Scenario,
     ),
     ("Evidence manifest", "`manifest.toml` of an evidence folder; rules are in [evidence/1](evidence-1.md).", Manifest),
@@ -77,14 +77,14 @@ def pages() -> dict[str, str]:
 
 def _constants() -> list[str]:
     rows = dict(constants.sections())
-    numbers = [row for own in rows.values() for row in own]
+    numbers = [row for rows_of_room in rows.values() for row in rows_of_room]
     lines = [
         "# Constants of the diagnosis",
         f"The diagnosis decides by {len(numbers)} numbers in {len({row[1] for row in numbers})} files of `diagnosis/`. Where no"
-        " count is named, the number follows from what is said of it, or is a step of the computation.", "",
+        " count is named, the number follows from its description, or is a step of the computation.", "",
     ]  # fmt: skip
-    for room, own in rows.items():
-        lines += [f"## {room}", "", *_table(("constant", "file", "value", "what it does", "counted in"), own)]
+    for room, rows_of_room in rows.items():
+        lines += [f"## {room}", "", *_table(("constant", "file", "value", "effect", "counted in"), rows_of_room)]
     return lines[:-1]
 
 
@@ -104,14 +104,14 @@ def _number(value: float) -> str:
 
 def _commands() -> list[str]:
     root = typer.main.get_command(cli.app)
-    found = list(_walk(root, "stickslip"))
-    rows = [(f"[`{name}`](#{name.replace(' ', '-')})", _first_sentence(command.help)) for name, command in found]
-    lines = ["# Commands", *_table(("command", "what it does"), rows)]
-    for name, command in found:
+    commands = list(_walk(root, "stickslip"))
+    rows = [(f"[`{name}`](#{name.replace(' ', '-')})", _first_sentence(command.help)) for name, command in commands]
+    lines = ["# Commands", *_table(("command", "purpose"), rows)]
+    for name, command in commands:
         lines += [f"## {name}", "", _paragraph(command.help), ""]
-        options = [one for one in command.params if not getattr(one, "hidden", False) and not one.is_eager]
-        if options:
-            lines += _table(("argument or option", "what it does"), ((_spelt(one), _meaning(one)) for one in options))
+        params = [param for param in command.params if not getattr(param, "hidden", False) and not param.is_eager]
+        if params:
+            lines += _table(("argument or option", "meaning"), ((_spelt(param), _meaning(param)) for param in params))
     return lines
 
 
@@ -133,23 +133,23 @@ def _first_sentence(text: str | None) -> str:
     return _paragraph(text).split(". ")[0].rstrip(".")
 
 
-def _spelt(one: Any) -> str:
-    """An argument or option as it is typed."""
-    if not one.opts[0].startswith("-"):
-        name = (one.metavar or one.opts[0]).upper()
-        return f"`{name.rstrip('.')}{'...' if one.nargs == -1 else ''}`"
-    kind = next((word for known, word in _VALUES.items() if known in type(one.type).__name__), "")
-    value = "" if one.is_flag else f" {one.metavar or kind or 'VALUE'}"
-    return f"`{', '.join((*one.opts, *one.secondary_opts))}{value}`"
+def _spelt(option: Any) -> str:
+    """An argument or option as typed in a shell."""
+    if not option.opts[0].startswith("-"):
+        name = (option.metavar or option.opts[0]).upper()
+        return f"`{name.rstrip('.')}{'...' if option.nargs == -1 else ''}`"
+    kind = next((word for known, word in _VALUES.items() if known in type(option.type).__name__), "")
+    value = "" if option.is_flag else f" {option.metavar or kind or 'VALUE'}"
+    return f"`{', '.join((*option.opts, *option.secondary_opts))}{value}`"
 
 
-def _meaning(one: Any) -> str:
-    told = _paragraph(one.help)
-    if one.required and one.opts[0].startswith("-"):
-        return f"{told} Needed."
-    if getattr(one, "is_flag", False) or not one.show_default or one.default in (None, "", [], ()):
-        return told
-    return f"{told} Default: `{one.default}`."
+def _meaning(option: Any) -> str:
+    text = _paragraph(option.help)
+    if option.required and option.opts[0].startswith("-"):
+        return f"{text} Needed."
+    if getattr(option, "is_flag", False) or not option.show_default or option.default in (None, "", [], ()):
+        return text
+    return f"{text} Default: `{option.default}`."
 
 
 # effects
@@ -167,24 +167,24 @@ def _effects() -> list[str]:
         drives = "" if {*effect.drives} == {"spring", "force"} else f" With a {' or '.join(effect.drives)} drive only."
         lines += [f"## {name}", "", f"Acts on: {effect.acts_on}.{drives}", ""]
         lines += _table(
-            ("form", "what it does", "parameters: default, range"),
+            ("form", "formula", "parameters: default, range"),
             (
-                (f"`{form}`" if form else "", _code_safe(told.formula), _parameters(told))
-                for form, told in effect.forms.items()
+                (f"`{form}`" if form else "", _code_safe(row.formula), _parameters(row))
+                for form, row in effect.forms.items()
             ),
         )
     return lines
 
 
-def _parameters(form: Form) -> str:
-    told = (
-        f"`{one.name}` {_number(one.default)}, {_number(one.low)} to {_number(one.high)}" for one in form.parameters
+def _parameters(form: Formula) -> str:
+    described = (
+        f"`{row.name}` {_number(row.default)}, {_number(row.low)} to {_number(row.high)}" for row in form.parameters
     )
-    return "<br>".join(told)
+    return "<br>".join(described)
 
 
 def _code_safe(formula: str) -> str:
-    """A formula whose asterisks and underscores are no emphasis."""
+    """A formula with escaped asterisks and underscores."""
     return formula.replace("*", "\\*").replace("_", "\\_").replace("<", "&lt;").replace("|", "&#124;")
 
 
@@ -192,11 +192,11 @@ def _code_safe(formula: str) -> str:
 
 
 def _faults() -> list[str]:
-    told = json.loads(CliRunner().invoke(cli.app, ["explain", "--json"]).stdout)
+    explained = json.loads(CliRunner().invoke(cli.app, ["explain", "--json"]).stdout)
     linked = [
-        (str(one["exit_status"]), f"[`{one['fault']}`](#{one['fault'].lower()})" if one["fault"] else one["help"])
-        for one in told
-        if "exit_status" in one
+        (str(row["exit_status"]), f"[`{row['fault']}`](#{row['fault'].lower()})" if row["fault"] else row["help"])
+        for row in explained
+        if "exit_status" in row
     ]
     lines = ["# Faults and exit statuses", _FAULTS_INTRO, ""]
     lines += _table(("exit status", "fault or meaning"), linked)
@@ -205,12 +205,12 @@ def _faults() -> list[str]:
     lines += ["## Words of a log", "", _WORDS_INTRO, ""]
     lines += _table(
         ("column", "number", "word", "meaning"),
-        ([f"`{one.column}`", str(one.number), f"`{one.word}`", one.help] for one in words()),
+        ([f"`{word.column}`", str(word.number), f"`{word.word}`", word.help] for word in words()),
     )
     lines += ["## Events", "", _EVENTS_INTRO, ""]
     lines += _table(
         ("code", "from", "NE 107", "meaning"),
-        ([f"`{one.code}`", one.sources, one.letter, one.help] for one in EVENTS.values()),
+        ([f"`{event.code}`", event.sources, event.letter, event.help] for event in EVENTS.values()),
     )
     return lines
 
@@ -223,12 +223,12 @@ def _files() -> list[str]:
     for title, where, model in _FILES:
         schema = model.model_json_schema()
         lines += [f"## {title}", "", where, ""]
-        for path, told, rows in _sections(schema, schema.get("$defs", {}), ""):
+        for path, about, rows in _sections(schema, schema.get("$defs", {}), ""):
             name = f"`[{path}]`" if path and not path.startswith("[") else f"`{path}`" if path else "top of the file"
-            lines += [f"### {name}" if path else f"**{name}**", "", *([_paragraph(told), ""] if told else [])]
+            lines += [f"### {name}" if path else f"**{name}**", "", *([_paragraph(about), ""] if about else [])]
             lines += _table(("key", "type and range", "default", "meaning"), rows)
     lines += ["## Keys that are gone", "", _GONE_INTRO, ""]
-    lines += _table(("key", "what holds instead"), _gone(Scenario, ""))
+    lines += _table(("key", "replacement"), _gone(Scenario, ""))
     lines += [
         "## Friction pairs",
         "",
@@ -257,54 +257,54 @@ def _sections(schema: dict[str, Any], known: dict[str, Any], path: str) -> Itera
     rows: list[list[str]] = []
     inner: list[tuple[str, dict[str, Any]]] = []
     needed = schema.get("required", [])
-    for key, one in schema.get("properties", {}).items():
-        here = f"{path}.{key}" if path else key
-        table = _resolved(one, known)
+    for key, sub in schema.get("properties", {}).items():
+        place = f"{path}.{key}" if path else key
+        table = _resolved(sub, known)
         item = _resolved(table.get("items", {}), known)
         value = _resolved(table.get("additionalProperties", {}), known) if table.get("type") == "object" else {}
         if "properties" in table:
-            inner.append((here, table))
+            inner.append((place, table))
         elif "properties" in item:
-            inner.append((f"[[{here}]]", item))
+            inner.append((f"[[{place}]]", item))
         elif "properties" in value:
-            inner.append((f"{here}.NAME", value))
+            inner.append((f"{place}.NAME", value))
         else:
             default = (
-                "needed" if key in needed else f"`{one['default']}`" if one.get("default") not in (None, "", {}) else ""
+                "needed" if key in needed else f"`{sub['default']}`" if sub.get("default") not in (None, "", {}) else ""
             )
-            rows.append([f"`{key}`", _kind(table, known), default, _paragraph(one.get("description"))])
+            rows.append([f"`{key}`", _kind(table, known), default, _paragraph(sub.get("description"))])
     if rows:
         yield path, schema.get("description", ""), rows
-    for here, table in inner:
-        yield from _sections(table, known, here)
+    for place, table in inner:
+        yield from _sections(table, known, place)
 
 
-def _resolved(one: Any, known: dict[str, Any]) -> dict[str, Any]:
-    """What a schema stands for: of a reference its target, of a value or nothing the value."""
-    if not isinstance(one, dict):
+def _resolved(schema: Any, known: dict[str, Any]) -> dict[str, Any]:
+    """The schema behind a reference or behind a value that may be null."""
+    if not isinstance(schema, dict):
         return {}
-    if "$ref" in one:
-        return known[one["$ref"].rpartition("/")[2]]
-    choices = [choice for choice in one.get("anyOf", []) if choice.get("type") != "null"]
-    return _resolved(choices[0], known) if len(choices) == 1 else one
+    if "$ref" in schema:
+        return known[schema["$ref"].rpartition("/")[2]]
+    choices = [choice for choice in schema.get("anyOf", []) if choice.get("type") != "null"]
+    return _resolved(choices[0], known) if len(choices) == 1 else schema
 
 
-def _kind(one: dict[str, Any], known: dict[str, Any]) -> str:
-    if "const" in one or "enum" in one:
-        return " or ".join(f"`{value}`" for value in one.get("enum", [one.get("const")]))
-    if one.get("type") == "array":
+def _kind(schema: dict[str, Any], known: dict[str, Any]) -> str:
+    if "const" in schema or "enum" in schema:
+        return " or ".join(f"`{value}`" for value in schema.get("enum", [schema.get("const")]))
+    if schema.get("type") == "array":
         return (
             "list"
-            if "prefixItems" in one or "items" not in one
-            else f"list of {_kind(_resolved(one['items'], known), known)}"
+            if "prefixItems" in schema or "items" not in schema
+            else f"list of {_kind(_resolved(schema['items'], known), known)}"
         )
-    if one.get("type") == "object":
+    if schema.get("type") == "object":
         return "table"
-    low = [f"above {_number(one['exclusiveMinimum'])}"] if "exclusiveMinimum" in one else []
-    low += [f"from {_number(one['minimum'])}"] if "minimum" in one else []
-    high = [f"below {_number(one['exclusiveMaximum'])}"] if "exclusiveMaximum" in one else []
-    high += [f"to {_number(one['maximum'])}"] if "maximum" in one else []
-    return " ".join((str(one.get("type", "any value")), *low, *high))
+    low = [f"above {_number(schema['exclusiveMinimum'])}"] if "exclusiveMinimum" in schema else []
+    low += [f"from {_number(schema['minimum'])}"] if "minimum" in schema else []
+    high = [f"below {_number(schema['exclusiveMaximum'])}"] if "exclusiveMaximum" in schema else []
+    high += [f"to {_number(schema['maximum'])}"] if "maximum" in schema else []
+    return " ".join((str(schema.get("type", "any value")), *low, *high))
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""What `mkdocs build` is told besides mkdocs.yml: whole folders in the navigation, and three pages from outside of docs/.
+"""Hooks of `mkdocs build`: whole folders in the navigation, and files from outside of docs/.
 
 A page links `../../bridge/wire/PROTOCOL.md`, which is right on the host and in an editor; on the site that file is the page
 `reference/protocol.md`.
@@ -12,11 +12,12 @@ from typing import Any
 from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).parent.parent
-# page of the site: file of the repository
+# file of the site: file of the repository
 PAGES = {
     "reference/protocol.md": "bridge/wire/PROTOCOL.md",
     "contributing.md": "CONTRIBUTING.md",
     "changelog.md": "CHANGELOG.md",
+    "reference/stickslip.proto": "bridge/wire/stickslip.proto",
 }
 _TARGET = re.compile(r"(?<=\]\()([^)#\s:]+)(?=[)#])")  # a relative target of a link, without its anchor
 
@@ -36,7 +37,7 @@ def _order(name: str) -> tuple[bool, int, str]:
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add the pages that lie outside docs/."""
+    """Add the files that lie outside docs/."""
     for page, source in PAGES.items():
         files.append(File.generated(config, page, abs_src_path=str(ROOT / source)))
     return files
@@ -44,13 +45,13 @@ def on_files(files: Files, config: Any) -> Files:
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     """Point every relative link at its page of the site."""
-    here = PurePosixPath(page.file.src_uri)
-    source = PurePosixPath(PAGES.get(str(here), f"docs/{here}"))
+    place = PurePosixPath(page.file.src_uri)
+    source = PurePosixPath(PAGES.get(str(place), f"docs/{place}"))
     pages = {file: page for page, file in PAGES.items()} | {"README.md": "index.md"}
 
     def on_site(match: re.Match[str]) -> str:
         file = os.path.normpath(source.parent / match[1])
         to = pages.get(file) or file.removeprefix("docs/")
-        return os.path.relpath(to, here.parent)
+        return os.path.relpath(to, place.parent)
 
     return _TARGET.sub(on_site, markdown)

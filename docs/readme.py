@@ -23,10 +23,10 @@ _BLOCK = re.compile(r"(?<=<!-- made by `make readme` -->\n\n).*?(?=\n\n)", re.DO
 
 def commands(readme: str) -> list[str]:
     """The demo in simulated time, and the commands that the README gives for a diagnosis."""
-    found = _EXAMPLE.search(readme)
-    if found is None:
+    match = _EXAMPLE.search(readme)
+    if match is None:
         raise ValueError("README.md: must give the command `stickslip example ...`, four blanks before it")
-    return [DEMO, *found[1].split(" && ")]
+    return [DEMO, *match[1].split(" && ")]
 
 
 def run(command: str, folder: Path) -> str:

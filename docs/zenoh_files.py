@@ -9,12 +9,12 @@ from bridge.wire.bus_config import BusConfig
 from bridge.wire.session import loopback_rig_security, session_settings, tls_rig_security
 
 FOLDER = Path(__file__).parent.parent / "deploy" / "zenoh"
-_MADE = "// Made by `make reference`. {what}\n"
+_MADE = "// Made by `make reference`. {about}\n"
 _CERTIFICATES, _RUNTIME = Path("CERTIFICATES"), Path("RUNTIME")
 
 
 def configurations() -> dict[str, str]:
-    """Text of every file, by name; CERTIFICATES, RUNTIME, HOST and PASSWORD stand for what the user's own are."""
+    """Text of every file, by name; CERTIFICATES, RUNTIME, HOST and PASSWORD stand for the user's values."""
     loopback = BusConfig()
     secure = BusConfig(endpoint="tls/HOST:7447")
     users = _RUNTIME / "stickslip" / loopback_users.file_name(loopback.endpoint)
@@ -41,8 +41,8 @@ def configurations() -> dict[str, str]:
             | certificates.tls_settings(role, certificates.files_of(role, _CERTIFICATES)),
         )
     return {
-        name: _MADE.format(what=what) + json.dumps(_nested(settings), indent=2) + "\n"
-        for name, (what, settings) in made.items()
+        name: _MADE.format(about=about) + json.dumps(_nested(settings), indent=2) + "\n"
+        for name, (about, settings) in made.items()
     }
 
 

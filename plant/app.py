@@ -8,16 +8,16 @@ from collections.abc import Sequence
 from bridge.faults import Fault
 from bridge.guard.codes import RESET, STOP
 from bridge.guard.config import wider
+from bridge.guard.events import GuardEvents
 from bridge.guard.kept_gain import KeptGain
 from bridge.guard.latch import StopLatch
-from bridge.guard.received import Commands
-from bridge.guard.tell import Teller
+from bridge.guard.received import CommandQueue
 from bridge.plain import Tell, say, untold
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.clock import time
 from bridge.wire.complaints import BAD_MESSAGE, FOREIGN, Complaints
-from bridge.wire.event_codes import is_told
+from bridge.wire.event_codes import is_listed
 from bridge.wire.inbox import WAITING
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, FAULT, OPERATOR, PLANT_EVENT, SENSORS
@@ -31,9 +31,9 @@ from plant.node import PlantNode
 _ANSWER_TIMEOUT_S = 5.0  # lockstep: longest wait for the command that answers a block
 _GOODBYE_S = 3.0  # longest wait for the other processes to leave the bus
 _ROUND_TRIPS_KEPT = 1024  # blocks whose time of sending is kept; answers to older blocks have no round trip
-_LONGEST_FADE_BLOCKS = 1000  # an exciter that does not come to rest within them never will
+_LONGEST_FADE_BLOCKS = 1000  # an exciter that is not at rest within them never will be
 _LATE_NS = 1_000_000  # round trip beyond which a command counts as late
-_PAUSE_NS = 250_000_000  # a block that is due and leaves so much later: this process stood still
+_PAUSE_NS = 250_000_000  # delay of a due block from which this process counts as stalled
 
 
 def run(
@@ -50,13 +50,13 @@ def run(
     faults: Sequence[FaultTable] = (),
     tell: Tell = untold,
 ) -> int:
-    """Serve the rig on the bus until `duration_s` is over (0: for ever) or `stop` is set; how many blocks.
+    """Serve the rig on the bus until `duration_s` is over (0: for ever) or `stop` is set. Returns the number of blocks.
 
     Args:
-        arm: start ARMED, as a simulated rig may whose scenario says so.
-        latch: where a person's stop is kept over restarts; None: nowhere, as in a run of `stickslip run`.
-        faults: that the rig and its bus have on purpose.
-        tell: of the life of this process, and of what is more than news, for a person.
+        arm: start ARMED, if the scenario of a simulated rig demands it.
+        latch: keeps the operator's stop over restarts; None: not kept, as in a run of `stickslip run`.
+        faults: injected into the rig and its bus.
+        tell: reports the state of this process and important events to the operator.
 
     Raises Fault ENDPOINT_BUSY, NO_PEER, NOT_SECURE, PEER_DIED, LOCKSTEP_STALLED.
 
@@ -72,7 +72,7 @@ def run(
     with Bus(bus_config, "plant", lockstep) as bus:
         bus.serve_header(header)
         process = PlantProcess(node, bus, latch, tell, kept)
-        # before the other processes hear of this one: claimed later, the link may lapse on busy cores (docs/method/plant.md)
+        # before the other processes see this one: claimed later, the link may lapse on busy cores (docs/method/rig.md)
         if lockstep:
             realtime.claim(realtime.core(bus_config.port), realtime.LOCKSTEP_PRIORITY)
             granted = "lockstep"  # the same text everywhere: the same run gives the same log
@@ -89,7 +89,7 @@ def run(
         tell("running", f"rig {rig.name} at {bus_config.endpoint}, {how_long}; {granted}")
         if why_not:
             process.event(
-                "STATE_FOLDER", f"{why_not}: a stop cannot be kept over a restart, so nothing is armed by itself"
+                "STATE_FOLDER", f"{why_not}: a stop cannot be kept over a restart, so the rig starts disarmed"
             )
         if wide := wider(rig.guard):
             process.event("WIDE_LIMITS", wide)
@@ -109,7 +109,7 @@ def wait_for_peers(bus: Bus, config: BusConfig, roles: list[str], stop: threadin
         missing = bus.wait_for(roles, 0.2)
     if missing and not stop.is_set():
         line = f"{config.endpoint}: no {' and no '.join(sorted(missing))} within {config.wait_s:g} s"
-        raise Fault("NO_PEER", f"{line}; start what is missing, or give it longer with --wait S")
+        raise Fault("NO_PEER", f"{line}; start the missing process, or wait longer with --wait S")
 
 
 class PlantProcess:
@@ -118,9 +118,9 @@ class PlantProcess:
     Args:
         node: the rig.
         bus: its session.
-        latch: where a person's stop is kept; None: nowhere.
-        say: of what is more than news, for a person.
-        kept: where the exciter's gain is kept that was accepted; None: nowhere.
+        latch: keeps the operator's stop; None: not kept.
+        say: reports important events to the operator.
+        kept: keeps the accepted gain of the exciter; None: not kept.
 
     """
 
@@ -131,26 +131,26 @@ class PlantProcess:
         self._kept, self._accepted_gain = kept, node.accepted_gain
         self._say = say
         self._latch = latch
-        self._teller = Teller()
-        self._words, self._orders = Inbox(16), Inbox(16)
+        self._teller = GuardEvents()
+        self._operator_orders, self._fault_orders = Inbox(16), Inbox(16)
         self._injected = Orders(node.faults)
         self._bus = bus
         self._complaints = Complaints(self.event)
-        self._commands = Commands(self._complaints)
+        self._commands = CommandQueue(self._complaints)
         self._answers = Inbox(64)
         self._on_the_way: collections.deque[Received] = collections.deque(maxlen=WAITING)
         self._events = 0
-        self._paused_ns = 0  # of a stall of this process that is not published
+        self._paused_ns = 0  # length of a stall of this process that is not yet published
         self._send_sensors = bus.publisher(SENSORS)
         self._send_applied = bus.publisher(APPLIED)
         self._send_announce = bus.publisher(ANNOUNCE)
         self._send_event = bus.publisher(PLANT_EVENT)
         bus.listen(COMMAND, self._receive)
-        bus.listen(OPERATOR, self._words.push)
-        bus.listen(FAULT, self._orders.push)
+        bus.listen(OPERATOR, self._operator_orders.push)
+        bus.listen(FAULT, self._fault_orders.push)
 
     def _receive(self, received: Received) -> None:
-        # a fault of the bus takes them first, in the loop
+        # the faults of the bus act on them first, in the loop
         (self._on_the_way.append if self._node.faults.on_the_bus else self._commands.push)(received)
         self._answers.push(received)
 
@@ -160,18 +160,18 @@ class PlantProcess:
         event = wire.Event(sequence=self._events, t_ns=t_ns, source="plant", code=code, text=text)
         self._events += 1
         self._send_event(event.SerializeToString())
-        if is_told(code):
+        if is_listed(code):
             self._say(code, text)
 
     def end(self) -> None:
-        """Say that the run is over, and leave the bus as a rig: only both together end the other processes."""
-        self._complaints.tell_when_due(all_of_it=True)
+        """Publish END, and leave the bus as a rig: only both together end the other processes."""
+        self._complaints.report_when_due(all_of_it=True)
         self._report_stall()
         self.event("END", f"blocks={self._node.block}")
         self._bus.withdraw()
 
     def _send(self, sensors: bytes, applied: bytes) -> None:
-        """Send the messages of a block, through the faults of the bus, if any act, and tell what is new."""
+        """Send the messages of a block, through the faults of the bus if any act, and publish new events."""
         faults = self._node.faults
         self._announce()
         if faults.on_the_bus:
@@ -186,48 +186,48 @@ class PlantProcess:
             self.event(code, text)
 
     def _let_commands_arrive(self) -> None:
-        """Let a fault of the bus pass on the commands that it took."""
-        there = [Message(one.payload, one) for one in _taken(self._on_the_way)]
-        for message in self._node.faults.on_the_way("commands", there, self._node.block - 1):
+        """Pass the received commands through the faults of the bus."""
+        taken = [Message(received.payload, received) for received in _taken(self._on_the_way)]
+        for message in self._node.faults.on_the_way("commands", taken, self._node.block - 1):
             self._commands.push(message.of._replace(payload=message.payload))
 
     def _announce(self) -> None:
         for message in self._node.announcements:
             self._send_announce(message.payload)
 
-    def _obey(self) -> None:
-        """Take the words of persons that came since the last block; what cannot be read is told and ignored."""
-        while (received := self._words.get_nowait()) is not None:
+    def _apply_orders(self) -> None:
+        """Apply the operators' orders since the last block; report and ignore unreadable ones."""
+        while (received := self._operator_orders.get_nowait()) is not None:
             try:
-                said = parsed(wire.Operator, received.payload, OPERATOR.name)
-                name = wire.Operator.Action.Name(said.action)
+                order = parsed(wire.Operator, received.payload, OPERATOR.name)
+                name = wire.Operator.Action.Name(order.action)
             except (Fault, ValueError) as error:
                 self.event("OPERATOR", f"ignored: {error}")
                 continue
-            self._node.obey(said.action)
-            self.event("OPERATOR", f"{name} by {said.who or 'somebody'}")
-            if self._latch is not None and said.action in (STOP, RESET):
-                # in a thread, as a slow disk must not hold up the fade
-                threading.Thread(target=self._keep_word, args=(said.action, said.who), name="latch").start()
+            self._node.apply_order(order.action)
+            self.event("OPERATOR", f"{name} by {order.who or 'an unnamed client'}")
+            if self._latch is not None and order.action in (STOP, RESET):
+                # in a thread: a slow disk must not delay the fade
+                threading.Thread(target=self._keep_order, args=(order.action, order.who), name="latch").start()
 
     def _take_orders(self) -> None:
-        """Take the faults that a person asks for, from the block after the next on; what is none is told and dropped."""
-        while (received := self._orders.get_nowait()) is not None:
+        """Queue fault-injection requests, effective from block n + 2. Report and drop malformed ones."""
+        while (received := self._fault_orders.get_nowait()) is not None:
             try:
                 self._injected.take(received.payload, self._node.block + 1)
             except Fault as fault:
                 self._complaints.note(BAD_MESSAGE, FAULT.name, f"{fault.line.partition(': ')[2]}: dropped")
 
-    def _keep_word(self, word: int, who: str) -> None:
+    def _keep_order(self, order: int, who: str) -> None:
         if self._latch is None:
             return
         try:
-            if word == STOP:
+            if order == STOP:
                 self._latch.set(who)
             else:
                 self._latch.clear()
         except OSError as error:
-            text = f"{self._latch.path}: {error.strerror}: the word does not outlast a restart"
+            text = f"{self._latch.path}: {error.strerror}: the order does not outlast a restart"
             self.event("STATE_FOLDER", text)
             say(f"stickslip: warning: STATE_FOLDER: {text}")
 
@@ -235,7 +235,7 @@ class PlantProcess:
         try:
             kept.save(gains)
         except (OSError, Fault) as error:
-            self.event("STATE_FOLDER", f"{kept.path}: {error}: the next run of this rig compares its gain with nothing")
+            self.event("STATE_FOLDER", f"{kept.path}: {error}: the next run of this rig has no gain to compare with")
 
     def _tell(self) -> None:
         applied = self._node.applied
@@ -246,11 +246,11 @@ class PlantProcess:
                 self._accepted_gain = self._node.accepted_gain
                 threading.Thread(target=self._keep_gain, args=(self._kept, self._accepted_gain), name="gain").start()
         if refused := int(applied.commands_refused):
-            text = "of another run, or not newer than the last: refused; is a controller of an earlier run still there?"
+            text = "of another run, or not newer than the last: refused; does a controller of an earlier run still run?"
             self._complaints.note(FOREIGN, f"{COMMAND.name} of another run", text, refused)
 
     def realtime(self, blocks: int, stop: threading.Event) -> None:
-        """Advance one block a period under the newest command; on every way out the vibration fades to zero first."""
+        """Advance one block per period under the newest command; on every exit the vibration fades to zero first."""
         try:
             self._advance_to(blocks, stop)
         finally:
@@ -273,7 +273,7 @@ class PlantProcess:
         while node.block < blocks and not stop.is_set():
             late_ns = pacer.wait(tick)
             tick += 1
-            self._obey()
+            self._apply_orders()
             self._take_orders()
             if node.faults.on_the_bus or self._on_the_way:
                 self._let_commands_arrive()
@@ -288,10 +288,10 @@ class PlantProcess:
             sensors, applied = node.advance(commands, late_commands, round_trip_ns, late_ns)
             sent_ns[(node.block - 1) % _ROUND_TRIPS_KEPT] = time.perf_counter_ns()
             self._send(sensors.payload, applied.payload)
-            self._complaints.tell_when_due()
+            self._complaints.report_when_due()
             if late_ns > _PAUSE_NS:
                 self._paused_ns = max(self._paused_ns, late_ns)
-            elif late_ns < node.block_ns and commands:  # whose sender has its link again
+            elif late_ns < node.block_ns and commands:  # the sender's link is up again
                 self._report_stall()
 
     def _report_stall(self) -> None:
@@ -305,7 +305,7 @@ class PlantProcess:
         node = self._node
         commands: list[bytes] = []
         while node.block < blocks and not stop.is_set():
-            self._obey()
+            self._apply_orders()
             sensors, applied = node.advance(commands)
             self._send(sensors.payload, applied.payload)
             commands = [self._answer(node.block - 1, stop)]
@@ -324,6 +324,6 @@ class PlantProcess:
         raise Fault("LOCKSTEP_STALLED", f"block {block}: no command answered it within {_ANSWER_TIMEOUT_S:g} s")
 
 
-def _taken(there: collections.deque[Received]) -> list[Received]:
-    """All that waits, oldest first; a receiving thread may add more meanwhile."""
-    return [there.popleft() for _ in range(len(there))]
+def _taken(queue: collections.deque[Received]) -> list[Received]:
+    """All waiting commands, oldest first; a receiving thread may add more during the call."""
+    return [queue.popleft() for _ in range(len(queue))]

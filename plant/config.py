@@ -1,4 +1,4 @@
-"""The rig file, in units of people; the paper's rig is the default of everything but the contact."""
+"""The rig file; every value except the contact defaults to the paper's rig."""
 
 import math
 from pathlib import Path
@@ -15,12 +15,12 @@ from plant.loop_delay import LONGEST_DELAY_S, LONGEST_JITTER_S, whole_blocks
 from plant.pairs import PAIRS
 
 NotPositive = Annotated[float, Field(le=0)]
-# Steps of the solver in a period of the vibration, and of the slide on its spring. Fewer: slips that are not real, and peaks of
-# force that are off. More: sound rigs are refused. Counted: docs/method/plant.md.
+# Fewest solver steps in a period of the vibration, and of the slide on its spring. Smaller: false slips and wrong peaks of the
+# force. Larger: sound rigs are refused. Counted: docs/method/rig.md.
 _FEWEST_STEPS_A_PERIOD = 20
-MOST_BLOCKS_AHEAD = 63  # of an announcement: one a block, and that of now, fill the controller's ring of 64
-# Steps of the solver in a block. A step takes 0.04 to 0.06 us (measured with steps of 0.1 us, two rigs): this many take 50 ms,
-# 50 times real time with blocks of 1 ms. More: a run seems to hang, in a kernel that Ctrl-C does not reach.
+MOST_BLOCKS_AHEAD = 63  # of an announcement: one per block and the present one fill the controller's ring of 64
+# Most solver steps in a block. A step takes 0.04 to 0.06 us (measured with steps of 0.1 us, two rigs): this many take 50 ms, 50
+# times a block of 1 ms. Larger: a run seems to hang, in a kernel that Ctrl-C does not interrupt.
 _MOST_STEPS_A_BLOCK = 1_000_000
 
 
@@ -92,7 +92,7 @@ class PiezoConfig(Strict):
 
 
 class SensorsConfig(Strict):
-    """The measuring chain of the paper's stand; noise is rms, a resolution of 0 means no quantisation."""
+    """The measuring chain of the paper's test rig; noise is rms, a resolution of 0 means no quantisation."""
 
     force_range_N: Positive = Field(default=50.0, description="Highest force that is measured.")
     force_lowest_N: NotPositive = Field(
@@ -118,7 +118,7 @@ class SensorsConfig(Strict):
 
 
 class SolverConfig(Strict):
-    """Time steps. `block_s` of physics make one message of `samples_per_block` samples a channel."""
+    """Time steps. Each block of `block_s` is one message with `samples_per_block` samples per channel."""
 
     step_s: Positive = 1e-5
     # Shorter: a block of 20 kHz has fewer samples than its message has fields. Longer: a slip of the paper's rig, 36 ms, is over
@@ -130,7 +130,7 @@ class SolverConfig(Strict):
 
 
 class LoopConfig(Strict):
-    """What lies between sensors and exciter besides the controller: converters, drivers, a slow bus."""
+    """Delays between sensors and exciter besides the controller: converters, drivers, a slow bus."""
 
     delay_s: Annotated[float, Field(ge=0, le=LONGEST_DELAY_S)] = Field(
         default=0.0,
@@ -207,7 +207,7 @@ class RigConfig(Strict):
                 f"{self.loop.longest_s(solver.block_s):g} s old when it acts, and would count as lost; raise it to "
                 f"{least_s:g} or more"
             )
-        # k_t dt^2 / m must be at most 1: at 1.9 friction oscillates by itself (docs/method/plant.md)
+        # k_t dt^2 / m must be at most 1: at 1.9 friction oscillates by itself (docs/method/rig.md)
         lightest_kg = self.contact.stiffness_N_per_m * solver.step_s**2
         if self.slide.mass_kg < lightest_kg:
             longest_s = math.sqrt(self.slide.mass_kg / self.contact.stiffness_N_per_m)
@@ -230,7 +230,7 @@ class RigConfig(Strict):
 
     @model_validator(mode="after")
     def _drive_is_not_too_stiff(self) -> "RigConfig":
-        # Nothing damps the slide on its spring, so too few steps a period change the peaks of the force (docs/method/plant.md).
+        # Nothing damps the slide on its spring, so too few steps a period change the peaks of the force (docs/method/rig.md).
         k_d, ratio = self.drive.stiffness_N_per_m, self._of("drive-stiffness", "ratio")
         per_step = 2.0 * math.pi / _FEWEST_STEPS_A_PERIOD
         stiffest = self.slide.mass_kg * (per_step / self.solver.step_s) ** 2 / (1.0 + ratio)
@@ -245,7 +245,7 @@ class RigConfig(Strict):
         return self
 
     def _of(self, effect: str, key: str) -> float:
-        """A parameter of an effect; 0 where the rig does not have the effect."""
+        """A parameter of an effect; 0 for a rig without the effect."""
         return float(self.effects.get(effect, {}).get(key, 0.0))
 
     @model_validator(mode="after")
@@ -290,7 +290,7 @@ class RigConfig(Strict):
                 f"{lightest_kg:.2g} kg with solver.step_s = {solver.step_s:g}; lower one of the three"
             )
         ratio, frequency_Hz = self._of("frame-compliance", "ratio"), self._of("frame-compliance", "frequency_Hz")
-        # sum of two stiffnesses over that of the frame: the drive's spring, and the spring in series with a relaxing damper
+        # sum of two stiffnesses over the frame's stiffness: the drive's spring, and the spring in series with a relaxing damper
         stiffer = ratio
         if relaxation_s := self._of("drive-damping", "relaxation_s"):
             k_d = self.drive.stiffness_N_per_m * (1.0 + self._of("drive-stiffness", "ratio"))

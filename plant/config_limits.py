@@ -1,4 +1,4 @@
-"""Rig files that pass every rule on single numbers, and for which the model would silently do what no rig does."""
+"""Rejection of rig files that pass every rule on single numbers but make the model unphysical."""
 
 import math
 
@@ -8,7 +8,7 @@ from plant.config import RigConfig
 from plant.records import build
 
 # Largest h_t dt / m. Too large: the step throws a vibrated slide (4.3: threefold velocity; 2.15: mean force off by 0.6 %).
-# Too small: sound rigs are refused. Counted: docs/method/plant.md.
+# Too small: sound rigs are refused. Counted: docs/method/rig.md.
 _MOST_DAMPING = 2.0
 # v / v_s at which the Stribeck curve is checked; beyond the last one the curve only approaches the Coulomb force
 _VELOCITY_RATIOS = np.linspace(0.0, 10.0, 2001)

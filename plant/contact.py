@@ -43,7 +43,7 @@ def step(
         sliding_share: 1 for LuGre; between 0 and 1 where the bristle of the elasto-plastic contact is still elastic.
         base_give: mean velocity that the base gains over the step for every newton of friction [m/(N s)]; 0 for a rigid base.
         guarded: whether friction may change by a large share within a step; without effects it never does.
-        dt, z_dt: the step [s]; the time over which the bristle moves [s], from the middle of the step before to that of this one.
+        dt, z_dt: the step [s]; the time of the bristle's motion [s], from the middle of the last step to the middle of this one.
         ahead: the middle of the step, in steps before, beyond the present: 0.5 where both are of one length.
         pull_N: force of the drive's spring in the middle of the step.
         base_velocity_mid: velocity of the base in the middle of the step, without the part that friction causes.
@@ -56,7 +56,7 @@ def step(
     g_end = g / sliding_share
     decay = k_t * math.fabs(v_r) / g_end * z_dt
     if decay < 0.03:
-        # exp(-decay) - 1 by its series, accurate to 1e-14 here; in pairs of terms, as the rest of the step waits for this line
+        # exp(-decay) - 1 by its series, accurate to 1e-14 here; in pairs of terms, because the rest of the step depends on it
         square = decay * decay
         pairs = (1.0 - decay / 2) + square * ((1 / 6 - decay / 24) + square * (1 / 120 - decay / 720))
         gone = -decay * pairs
@@ -70,12 +70,12 @@ def step(
     z += moved
     share = 1.0 - per_g_mid * z
     if guarded and decay > 1.0:
-        # The bristle follows g within the step: use what it has moved, not the small difference of two extrapolated numbers.
+        # The bristle follows g within the step: use its motion, not the small difference of two extrapolated numbers.
         share = moved / (v_r * z_dt)
     damping = h_t * share + h_v
     bristle_N = k_t * z
     if base_give > 0.0:
-        # Friction moves the base within the step. One equation solves both: the contact's stiff damping makes two unstable.
+        # Friction moves the base within the step. One equation solves both: two are unstable with the contact's stiff damping.
         yielding = 1.0 / (1.0 + damping * base_give)
         bristle_N *= yielding
         damping *= yielding

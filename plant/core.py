@@ -22,14 +22,15 @@ from plant.effects.structure import base_free_mps, base_give, frame_gain_mps
 from plant.effects.waves import TWO_PI
 from plant.piezo import accepted, delivered_share
 
-# Share of v_s below which the slide sticks. A sample of it, and the next may be one step: the error of the slip times was the
-# same from 0.01 to 0.05 (docs/method/plant.md). Larger: the beginning of a slip is cut short. Smaller: fewer long steps.
+# Share of v_s below which the slide sticks; after a stuck sample the next sample may be a single step. The error of the slip
+# times was the same from 0.01 to 0.05 (docs/method/rig.md). Larger: the beginning of a slip is cut short. Smaller: fewer long
+# steps.
 _STICK_SHARE = 0.02
 
 
 @kernel
 def _stribeck_share(q: float, tail: float) -> float:
-    """Share of F_s - F_c that is left at q times the Stribeck velocity."""
+    """Remaining share of F_s - F_c at q times the Stribeck velocity."""
     share = math.exp(-q * q)
     if tail != 0.0:
         share += tail * (1.0 / (1.0 + q * q) - share)
@@ -53,12 +54,12 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
             drive: velocity of the drive [m/s], held over the block; with `force_driven` the force on the slide [N].
             frequency_Hz, amplitude_m: the command to the piezo, held over the block.
             analogue: filled with the sensors before noise and digitising, float64 [5, samples], rows as CHANNELS.
-            truth: filled with what no sensor sees, float64 [6, samples], rows as TRUTH.
+            truth: filled with quantities without a sensor, float64 [6, samples], rows as TRUTH.
 
         """
         p: Record = params[0]
         s: Record = state[0]
-        # into locals: through the record every store to an output array would force a reload
+        # copied to locals: the compiler would reload record fields after every store to an output array
         dt, m, k_d, h_d = p.dt_s, p.m, p.k_d, p.h_d
         fine_dt, stick_dt, stick_mps = dt, p.stick_dt_s, _STICK_SHARE * p.v_s
         k_t, h_t, h_v, F_c, F_s, per_v_s = p.k_t, p.h_t, p.h_v, p.F_c, p.F_s, 1.0 / p.v_s
@@ -87,7 +88,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
         drive_velocity_mps = drive
         h_d_now, h_d_step, F_c_now, F_s_now, sliding_share, gives = h_d, h_d, F_c, F_s, 1.0, 0.0
         force_N, slack = s.drive_N, False
-        # only the disturbed kernel looks at what follows
+        # the rest is used by the disturbed kernel only
         t_s = s.t_s
         frame_m, frame_mps, base_m, base_mps, yield_mps2 = s.frame_m, s.frame_mps, s.base_m, s.base_mps, 0.0
         age_s, v_lag, arm_N = s.age_s, s.v_lag, s.arm_N
@@ -97,7 +98,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
         frame_loss, base_loss = p.frame_damping_ratio * frame_omega * dt, p.base_damping_ratio * base_omega * dt
         if disturbed and p.base_m_per_N != 0.0:
             gives = base_give(dt, base_omega, base_loss, p.base_m_per_N)
-        # where friction falls at once the bristle's damper pushes: more than this, and the step would be unstable
+        # the bristle's damper pushes where friction falls abruptly: beyond this the step would be unstable
         least_N_per_m = k_t / (1.0 + 1.0 / (dt * h_t * (1.0 / m + 2.0 * gives / dt))) if h_t > 0.0 else 0.0
         block_s = samples * steps_per_sample * dt
         vibrating_s = s.vibrating_s if vibrating else 0.0
@@ -108,7 +109,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
             warm_share = heat_share(p, vibrating_s + 0.5 * block_s)
         if disturbed and p.force_driven:
             drive_velocity_mps = 0.0
-        # turned on from step to step: a sine in each step made a rig whose load varies a third slower
+        # rotated from step to step: a sine in each step slowed a rig with a varying load by a third
         load_omega = TWO_PI * p.load_frequency_Hz
         load_sin, load_cos = (
             math.sin(load_omega * t_s + p.load_phase_rad),
@@ -124,7 +125,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
 
         for sample in range(samples):
             steps = steps_per_sample
-            if not disturbed:  # with effects something else may swing while the slide sticks
+            if not disturbed:  # with effects other parts may swing while the slide sticks
                 coarse = sticks and not vibrating
                 steps = p.steps_per_stick_sample if coarse else steps_per_sample
                 dt = stick_dt if coarse else fine_dt
@@ -161,12 +162,12 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                     anchor_mps = drive_velocity_mps - frame_mps
                     extension_m = s_d - frame_m - x
                     pull_N = drive if p.force_driven else spring_N(p, extension_m + 0.5 * dt * (anchor_mps - v))
-                    # a slack drive damps nothing, and a force has none
+                    # a slack drive does not damp; a force drive has no damper
                     slack = math.fabs(extension_m) < 0.5 * p.gap_m
                     h_d_now = 0.0 if p.force_driven or slack else h_d
                     h_d_step = h_d_now
-                    if p.relaxing_Ns_per_m > 0.0:  # what it keeps to mid-step, and a damper for what it gains
-                        arm_N = 0.0 if slack else arm_N  # it hangs on the slide across the gap, too
+                    if p.relaxing_Ns_per_m > 0.0:  # force kept to mid-step, plus a damper for the force gained
+                        arm_N = 0.0 if slack else arm_N  # it also acts across the gap
                         pull_N += arm_keep_half * arm_N
                         h_d_step += 0.0 if slack else p.relaxing_Ns_per_m * (1.0 - arm_keep_half)
                 else:
@@ -215,7 +216,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                 if disturbed:
                     least_N = least_N_per_m * math.fabs(z)
                     g = max(g, least_N)
-                    g_before = min(g_before, 3.0 * g - 2.0 * max(least_N, 0.5 * g))  # keeps g in mid-step above both
+                    g_before = min(g_before, 3.0 * g - 2.0 * max(least_N, 0.5 * g))  # keeps g above both in mid-step
                 if disturbed and p.elasto_plastic:
                     sliding_share = elasto_plastic_share(z, v_r, g, k_t, p.elastic_ratio)
                 v, v_mid, z = contact_step(
@@ -236,7 +237,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                         base_m += dt * base_mean_mps
                         yield_mps2 = 2.0 * (base_mean_mps - base_mps) / dt
                         base_mps = 2.0 * base_mean_mps - base_mps
-                    frame_m += dt * frame_mps  # its velocity is that of the middle of the step
+                    frame_m += dt * frame_mps  # with the velocity in the middle of the step
                     spring_force_N = spring_N(p, s_d - frame_m - x) + h_d_now * (anchor_mps - v)
                     if p.relaxing_Ns_per_m > 0.0:
                         arm_keep = arm_keep_half * arm_keep_half

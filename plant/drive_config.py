@@ -6,7 +6,7 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from bridge.config import Strict, Two
-from plant.drive_motion import Motion, Move, again_and_again, of_moves, of_profile, peak_mps
+from plant.drive_motion import DriveMotion, Move, again_and_again, of_moves, of_profile, peak_mps
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
@@ -20,13 +20,13 @@ class MoveConfig(Strict):
     velocity_mps: Positive = Field(description="Highest speed; a short move stays below it.")
     acceleration_mps2: Positive = Field(description="Highest acceleration, and deceleration.")
     jerk_mps3: Positive = Field(description="Highest rate of the acceleration.")
-    dwell_s: NotNegative = Field(default=0.0, description="How long the drive stands afterwards.")
+    dwell_s: NotNegative = Field(default=0.0, description="Time at rest after the move.")
 
     @model_validator(mode="after")
     def _goes_somewhere(self) -> "MoveConfig":
         if (self.distance_m is None) == (self.to_m is None):
             given = "neither" if self.distance_m is None else "both"
-            raise ValueError(f"distance_m, to_m: {given} given: must be one of them; say how far or where to")
+            raise ValueError(f"distance_m, to_m: {given} given: must be one of them; give a distance or a target")
         return self
 
 
@@ -43,11 +43,11 @@ class DriveConfig(Strict):
         default=[], description="Jerk-limited moves, one after the other, in place of the profile."
     )
     repeat_every_s: NotNegative = Field(
-        default=0.0, description="Profile or moves begin anew after this time; 0: they come once."
+        default=0.0, description="Profile or moves repeat after this time; 0: they run once."
     )
     announce_ahead_s: NotNegative = Field(
         default=0.0,
-        description="The rig tells the controller so long ahead how fast the drive will move, in whole blocks; 0: not.",
+        description="The rig announces the drive velocity to the controller this long ahead, in whole blocks; 0: not.",
     )
 
     @model_validator(mode="after")
@@ -70,7 +70,7 @@ class DriveConfig(Strict):
             )
         return self
 
-    def motion(self) -> Motion:
+    def motion(self) -> DriveMotion:
         """Where the drive is at every time of a run."""
         once = self._once()
         return again_and_again(once, self.repeat_every_s) if self.repeat_every_s > 0.0 else once
@@ -81,7 +81,7 @@ class DriveConfig(Strict):
         of_profile = {abs(velocity_mps) for _, velocity_mps in self.profile if velocity_mps != 0.0}
         return sorted(of_moves if self.moves else of_profile)
 
-    def _once(self) -> Motion:
+    def _once(self) -> DriveMotion:
         return of_moves(self._moves()) if self.moves else of_profile(self.profile)
 
     def _moves(self) -> list[Move]:

@@ -1,4 +1,4 @@
-"""Where a drive is and how fast it moves over the time of a run, in either direction: pieces of constant jerk.
+"""Position and velocity of a drive over the time of a run, in either direction: pieces of constant jerk.
 
 A jerk-limited move has seven of them, as in Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots,
 2008, section 3.4: the acceleration grows, holds and falls, the velocity holds, and the same to a stop. A move too short for its
@@ -7,26 +7,26 @@ velocity has the highest one from which it still stops in time.
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.floating[Any]]
+from bridge.arrays import Floats
 
-_CLOSED_M = 1e-12  # a cycle that ends so near to its beginning is closed: rounding, 1 um in a million cycles
+_CLOSED_M = 1e-12  # a cycle ending this near to its beginning counts as closed: rounding, 1 um in a million cycles
 
 
-class Motion(NamedTuple):
-    """Motion of a drive that is at 0 m at 0 s. The pieces [pieces] follow each other; the last one goes on until the period."""
+class DriveMotion(NamedTuple):
+    """Motion of a drive that starts at 0 m. The pieces [pieces] follow each other; the last lasts until the period."""
 
     start_s: Floats
     position_m: Floats
     velocity_mps: Floats
     acceleration_mps2: Floats
     jerk_mps3: Floats
-    period_s: float = math.inf  # after which it begins anew
-    drift_m: float = 0.0  # from the beginning of one period to that of the next
+    period_s: float = math.inf  # of a repeated motion
+    drift_m: float = 0.0  # per period
 
 
 class Move(NamedTuple):
@@ -39,7 +39,7 @@ class Move(NamedTuple):
     dwell_s: float
 
 
-def of_profile(points: Sequence[tuple[float, float]]) -> Motion:
+def of_profile(points: Sequence[tuple[float, float]]) -> DriveMotion:
     """The motion of points (time [s], velocity [m/s]): linear velocity between them, constant outside of them."""
     times_s, velocities_mps = np.array(points).T
     start_s = np.unique([0.0, *times_s[times_s > 0.0]])
@@ -47,10 +47,10 @@ def of_profile(points: Sequence[tuple[float, float]]) -> Motion:
     length_s, gain_mps = np.diff(start_s), np.diff(velocity_mps)
     travel_m = 0.5 * (velocity_mps[1:] + velocity_mps[:-1]) * length_s
     position_m = np.append(0.0, np.cumsum(travel_m))
-    return Motion(start_s, position_m, velocity_mps, np.append(gain_mps / length_s, 0.0), np.zeros(len(start_s)))
+    return DriveMotion(start_s, position_m, velocity_mps, np.append(gain_mps / length_s, 0.0), np.zeros(len(start_s)))
 
 
-def of_moves(moves: Iterable[Move]) -> Motion:
+def of_moves(moves: Iterable[Move]) -> DriveMotion:
     """The motion of moves, one after the other, at rest after the last one."""
     rows: list[tuple[float, float, float, float, float]] = []
     begin_s = begin_m = 0.0
@@ -62,32 +62,32 @@ def of_moves(moves: Iterable[Move]) -> Motion:
             at_m += length_s * (v + length_s * (a / 2.0 + length_s * jerk / 6.0))
             v += length_s * (a + length_s * jerk / 2.0)
             a += length_s * jerk
-        # where the move ends and not where rounding got to, so that no drift builds up
+        # the exact end of the move, so that rounding does not add up to a drift
         begin_m += move.distance_m
         if move.dwell_s > 0.0:
             rows.append((at_s, begin_m, 0.0, 0.0, 0.0))
         begin_s = at_s + move.dwell_s
     rows.append((begin_s, begin_m, 0.0, 0.0, 0.0))
-    return Motion(*np.array(rows).T)
+    return DriveMotion(*np.array(rows).T)
 
 
 def peak_mps(move: Move) -> float:
-    """The speed that a move reaches [m/s]: its velocity, or less where it is too short."""
+    """The speed that a move reaches [m/s]: its velocity, or less for a short move."""
     distance_m, v, a, j = abs(move.distance_m), move.velocity_mps, move.acceleration_mps2, move.jerk_mps3
     if distance_m >= v * _ramp_s(v, a, j):
         return v
-    # of two ramps without a way between them: with the full acceleration, and where that is more than is reached without
+    # two ramps without a cruise between them: with the full acceleration, or a lower peak if that is not reached
     full = 0.5 * a * (math.sqrt((a / j) ** 2 + 4.0 * distance_m / a) - a / j)
     return full if full >= a * a / j else (0.25 * distance_m * distance_m * j) ** (1.0 / 3.0)
 
 
 def _ramp_s(v: float, a: float, j: float) -> float:
-    """Time from standstill to a velocity; half of v times it is the way there."""
+    """Time from standstill to a velocity; the distance is half of v times it."""
     return v / a + a / j if v * j >= a * a else 2.0 * math.sqrt(v / j)
 
 
 def _pieces(move: Move) -> list[tuple[float, float]]:
-    """Length [s] and jerk [m/s3] of the pieces of a move, without its stop."""
+    """Duration [s] and jerk [m/s3] of the pieces of a move, without its stop."""
     if move.distance_m == 0.0:
         return []
     v, a, j = peak_mps(move), move.acceleration_mps2, move.jerk_mps3
@@ -104,21 +104,21 @@ def _pieces(move: Move) -> list[tuple[float, float]]:
     return [piece for piece in pieces if piece[0] > 0.0]
 
 
-def again_and_again(motion: Motion, period_s: float) -> Motion:
-    """The motion begun anew after every period."""
+def again_and_again(motion: DriveMotion, period_s: float) -> DriveMotion:
+    """The motion, repeated after every period."""
     drift_m = float(position_m(motion, np.array([period_s]))[0])
     return motion._replace(period_s=period_s, drift_m=drift_m if abs(drift_m) > _CLOSED_M else 0.0)
 
 
-def _within(motion: Motion, t_s: Floats) -> tuple[Floats, npt.NDArray[np.intp], Floats]:
-    """Of the times `t_s`, 0 or later: whole periods before, the piece, and the time since the piece began [s]."""
+def _within(motion: DriveMotion, t_s: Floats) -> tuple[Floats, npt.NDArray[np.intp], Floats]:
+    """For the times `t_s`, 0 or later: whole periods before, the piece, and the time since the piece began [s]."""
     periods = np.floor(t_s / motion.period_s)
     phase_s = np.maximum(t_s - periods * motion.period_s if math.isfinite(motion.period_s) else t_s, 0.0)
     piece = np.searchsorted(motion.start_s, phase_s, side="right") - 1
     return periods, piece, phase_s - motion.start_s[piece]
 
 
-def position_m(motion: Motion, t_s: Floats) -> Floats:
+def position_m(motion: DriveMotion, t_s: Floats) -> Floats:
     """Position of the drive [m] at the times `t_s` [s], 0 or later."""
     periods, piece, since_s = _within(motion, t_s)
     v, a, j = motion.velocity_mps[piece], motion.acceleration_mps2[piece], motion.jerk_mps3[piece]
@@ -126,19 +126,19 @@ def position_m(motion: Motion, t_s: Floats) -> Floats:
     return motion.position_m[piece] + gained_m + periods * motion.drift_m
 
 
-def velocity_mps(motion: Motion, t_s: Floats) -> Floats:
+def velocity_mps(motion: DriveMotion, t_s: Floats) -> Floats:
     """Velocity of the drive [m/s] at the times `t_s` [s], 0 or later."""
     _, piece, since_s = _within(motion, t_s)
     gained_mps = since_s * (motion.acceleration_mps2[piece] + since_s * motion.jerk_mps3[piece] / 2.0)
     return motion.velocity_mps[piece] + gained_mps
 
 
-def mean_velocity_mps(motion: Motion, t_s: Floats, block_s: float) -> Floats:
-    """Mean velocity [m/s] over the blocks that begin at `t_s` [s]: held over them, it leads to the very same places."""
+def mean_velocity_mps(motion: DriveMotion, t_s: Floats, block_s: float) -> Floats:
+    """Mean velocity [m/s] over the blocks that begin at `t_s` [s]: held over them, it gives the same positions."""
     return (position_m(motion, t_s + block_s) - position_m(motion, t_s)) / block_s
 
 
-def reach_m(motion: Motion, until_s: float) -> tuple[float, float]:
+def reach_m(motion: DriveMotion, until_s: float) -> tuple[float, float]:
     """The lowest and the highest position of the drive [m] from 0 s to `until_s`."""
     periods = math.floor(until_s / motion.period_s)
     if periods == 0:
@@ -150,9 +150,9 @@ def reach_m(motion: Motion, until_s: float) -> tuple[float, float]:
     return min(ends_m), max(ends_m)
 
 
-def _reach_within(motion: Motion, until_s: float) -> tuple[float, float]:
+def _reach_within(motion: DriveMotion, until_s: float) -> tuple[float, float]:
     """As `reach_m`, within the first period."""
-    # where a piece begins, and where it turns back; pieces with a jerk belong to moves, which turn back at rest only
+    # begins of the pieces, and their turning points; pieces with a jerk belong to moves, which reverse only at rest
     with np.errstate(divide="ignore", invalid="ignore"):
         turn_s = motion.start_s - motion.velocity_mps / motion.acceleration_mps2
     turns = (turn_s > motion.start_s) & (turn_s < np.append(motion.start_s[1:], np.inf)) & (motion.jerk_mps3 == 0.0)
@@ -161,8 +161,8 @@ def _reach_within(motion: Motion, until_s: float) -> tuple[float, float]:
     return float(positions_m.min()), float(positions_m.max())
 
 
-def lowest_mps(motion: Motion, until_s: float) -> float:
-    """The lowest velocity of the drive [m/s] from 0 s to `until_s`; below 0 where it goes back."""
+def lowest_mps(motion: DriveMotion, until_s: float) -> float:
+    """The lowest velocity of the drive [m/s] from 0 s to `until_s`; below 0 if it reverses."""
     until_s = min(until_s, math.nextafter(motion.period_s, 0.0))
     begun = motion.start_s <= until_s
     return float(min(motion.velocity_mps[begun].min(), velocity_mps(motion, np.array([until_s]))[0]))

@@ -1,9 +1,9 @@
 """Four or eight rigs through one run side by side (`make bench`): a refit asks for one run of many slightly different rigs.
 
-They get the same commands in the same steps, so that `four_rigs_step` does each step for all of them at once. What its loops
-cannot hold, a sine of the place or a power of an age, has loops of its own here, which run only where a rig has such an effect.
+They get the same commands in the same steps, so that `four_rigs_step` does each step for all of them at once. Terms that
+do not fit into its loops (a sine of the position, a power of an age) have separate loops here, for rigs with such an effect only.
 
-What is right is what `plant.core` does: tests/truth/test_side_by_side.py holds every form of every effect against it.
+The reference is `plant.core`: tests/truth/test_side_by_side.py compares every form of every effect with it.
 """
 
 import math
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.kernel import Record, kernel
 from plant import four_rigs_step as at
 from plant.effects.drive import extension_m, unevenness, yield_m
@@ -21,8 +22,6 @@ from plant.effects.piezo import heat_share, load_share
 from plant.effects.waves import TWO_PI
 from plant.four_rigs_step import LANES, Width
 from plant.piezo import delivered_share
-
-Floats = npt.NDArray[np.floating[Any]]
 
 
 @kernel
@@ -40,7 +39,7 @@ def advance_lanes(
     entry_age_s: Floats,
     out: Floats,
 ) -> None:
-    """Take as many rigs as `width` is long through one run.
+    """Simulate one run of as many rigs as `width` is long.
 
     Args:
         width: of `NARROW` or of `LANES` numbers, whose values do not matter.
@@ -96,7 +95,7 @@ def advance_lanes(
         w[at.BASE + i], w[at.BASE_V + i], w[at.ARM + i] = s.base_m, s.base_mps, s.arm_N
         w[at.AGE + i], w[at.V_LAG + i] = s.age_s, s.v_lag
         w[at.CELL_M + i], w[at.CELL + i] = 1.0, math.inf
-        if p.roughness_ratio != 0.0 and not _varies(p):  # else `level` has it, too
+        if p.roughness_ratio != 0.0 and not _varies(p):  # otherwise included in `level`
             w[at.ROUGH + i], w[at.CELL_M + i] = p.roughness_ratio, p.roughness_length_m
         ripples = ripples or p.ripple_ratio != 0.0 or p.ripple_per_N != 0.0
         sags = sags or w[at.SAG_PER_N + i] != 0.0
@@ -201,13 +200,13 @@ def advance_lanes(
 
 @kernel
 def _varies(p: Record) -> bool:
-    """Whether the friction's level depends on the place or the time by more than a rough surface and waves."""
+    """Whether the friction's level depends on position or time beyond a rough surface and waves."""
     return p.position_ratio != 0.0 or (p.load_ratio != 0.0 and p.load_seed >= 0.0)
 
 
 @kernel
 def _enter(w: Floats, width: Width, params: npt.NDArray[Any], drive_mps: float, force_N: Floats, age_s: Floats) -> None:
-    """Put every slide where its spring has a force [rigs], stuck where the age [rigs] is a number."""
+    """Place every slide so that its spring has a force [rigs]; it sticks if its age [rigs] is a number."""
     for i in range(len(width)):
         p: Record = params[i]
         w[at.FRAME + i], w[at.FRAME_V + i] = force_N[i] * p.frame_m_per_N, 0.0

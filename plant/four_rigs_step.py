@@ -1,10 +1,11 @@
 """One step of four or eight rigs side by side, whose numbers are in one array, in rows of `LANES` at constant places.
 
-What makes vectors of it: loops over the lanes alone, without a branch and with no call but to plain arithmetic; an exponential of
-additions and multiplications. What a step waits for is the way from one velocity to the next: two exponentials and two divisions
-after one another. What can be computed beside that way is: 2.2 times the plant's kernel instead of 1.6 (`make bench`).
+The compiler vectorises it because its loops run over the lanes alone, without a branch and with plain arithmetic only; the
+exponential consists of additions and multiplications. The critical path of a step leads from one velocity to the next: two
+exponentials and two divisions in sequence. Everything else is computed in parallel to it: 2.2 times the speed of the plant's
+kernel instead of 1.6 (`make bench`).
 
-The equations are those of `plant.contact`, `plant.effects` and `plant.core`.
+The equations are the same as in `plant.contact`, `plant.effects` and `plant.core`.
 """
 
 import math
@@ -13,12 +14,12 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.kernel import Record, has_wide_vectors, kernel
 from plant.effects.drive import spring_law_N
 from plant.effects.friction_memory import late_mps
 from plant.effects.waves import TWO_PI, lattice_value, noise_in_cell, with_second
 
-Floats = npt.NDArray[np.floating[Any]]
 # As many numbers as there are rigs: a kernel is compiled for the length of it, as for a type.
 Width = tuple[int, ...]
 # Rigs at once: a register of AVX2 holds four, one of AVX-512 eight. With AVX2 eight rigs take 1.9 times as long as four, so there
@@ -39,13 +40,13 @@ ARM_KEEP, LOAD_SIN_STEP, LOAD_COS_STEP, SHARE = _AT[42:46]
 # its state:
 X, V, Z, V_R, G, S_D, FORCE, FRAME, FRAME_V, BASE, BASE_V, ARM = _AT[46:58]
 AGE, V_LAG, LOAD_SIN, LOAD_COS = _AT[58:62]
-# what one loop of a step leaves for the next:
+# intermediate values from one loop of a step to the next:
 DRIVE, PULL, HELD, HELD_STEP, FREE, DELIVERED, V_R_NOW, LEVEL, SETTLED, V_G, LATE_FALL, AGED = _AT[62:74]
 # a rough surface: its ratio, the length of a cell of its lattice, where the slide is in cells, its cell, the noise at both ends
 ROUGH, CELL_M, AT_CELL, CELL, CELL_BEGIN, CELL_END = _AT[74:80]
 # sums over a block: the five signals, then the squares of the accelerations of mass and base
 SUM_FORCE, SUM_MASS, SUM_BASE, SUM_X, SUM_S_D, SUM_MASS_2, SUM_BASE_2 = _AT[80:87]
-_ROUNDS: Final = 6755399441055744.0  # 1.5 * 2^52: what is added to it becomes a whole number, in its last bits
+_ROUNDS: Final = 6755399441055744.0  # 1.5 * 2^52: a number added to it is rounded to a whole number, in its last bits
 
 
 @kernel
@@ -90,7 +91,7 @@ def approach(w: Floats, width: Width, dt: float, t_s: float, base_mps: float) ->
         v_r = w[V + i] - (w[DELIVERED + i] * base_mps + w[BASE_V + i])
         w[V_R_NOW + i] = v_r
         w[V_G + i] = v_r
-        # the friction's level where no place and no chance has a say in it
+        # the friction's level without dependence on position or noise
         load_sin, load_cos = w[LOAD_SIN + i], w[LOAD_COS + i]
         load = with_second(load_sin, load_cos, w[LOAD_SIN_2 + i], w[LOAD_COS_2 + i])
         direction = w[FORWARD + i] + (v_r < 0.0) * (w[BACKWARD + i] - w[FORWARD + i])
@@ -110,7 +111,7 @@ def slide(w: Floats, width: Width, dt: float, z_dt: float, base_mid_mps: float, 
         static_N = (w[F_S + i] + w[AGED + i]) * w[LEVEL + i]
         excess_N = static_N - coulomb_N
         q = w[V_G + i] * w[PER_V_S + i]
-        # of the excess over Coulomb's: what falls with the velocity of now, and what stands by its tail and by the late one
+        # the excess over Coulomb friction: a part that falls with the present velocity, and the parts of tail and late velocity
         late, falling = w[LATE_SHARE + i], w[FALLING + i]
         standing = falling + (1.0 - late) * (w[TAIL + i] / (1.0 + q * q)) + late * w[LATE_FALL + i]
         g = (coulomb_N + excess_N * standing) + (excess_N * falling) * gone(q * q)
@@ -177,7 +178,7 @@ def slide(w: Floats, width: Width, dt: float, z_dt: float, base_mid_mps: float, 
 
 @kernel
 def set_steps(w: Floats, p: Record, i: int, dt: float) -> None:
-    """What of a rig depends on the length of a step."""
+    """The numbers of a rig that depend on the length of a step."""
     w[FRAME_LOSS + i] = p.frame_damping_ratio * TWO_PI * p.frame_Hz * dt
     w[FRAME_KEEP + i] = 1.0 / (1.0 + w[FRAME_LOSS + i])
     held = 1.0 / (1.0 + w[FRAME_LOSS + i] + dt * w[FRAME_2 + i] * w[FRAME_GIVE + i] * p.h_d)

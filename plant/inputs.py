@@ -1,4 +1,4 @@
-"""What comes into a rig block by block besides the command: the drive's velocity, noise, and how late commands are."""
+"""Inputs of a rig block by block besides the command: the drive's velocity, noise, and the delays of commands."""
 
 import math
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -12,17 +12,17 @@ from plant.config import RigConfig
 from plant.loop_delay import whole_blocks
 from plant.simulate import held_velocity
 
-_SAME_MPS = 1e-12  # difference of two velocities that are one: rounding of places, 1e-17 m over a block
-_JITTER = 1  # the second stream of the seed: a jitter leaves the noise as it is
+_SAME_MPS = 1e-12  # velocities closer than this are equal: rounding of positions, 1e-17 m over a block
+_JITTER = 1  # the second stream of the seed: jitter does not change the noise
 
 
 class Inputs(NamedTuple):
-    """Of some blocks."""
+    """The inputs of some blocks."""
 
     velocity_mps: npt.NDArray[Any]  # of the drive, [blocks]
     noise: npt.NDArray[np.float64]  # standard normal numbers, [blocks, 5, samples]
-    delay_blocks: npt.NDArray[np.int64]  # that a command takes which comes before the block, [blocks]
-    announcements: npt.NDArray[np.int64]  # that go out before the block's samples, [blocks]
+    delay_blocks: npt.NDArray[np.int64]  # delay of a command received before the block, [blocks]
+    announcements: npt.NDArray[np.int64]  # number sent before the block's samples, [blocks]
     announce: Records  # these announcements, in order
 
     def joined(self, later: "Inputs") -> "Inputs":
@@ -40,7 +40,7 @@ class Inputs(NamedTuple):
         )
 
     def part(self, blocks: slice) -> "Inputs":
-        """Some of these blocks, of a slice without a step."""
+        """The blocks of a slice without a step."""
         first, last, _ = blocks.indices(len(self.noise))
         announced = slice(int(self.announcements[:first].sum()), int(self.announcements[:last].sum()))
         return Inputs(
@@ -79,16 +79,16 @@ class RigInputs:
         return Inputs(self._velocity_mps(t_s), noise, self._delay_blocks(blocks), *self._announce(blocks))
 
     def _announce(self, blocks: int) -> tuple[npt.NDArray[np.int64], Records]:
-        """Of the blocks up to now: how many announcements each makes, and the announcements.
+        """Number of announcements per drawn block, and the announcements.
 
         The samples of block n leave when block n + 1 begins: before them the rig announces the velocity of block n + 1 + ahead
-        where it is another than the one announced last; before those of block 0 that of each block up to there.
+        if it differs from the last announcement; before the samples of block 0, the velocity of each block up to there.
         """
         counts = np.zeros(blocks, np.int64)
         if not (self._ahead_blocks and blocks):
             return counts, ANNOUNCE.blank(0)
         solver = self._config.solver
-        said: list[tuple[int, int, float]] = []
+        rows: list[tuple[int, int, float]] = []
         first = self._block - blocks
         ahead = np.arange(1 if first == 0 else first + 1 + self._ahead_blocks, self._block + 1 + self._ahead_blocks)
         for block, velocity_mps in zip(
@@ -97,11 +97,11 @@ class RigInputs:
             if not abs(velocity_mps - self._announced_mps) <= _SAME_MPS:
                 at = max(block - 1 - self._ahead_blocks, 0)
                 counts[at - first] += 1
-                said.append((at, block, velocity_mps))
+                rows.append((at, block, velocity_mps))
                 self._announced_mps = velocity_mps
         block_ns = round(solver.block_s * 1e9)
-        announce = ANNOUNCE.blank(len(said))
-        for record, (at, block, velocity_mps) in zip(announce, said, strict=True):
+        announce = ANNOUNCE.blank(len(rows))
+        for record, (at, block, velocity_mps) in zip(announce, rows, strict=True):
             record.sequence, record.t_ns = self._announcements, (at + 1) * block_ns
             record.holds_from_ns, record.drive_velocity_mps = block * block_ns, velocity_mps
             self._announcements += 1
@@ -116,7 +116,7 @@ class RigInputs:
 
 
 class InputsAhead:
-    """The numbers of `RigInputs`, drawn by a second thread while those drawn before are used: a sixth of a run's time.
+    """The numbers of `RigInputs`, drawn ahead by a second thread: drawing takes a sixth of a run's time.
 
     Args:
         inputs: drawn from here alone.
@@ -129,7 +129,7 @@ class InputsAhead:
         self._ahead: Future[Inputs] | None = None
 
     def draw(self, blocks: int) -> Inputs:
-        """The inputs of the next blocks; the thread begins to draw as many blocks after them."""
+        """The inputs of the next blocks; the thread begins to draw as many following blocks."""
         ahead = self._inputs.draw(blocks) if self._ahead is None else self._ahead.result()
         if (missing := blocks - len(ahead.noise)) > 0:
             ahead = ahead.joined(self._inputs.draw(missing))

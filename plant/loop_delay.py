@@ -1,4 +1,4 @@
-"""Commands on their way to the exciter: each acts some whole blocks after it came, in the order in which they came."""
+"""Delayed commands: each acts a whole number of blocks after its arrival, in the order of arrival."""
 
 import math
 from typing import Final
@@ -7,18 +7,18 @@ from bridge.kernel import Record, kernel
 
 LONGEST_DELAY_S: Final = 0.2  # of loop.delay_s; 50 ms is a slow converter on USB with its driver's queue
 LONGEST_JITTER_S: Final = 0.1
-# commands on their way at most: one a block of 0.25 ms over delay and jitter, and the one of now
+# most delayed commands: one per block of 0.25 ms over delay and jitter, and the present one
 LINE: Final = round((LONGEST_DELAY_S + LONGEST_JITTER_S) / 0.25e-3) + 1
 
 
 def whole_blocks(time_s: float, block_s: float) -> int:
-    """The blocks that a time takes, rounded up; not one more where it is a whole number of them but for rounding."""
+    """The number of blocks in a time, rounded up; a rounding error does not add a block."""
     return max(math.ceil(time_s / block_s - 1e-6), 0)
 
 
 @kernel
 def send(s: Record, command: Record, delay_blocks: int) -> None:
-    """Note a command that came before block `s.block`; it acts from the block that is `delay_blocks` later."""
+    """Queue a command received before block `s.block`; it acts `delay_blocks` later."""
     due = s.block + delay_blocks
     if s.line_count > 0:
         newest = (s.line_first + s.line_count - 1) % LINE

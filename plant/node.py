@@ -10,8 +10,8 @@ from bridge.faults import Fault
 from bridge.guard.check import gain_change
 from bridge.guard.codes import LEAVE
 from bridge.guard.core import accept
-from bridge.guard.senses import expect_drive
-from bridge.guard.states import obey
+from bridge.guard.estimates import expect_drive
+from bridge.guard.states import apply_order
 from bridge.kernel_cache import compile_once
 from bridge.wire.messages import ANNOUNCE as ANNOUNCE_LAYOUT
 from bridge.wire.messages import APPLIED as APPLIED_LAYOUT
@@ -27,7 +27,7 @@ from plant.records import NO_COMMAND, TRUTH, build, guard_records
 from plant.step import act, report
 
 _VELOCITY = TRUTH.index("true_velocity_mps")
-_BATCH_BLOCKS = 64  # noise and drive velocity are drawn for so many blocks at once; fewer cost more time a block
+_BATCH_BLOCKS = 64  # noise and drive velocity are drawn for this many blocks at once; fewer take more time per block
 
 
 class PlantNode:
@@ -36,10 +36,10 @@ class PlantNode:
     Args:
         config: the rig file.
         seed: seed of the sensor noise; the same seed gives the same bytes.
-        run: number that each command must carry.
+        run: the number that each command must carry.
         arm: start ARMED, as only a simulated rig may.
-        stop_kept: start in FAULT, as a person's stop of an earlier run holds.
-        faults: that the rig has on purpose.
+        stop_kept: start in FAULT, because the operator's stop of an earlier run holds.
+        faults: injected into the rig.
 
     """
 
@@ -66,8 +66,8 @@ class PlantNode:
         self._drawn = Inputs(
             np.zeros(1), np.zeros((1, len(CHANNELS), samples)), nothing, nothing, ANNOUNCE_LAYOUT.blank(0)
         )
-        self._announced = 0  # of the announcements drawn, those that went out
-        self.announcements: list[Outgoing] = []  # of the last block, which go out before its samples
+        self._announced = 0  # number of the drawn announcements already sent
+        self.announcements: list[Outgoing] = []  # of the last block; sent before its samples
         self._command = COMMAND_LAYOUT.blank()
         self._sensors = sensor_block(samples).blank()
         self._applied = APPLIED_LAYOUT.blank()
@@ -80,7 +80,7 @@ class PlantNode:
         guard = self._guard_state.copy()
         accept(self._guard_params[0], guard[0], self._command[0])
         expect_drive(guard[0], 0.0)
-        obey(guard[0], LEAVE)
+        apply_order(guard[0], LEAVE)
         state, sensors = self._state.copy(), sensor_block(self._drawn.noise.shape[2]).blank()
         act(
             self._params, state, self._guard_params, guard, 0.0, self._command, 0, 0, self._drawn.noise[0],
@@ -91,12 +91,12 @@ class PlantNode:
     def advance(
         self, commands: list[bytes], commands_late: int = 0, round_trip_ns: int = 0, late_ns: int = 0
     ) -> tuple[Outgoing, Outgoing]:
-        """Advance one block under the newest of `commands` that the guard accepts; return sensor block and applied vibration.
+        """Advance one block under the newest of `commands` accepted by the guard; return sensor block and applied vibration.
 
         Send `announcements` before them.
 
-        Raises Fault BAD_MESSAGE when the command cannot be read, CONFIG when the state becomes NaN or infinite, so that the
-        rig cannot be stepped.
+        Raises Fault BAD_MESSAGE if the command cannot be read, CONFIG if the state becomes NaN or infinite: the rig cannot be
+        stepped.
         """
         faults = self.faults
         if faults.busy:
@@ -134,9 +134,9 @@ class PlantNode:
         self.block += 1
         return Outgoing(SENSORS, sealed(self._sensors.tobytes())), Outgoing(APPLIED, self._applied.tobytes())
 
-    def obey(self, word: int) -> bool:
-        """Take a person's word (`wire.Operator.Action`), or LEAVE of `bridge.guard.codes`; whether it changed the state."""
-        return bool(obey(self._guard_state[0], word))
+    def apply_order(self, word: int) -> bool:
+        """Apply an operator's order (`wire.Operator.Action`) or the code LEAVE. Returns whether it changed the state."""
+        return bool(apply_order(self._guard_state[0], word))
 
     @property
     def check_tones_Hz(self) -> list[float]:
@@ -145,12 +145,12 @@ class PlantNode:
         return [float(tone_Hz) for tone_Hz in p.tone_Hz[: int(p.tones)]]
 
     def accept_gain(self, gains: Sequence[float]) -> None:
-        """Compare later checks with gains that an earlier run accepted, one a tone; none: with nothing."""
+        """Set the gains that later checks are compared with, one per tone, from an earlier run; empty: no comparison."""
         self._guard_state[0].accepted[: len(gains)] = gains
 
     @property
     def accepted_gain(self) -> list[float]:
-        """Of the exciter at each tone of the loop check, as it was accepted; none before the first check."""
+        """The accepted exciter gain at each tone of the loop check; empty before the first check."""
         gains = [float(gain) for gain in self._guard_state[0].accepted[: int(self._guard_params[0].tones)]]
         return gains if all(gains) else []
 
@@ -161,23 +161,23 @@ class PlantNode:
 
     @property
     def applied(self) -> Any:
-        """What was applied in the last block, a record of `Applied`."""
+        """The applied vibration of the last block, a record of `Applied`."""
         return self._applied[0]
 
     def let_go(self) -> None:
-        """Forget the commands in force and on their way, and leave: the vibration fades to zero at the exciter's own rate."""
+        """Drop all commands in force or delayed, and leave: the vibration fades to zero at the exciter's rate."""
         self._state["command_block"] = NO_COMMAND
         self._state["line_count"] = 0
-        self.obey(LEAVE)
+        self.apply_order(LEAVE)
 
     @property
     def vibration_mps(self) -> float:
-        """The velocity amplitude v_a that the base truly has at the end of the last block [m/s]."""
+        """The true velocity amplitude v_a of the base at the end of the last block [m/s]."""
         return base_velocity_mps(self._params[0], self._state[0])
 
     @property
     def at_rest(self) -> bool:
-        """Whether the base stands still."""
+        """Whether the base is at rest."""
         return self._state["amplitude_m"][0] == 0.0
 
 
@@ -185,7 +185,7 @@ def no_number(config: RigConfig, block: int) -> Fault:
     """The fault of a rig whose state became NaN or infinite in a block."""
     solver = config.solver
     line = (
-        f"{config.name}: the slide's velocity is no number at {(block + 1) * solver.block_s:.3f} s: this rig cannot be stepped "
-        f"with solver.step_s = {solver.step_s:g}; shorten it, or weaken what is extreme"
+        f"{config.name}: the slide's velocity is not finite at {(block + 1) * solver.block_s:.3f} s: this rig cannot be stepped "
+        f"with solver.step_s = {solver.step_s:g}; shorten it, or weaken extreme values"
     )
     return Fault("CONFIG", line)

@@ -3,7 +3,7 @@
 The paper prints k_t in N/m in Table 2 and in N/um in Table 1; N/um is right: h_t = 2 sqrt(k_t m), their zeta = 1, gives
 2.157e4 N s/m from 77.52 N/um and 1.5 kg, the printed 2.15e4.
 
-PTFE: the paper gives k_t and says only that it saw no stick-slip. Assumed here: a friction coefficient of 0.08 and no
+PTFE: the paper gives k_t and reports only that no stick-slip occurred. Assumed here: a friction coefficient of 0.08 and no
 drop from static to kinetic friction, so F_s = F_c. Published ranges for PTFE on steel are 0.05-0.10 static and 0.04-0.08
 kinetic, "remarkably close" to each other (kintek-solution.com/faqs, typical friction coefficient values for PTFE). A pair
 without stick-slip must have no drop. h_t follows the paper's zeta = 1; F = mu p_n A, A = 1192 mm2.

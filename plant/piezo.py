@@ -13,7 +13,7 @@ from plant.effects.waves import TWO_PI
 
 @kernel
 def delivered_share(p: Record, frequency_Hz: float) -> float:
-    """The share of the commanded amplitude that reaches the base at this frequency; 1 on a rigid mount without effects."""
+    """Delivered share of the commanded amplitude at this frequency; 1 on a rigid mount without effects."""
     share = p.delivered_ratio
     if p.mount_resonance_Hz > 0.0:
         r = frequency_Hz / p.mount_resonance_Hz
@@ -39,7 +39,7 @@ def accepted(p: Record, frequency_Hz: float, amplitude_m: float) -> tuple[float,
 
 @kernel
 def base_velocity_mps(p: Record, s: Record) -> float:
-    """The vibration velocity amplitude v_a = 2 pi f u0 that the base has at the end of the last block [m/s].
+    """The vibration velocity amplitude v_a = 2 pi f u0 of the base at the end of the last block [m/s].
 
     Args:
         p, s: records of `plant.records.PARAMS` and `STATE`.

@@ -1,4 +1,4 @@
-"""The numbers a plant runs on: parameters derived once from the configuration, and everything that changes."""
+"""The records of a plant: parameters derived once from the configuration, and the changing state."""
 
 import math
 from typing import Any
@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from bridge.guard.records import Exciter
+from bridge.guard.records import ExciterLimits
 from bridge.guard.records import build as build_guard
 from bridge.kernel import record
 from plant.config import RigConfig, SensorsConfig
 from plant.effects.library import EFFECTS
 from plant.loop_delay import LINE
 
-# Rows of the array that a block fills beside the sensors, one column a sample: what no sensor sees.
+# Rows of the array of quantities without a sensor, one column per sample.
 TRUTH = (
     "true_drive_force_N",
     "true_friction_force_N",
@@ -42,7 +42,7 @@ PARAMS = np.dtype(
                 "position_linearity",
                 "position_resolution_m",
             ),
-            # the effects of `plant.effects`, then those of the contact, of no size in the nominal rig
+            # the effects of `plant.effects`, then of the contact; all without effect in the nominal rig
             *(name for effect in EFFECTS.values() for name in effect.numbers),
             *("age_length_m", "roughness_ratio", "roughness_length_m", "roughness_seed"),
             *("elastic_ratio", "stribeck_tail"),
@@ -58,7 +58,7 @@ PARAMS = np.dtype(
     align=True,
 )
 
-# x and z are kept half a step before v: the leapfrog of `contact`. `_f` marks what a sensor's filter remembers.
+# x and z are kept half a step before v: the leapfrog of `contact`. `_f` marks the state of a sensor's filter.
 STATE = np.dtype(
     [("block", "i8"), ("command_block", "i8"), ("sticks", "i8")]
     + [
@@ -78,14 +78,14 @@ STATE = np.dtype(
 )
 
 # Longest step while the slide sticks, in radians of the slide's swing on the bristles. From 2 on the leapfrog is unstable; at 1
-# it swings 4.7 % too fast, 2 asin(1/2) / 1. Smaller: stiff rigs take more steps.
+# the swing is 4.7 % too fast, 2 asin(1/2) / 1. Smaller: stiff rigs take more steps.
 _STICK_STEP_RAD = 1.0
 
 NO_COMMAND = -1  # as the unsigned number of the wire: bridge.messages.NO_BLOCK
 
 
 def _keep(bandwidth_Hz: float, period_s: float) -> float:
-    """Share of its old value that a first-order low-pass keeps over one period, exact for a held input."""
+    """Share of the old value that a first-order low-pass keeps over one period, exact for a held input."""
     return math.exp(-2.0 * math.pi * bandwidth_Hz * period_s)
 
 
@@ -141,9 +141,9 @@ def build(config: RigConfig) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
 def guard_records(
     config: RigConfig, run: int, arm: bool, stop_kept: bool = False
 ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    """Parameters and memory of the rig's guard; the arguments besides the rig are those of `bridge.guard.records.build`."""
+    """Parameters and memory of the rig's guard; the other arguments are passed to `bridge.guard.records.build`."""
     piezo, solver = config.piezo, config.solver
-    exciter = Exciter(
+    exciter = ExciterLimits(
         piezo.amplitude_max_m,
         piezo.frequency_min_Hz,
         piezo.frequency_max_Hz,
@@ -156,12 +156,12 @@ def guard_records(
 
 
 def _add_effects(p: Any, config: RigConfig) -> None:
-    """Fold the effects that only change a number into it; hand the others to the kernel."""
+    """Fold effects that only change a number into that number; pass the others to the kernel."""
     contact = config.contact
     p.elasto_plastic = contact.backbone == "elasto-plastic"
     for name in ("stribeck_tail", "elastic_ratio", "roughness_ratio", "roughness_length_m", "roughness_seed"):
         p[name] = getattr(contact, name)
-    # ten reaches of the bristle: creep before breakaway leaves the contact its age, a slip of any size takes it
+    # ten reaches of the bristle: creep before breakaway keeps the age of the contact, any slip resets it
     p.age_length_m = 10.0 * contact.static_force_N / contact.stiffness_N_per_m
     for effect in EFFECTS.values():
         for name, number in effect.off.items():
@@ -170,8 +170,9 @@ def _add_effects(p: Any, config: RigConfig) -> None:
         value = {key: float(number) for key, number in table.items() if key != "form"}
         EFFECTS[name].set_numbers(p, str(table["form"]), value)
     switches = (name for effect in EFFECTS.values() for name in effect.switches)
-    # friction that falls below a third within a step needs the guard that only that kernel has; so does a bristle whose damper,
-    # as friction falls, could turn the slide around within a step: at 6.6 times that a slip came 0.37 s late, guarded 0.3 ms
+    # Friction that falls below a third within a step needs the guarded step of the disturbed kernel; so does a bristle whose
+    # damper could reverse the slide within a step while friction falls: at 6.6 times this limit a slip is 0.37 s late, guarded
+    # 0.3 ms.
     falls = p.F_s > 3.0 * p.F_c or p.h_t * (p.F_s / p.F_c - 1.0) * p.dt_s > p.m
     of_contact = p.elasto_plastic or p.roughness_ratio != 0.0
     p.disturbed = of_contact or falls or any(p[name] != 0.0 for name in switches)

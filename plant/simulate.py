@@ -6,14 +6,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.kernel import kernel
 from bridge.wire.messages import CHANNELS
 from plant.config import RigConfig
 from plant.core import advance, advance_disturbed
 from plant.drive_motion import mean_velocity_mps
 from plant.records import TRUTH, build
-
-Floats = npt.NDArray[np.floating[Any]]
 
 
 class Simulation(NamedTuple):
@@ -92,8 +91,8 @@ def simulate(
 def drive_velocity_mps(config: RigConfig, t_s: Floats) -> Floats:
     """Drive velocity [m/s] held over the blocks that begin at the times `t_s` [s], 0 or later.
 
-    Of a profile that comes once, the velocity when the block begins: linear between the points of the profile, constant
-    outside them. Of moves and of what repeats, the mean over the block, so that a cycle ends where it began.
+    For a profile that runs once: the velocity at the begin of the block, linear between the points of the profile, constant
+    outside them. For moves and repeated motions: the mean over the block, so that a cycle ends where it began.
     """
     return held_velocity(config)(t_s)
 

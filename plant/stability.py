@@ -18,13 +18,12 @@ from typing import Any, NamedTuple
 
 import control
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import brentq
 
+from bridge.arrays import Floats
 from plant.config import ContactConfig, RigConfig
 from plant.records import build
 
-Floats = npt.NDArray[np.float64]
 Numbers = float | Floats
 
 # 64 Gauss points on either side of the reversal of v_r: means to 2e-12 up to v_a = 40 v_s
@@ -34,7 +33,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(64)
 class Contact(NamedTuple):
     """The cycle-averaged contact at steady sliding: dz' = slip dv - relaxation dz. Arrays of one shape."""
 
-    slip: Floats  # share of an extra velocity that stretches the bristle; below 0 where friction falls with velocity
+    slip: Floats  # share of an extra velocity that stretches the bristle; below 0 if friction falls with velocity
     relaxation_per_s: Floats
 
 
@@ -62,7 +61,7 @@ def contact(config: ContactConfig, velocity_mps: Numbers, vibration_velocity_mps
         g_slope = -2.0 * q / config.stribeck_velocity_mps * drop_N * (falling + tail * trailing * trailing)
         share = sign * half * _WEIGHTS / np.pi
         mean += np.sum(share * v_r / g, axis=-1)
-        # B - v dB/dv under one sum: as a difference of the two it would lose slopes below 1e-16
+        # B - v dB/dv in one sum: as a difference it would lose slopes below 1e-16
         excess += np.sum(share * (v * v_r * g_slope / g**2 - back / g), axis=-1)
     # with vibration the sum rounds to 1e-16 where the slope is 0 (F_s = F_c below the edge): count it as 0
     rounded = (v_a[..., 0] > 0.0) & (np.abs(excess) < 1e-14 * mean)
@@ -70,7 +69,7 @@ def contact(config: ContactConfig, velocity_mps: Numbers, vibration_velocity_mps
 
 
 def with_constant_effects(config: RigConfig) -> RigConfig:
-    """A rig without effects whose numbers are those that its effects change constantly; all else of the effects is left out."""
+    """A rig without effects, with the numbers that its effects change permanently; other effects are dropped."""
     p: Any = build(config)[0][0]
     contact = {
         "coulomb_force_N": float(p.F_c),
@@ -208,7 +207,7 @@ def stabilising_vibration_mps(config: RigConfig, drive_velocity_mps: float) -> f
 
 
 def self_sustained_velocity_mps(config: RigConfig, drive_stiffness_N_per_m: Numbers | None = None) -> Floats:
-    """Drive velocity up to which stick-slip that has started goes on without vibration [m/s]; inf without damping.
+    """Drive velocity up to which existing stick-slip persists without vibration [m/s]; inf without damping.
 
     A slip leaves rest at F_s and turns about F_c on the spring. In the frame of the drive it starts with the
     velocity -v_d and the spring velocity s v_d, s = (F_s - F_c) / (v_d sqrt(k_d m)), and is slowest after the
@@ -222,7 +221,7 @@ def self_sustained_velocity_mps(config: RigConfig, drive_stiffness_N_per_m: Numb
     drop_N = config.contact.static_force_N - config.contact.coulomb_force_N
     if H == 0.0:
         return np.full(k_d.shape, math.inf if drop_N > 0.0 else 0.0)
-    zeta = np.minimum(H / (2.0 * np.sqrt(k_d * m)), 0.999)  # the slide does not turn at 1; at 0.999 s is 1e54 already
+    zeta = np.minimum(H / (2.0 * np.sqrt(k_d * m)), 0.999)  # at 1 the slide never reverses; at 0.999 s is 1e54 already
     d = zeta / np.sqrt(1.0 - zeta**2)
     s = np.full(k_d.shape, np.inf)
     for _ in range(50):  # ten rounds reach 1e-11 for any zeta

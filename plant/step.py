@@ -1,10 +1,10 @@
-"""One block of the rig as the bus sees it: a command in, a sensor block and a message of the applied vibration out."""
+"""One block of the rig at its interface: a command in, a sensor block and a message of the applied vibration out."""
 
 from typing import Any
 
 import numpy.typing as npt
 
-from bridge.guard.check import tell_gain
+from bridge.guard.check import write_gain
 from bridge.guard.core import allow, look
 from bridge.kernel import Record, kernel, shared_kernel
 from plant.core import advance, advance_disturbed
@@ -27,7 +27,7 @@ def act(
     truth: npt.NDArray[Any],
     sensors: npt.NDArray[Any],
 ) -> None:
-    """Advance `state` by one block, in place, up to the samples of its sensors; the arguments are those of `step`."""
+    """Advance `state` by one block, in place, up to the samples of its sensors; arguments as in `step`."""
     p: Record = params[0]
     s: Record = state[0]
     if commands > 0:
@@ -58,7 +58,7 @@ def report(
     sensors: npt.NDArray[Any],
     applied: npt.NDArray[Any],
 ) -> None:
-    """Let the guard see the samples, and end the block that `act` began: fill in what was applied."""
+    """Pass the samples to the guard, and end the block that `act` began: fill in the applied vibration."""
     p: Record = params[0]
     s: Record = state[0]
     gp: Record = guard_params[0]
@@ -67,7 +67,7 @@ def report(
     look(gp, g, block)
     block.run = gp.run
     block.guard_state = g.state
-    tell_gain(gp, g, block)
+    write_gain(gp, g, block)
     a: Record = applied[0]
     a.sequence = s.block
     a.t_ns = (s.block + 1) * p.block_ns
@@ -117,7 +117,7 @@ def step(
         delay_blocks: blocks that this command takes to the exciter besides.
         noise: standard normal numbers, float64 [5, samples].
         commands_late, round_trip_ns, late_ns: copied to `applied`.
-        analogue, truth: filled, as `plant.core.advance` says.
+        analogue, truth: filled, as in `plant.core.advance`.
         sensors, applied: one message record each, filled.
 
     """

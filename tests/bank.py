@@ -1,5 +1,5 @@
 """The bank of scenarios, read once for all tests: it takes 0.25 s of CPU."""
 
-from cockpit.bank.scenario import load_bank
+from bench.control.scenario import load_bank
 
 BANK = load_bank()

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from bridge.log.check.channel import Channel
+from bridge.log.check.channel import ChannelLimits
 from bridge.log.logfile import RunData
 from bridge.wire.messages import CHANNELS
 
@@ -50,7 +50,7 @@ def _copied(name: str, other: str) -> Edit:
     return edit
 
 
-def _noise(name: str, of: Channel) -> Edit:
+def _noise(name: str, of: ChannelLimits) -> Edit:
     def edit(sensors: Any, begin: int) -> None:
         noise = of.noise * np.random.default_rng(1).standard_normal(sensors[name][begin:].shape)
         mean = sensors[name][begin].mean() if name.endswith("_m") else 0.0
@@ -59,9 +59,9 @@ def _noise(name: str, of: Channel) -> Edit:
     return edit
 
 
-def edits_of(name: str, of: Channel) -> dict[str, Edit]:
+def edits_of(name: str, of: ChannelLimits) -> dict[str, Edit]:
     """The edits of a channel by their names."""
-    found = {
+    edits = {
         "zero": _dead(name, 0.0),
         "stuck": _dead(name, None),
         "clipped": _clipped(name),
@@ -72,8 +72,8 @@ def edits_of(name: str, of: Channel) -> dict[str, Edit]:
         "noise": _noise(name, of),
     }
     others = [other for other in CHANNELS if other != name]
-    found |= {f"swapped with {other}": _swapped(name, other) for other in others}
-    return found | {f"copy of {other}": _copied(name, other) for other in others if other[-2:] == "_m" == name[-2:]}
+    edits |= {f"swapped with {other}": _swapped(name, other) for other in others}
+    return edits | {f"copy of {other}": _copied(name, other) for other in others if other[-2:] == "_m" == name[-2:]}
 
 
 def edited(run: RunData, edit: Edit, from_s: float) -> RunData:

@@ -12,7 +12,7 @@ from hypothesis import settings
 
 pytest_plugins = ["tests.cpu_limit", "tests.stall_report"]
 
-# the first example compiles kernels, and these machines are shared: time is no criterion in a test
+# no deadline: the first example compiles kernels, and the computer is shared
 settings.register_profile("stickslip", deadline=None, derandomize=True)
 settings.load_profile("stickslip")
 # A suite that a script starts with `&` inherits an ignored SIGINT, one under `nohup` an ignored SIGHUP, and so would all that the

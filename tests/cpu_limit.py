@@ -1,6 +1,6 @@
-"""What the tests of the quick size may cost, in CPU time: how long they take depends on what else a machine does.
+"""Limits on the CPU time of the quick tests; the wall time depends on other programs.
 
-Nothing here judges the product. It keeps `make quick` quick: a test that costs much says so with the marker `slow`.
+They do not judge the product. They keep `make quick` quick: an expensive test carries the marker `slow`.
 """
 
 import resource
@@ -9,9 +9,9 @@ from collections.abc import Generator
 
 import pytest
 
-LARGE = {"slow", "nightly", "realtime"}  # markers of tests that may cost what they need
+LARGE = {"slow", "nightly", "realtime"}  # markers of tests without a limit
 BEGAN = pytest.StashKey[float]()
-_COST = "cpu_s"  # in the report of a test's end, which says what setup, call and teardown took together
+_COST = "cpu_s"  # in the teardown report: CPU time of setup, call and teardown together
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -28,12 +28,12 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_teardown(item: pytest.Item) -> Generator[None, object, object]:
-    found = yield
+    result = yield
     cost_s, most_s = _cpu_s() - item.stash[BEGAN], item.config.option.cpu_each
     item.user_properties.append((_COST, cost_s))
     if 0.0 < most_s < cost_s and not LARGE.intersection(mark.name for mark in item.iter_markers()):
         pytest.fail(f"{cost_s:.1f} s of CPU: must be {most_s:g} s at most; do it with less, or mark it slow", False)
-    return found
+    return result
 
 
 @pytest.hookimpl(trylast=True)
@@ -53,7 +53,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 
 def _total_s(reporter: pytest.TerminalReporter) -> float:
-    reports = [report for some in reporter.stats.values() for report in some if isinstance(report, pytest.TestReport)]
+    reports = [report for group in reporter.stats.values() for report in group if isinstance(report, pytest.TestReport)]
     return sum(
         value
         for report in reports

@@ -1,4 +1,4 @@
-"""Rigs with effects, run by the block: what the tests of the effects have in common."""
+"""Rigs with effects, run by the block: shared by the tests of the effects."""
 
 import math
 from types import SimpleNamespace
@@ -14,7 +14,7 @@ from plant.simulate import run_blocks
 
 BLOCK_S = 1e-3
 TAU = 2.0 * math.pi
-# so heavy that nothing changes its velocity but what the test says; still light enough to see friction in its inertia
+# heavy enough to keep the velocity of the test; light enough to see friction in its inertia
 HEAVY_KG = 1e9
 NO_FRICTION = {
     "stiffness_N_per_m": 1.0,
@@ -54,9 +54,9 @@ def run(config, drive, start=None, frequency_Hz=0.0, amplitude_m=0.0, force_driv
 
 
 def towed(effects, velocity_mps, duration_s, contact=None):
-    """Steady sliding at a velocity, towed by a slack spring: what friction is at every moment but the first 20 ms.
+    """Steady sliding at a velocity, towed by a slack spring: the friction at every moment after the first 20 ms.
 
-    Without the bristle's damping, which takes friction ahead of itself by h_t / k_t, 0.28 ms, while it changes.
+    Without the bristle's damping, which leads a changing friction by h_t / k_t = 0.28 ms.
     """
     pair = {"pair": "C45-C45 @ 0.063", "damping_Ns_per_m": 0.0} | (contact or {})
     config = rig(effects, slide={"mass_kg": HEAVY_KG}, contact=pair)

@@ -1,7 +1,7 @@
 """Evidence folders of the plant, made once and shared: by all tests, by all worker processes, and by later runs.
 
-Whoever writes into one copies it first. A folder is found again by its case, its seed and everything that makes it: the
-sources of the plant, of the evidence and of what both stand on, and the versions of the packages. Old ones go by themselves.
+A test that writes into a folder copies it first. The key of a folder is its case, its seed, the sources of plant, evidence and
+bridge, and the versions of the packages. Old folders are deleted.
 """
 
 import hashlib
@@ -29,20 +29,20 @@ def made_evidence(case: Case, seed: int) -> Path:
         make_evidence(part, case, seed)
         try:
             part.rename(folder)
-        except OSError:  # somebody else made the same meanwhile
+        except OSError:  # another process has made the same folder
             shutil.rmtree(part)
     return folder
 
 
 def forget_old() -> None:
-    """Delete what other sources made, an hour or more ago."""
+    """Delete folders of other sources that are an hour old or more."""
     for folder in KEPT.glob("*"):
         if folder.name != digest_of(ROOT) and time.time() - folder.stat().st_mtime > _KEPT_S:
             shutil.rmtree(folder)
 
 
 def _name(case: Case, seed: int) -> str:
-    plans = PROTOCOLS.get(case.protocol, AXIS_PLANS)  # a test may have a protocol of its own
+    plans = PROTOCOLS.get(case.protocol, AXIS_PLANS)  # a test may define a protocol
     return hashlib.sha256(repr((case, plans, seed)).encode()).hexdigest()[:16]
 
 

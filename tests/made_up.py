@@ -161,7 +161,7 @@ def diagnosis() -> Diagnosis:
 
 
 def quick(evidence: Evidence, progress: Progress, jobs: int, budget_s: float | None = None) -> Diagnosis:
-    """At once; the folder's name decides what happens."""
+    """Return at once; the folder's name selects the result."""
     name = evidence.folder.name
     progress("the drive force is off by 6 noise floors", 0.1)
     if "refused" in name:
@@ -182,10 +182,10 @@ def dies(evidence: Evidence, progress: Progress, jobs: int, budget_s: float | No
 
 
 def spreads(evidence: Evidence, progress: Progress, jobs: int, budget_s: float | None = None) -> Diagnosis:
-    """Like `quick`, but says 0 jobs where several did not get processes of their own."""
-    told = quick(evidence, progress, jobs)
-    own = jobs == 1 or os.getpid() not in each(jobs, _who, None, range(jobs))
-    return told if own else told._replace(elapsed_s=0.0)
+    """Like `quick`, but reports 0 jobs where several jobs shared one process."""
+    result = quick(evidence, progress, jobs)
+    apart = jobs == 1 or os.getpid() not in each(jobs, _who, None, range(jobs))
+    return result if apart else result._replace(elapsed_s=0.0)
 
 
 def _who(_shared: None, _item: int) -> int:
@@ -202,7 +202,7 @@ def marks(evidence: Evidence, progress: Progress, jobs: int, budget_s: float | N
 
 
 def endless(evidence: Evidence, progress: Progress, jobs: int, budget_s: float | None = None) -> Diagnosis:
-    """Says who works, and does not end."""
+    """Write the process id into the folder, and do not end."""
     (evidence.folder / "worker").write_text(str(os.getpid()))
     progress("this takes long", 0.1)
     time.sleep(PATIENCE_S)

@@ -1,9 +1,9 @@
 """`make mutants`: every condition of the guard is changed in turn, and its unit tests must notice.
 
-`python -m tests.mutants --report FILE` writes the page of it.
+`python -m tests.mutants --report FILE` writes the page.
 
 Cosmic Ray changes the files of a copy: each comparison gets its edge moved and is turned round, each `and` becomes `or` and the
-other way round, each condition gets a `not`. Kernels run interpreted, as a change would compile them anew.
+other way round, each condition gets a `not`. Kernels run interpreted, as each change would need a compilation.
 """
 
 import argparse
@@ -42,7 +42,7 @@ SAME = {
     "elif not 1.0 / _WILD < s.gain[at] <= _WILD:": "a measured number is never equal to the last bit",
 }
 _ABOUT = (
-    "Made by `python -m tests.mutants --report docs/quality/mutants.md`; `make mutants` runs the same and fails where more than "
+    "Made by `python -m tests.mutants --report runs/mutants.md`; `make mutants` runs the same and fails where more than "
     f"{MOST_SURVIVE:.0%} of the",
     "changes go unnoticed. Each comparison of the guard's kernels gets its edge moved and is turned round, each `and` becomes "
     "`or`",
@@ -55,7 +55,7 @@ class Survivor(NamedTuple):
     """A change that no test noticed."""
 
     place: str  # file and line
-    change: str  # the line as it was changed
+    change: str  # the changed line
 
     @property
     def why(self) -> str:
@@ -101,8 +101,8 @@ def run(module: str, folder: Path) -> Count:
         ("cosmic-ray", "exec", config.name, session.name),
     ):
         subprocess.run([str(tools / words[0]), *words[1:]], cwd=folder, env=environment, check=True)
-    with sqlite3.connect(session) as found:
-        rows = found.execute(
+    with sqlite3.connect(session) as database:
+        rows = database.execute(
             "SELECT start_pos_row, test_outcome, diff FROM work_results JOIN mutation_specs USING (job_id) "
             "WHERE worker_outcome != 'SKIPPED'"
         ).fetchall()
@@ -120,13 +120,13 @@ def _added(diff: str) -> Iterator[str]:
 
 def page(counts: Sequence[Count]) -> str:
     """The result in Markdown."""
-    rows = [(f"`bridge/guard/{one.module}.py`", one.changed, one.survived) for one in counts]
-    rows.append(("all", sum(row[1] for row in rows), [one for row in rows for one in row[2]]))
+    rows = [(f"`bridge/guard/{count.module}.py`", count.changed, count.survived) for count in counts]
+    rows.append(("all", sum(row[1] for row in rows), [m for row in rows for m in row[2]]))
     table = [
-        f"| {name} | {changed} | {len(survived)} | {len(survived) / changed:.1%} | {sum(not one.why for one in survived)} |"
+        f"| {name} | {changed} | {len(survived)} | {len(survived) / changed:.1%} | {sum(not m.why for m in survived)} |"
         for name, changed, survived in rows
     ]
-    left = [f"| `{one.place}` | `{one.change}` | {one.why or 'a test could notice it'} |" for one in rows[-1][2]]
+    left = [f"| `{m.place}` | `{m.change}` | {m.why or 'a test could notice it'} |" for m in rows[-1][2]]
     return "\n".join([
         "# Mutants of the guard", "",
         *_ABOUT, "",
@@ -148,10 +148,11 @@ def main() -> int:
     for module in given.modules:
         counts.append(run(module, folder))
         print(f"{module}: {len(counts[-1].survived)} of {counts[-1].changed} changed conditions survive", flush=True)
-    changed, survived = sum(one.changed for one in counts), [line for one in counts for line in one.survived]
-    print("\n".join(f"{one.place}: {one.change}  ({one.why or 'a test could notice it'})" for one in survived))
+    changed, survived = sum(file.changed for file in counts), [line for file in counts for line in file.survived]
+    print("\n".join(f"{m.place}: {m.change}  ({m.why or 'a test could notice it'})" for m in survived))
     print(f"{len(survived)} of {changed} changed conditions survive: at most {MOST_SURVIVE:.0%} may")
     if given.report is not None:
+        given.report.parent.mkdir(parents=True, exist_ok=True)
         given.report.write_text(page(counts))
     return int(len(survived) > MOST_SURVIVE * changed)
 

@@ -1,4 +1,4 @@
-"""Runs made from the plant and made ready for comparison: what the tests of the diagnosis' parts have in common."""
+"""Runs made from the plant and prepared for comparison: shared by the tests of the diagnosis' parts."""
 
 from collections.abc import Mapping
 
@@ -18,7 +18,7 @@ from tests.made_evidence import made_evidence
 def prepared(
     protocol: str, effects: Mapping[str, Numbers] | None = None, seed: int = 1
 ) -> tuple[Evidence, list[Prepared]]:
-    """A rig that is as described but for `effects` and what every rig differs by."""
+    """A rig that differs from its description by `effects` and by the usual tolerances."""
     evidence = load_evidence(made_evidence(Case(protocol, effects=effects or {}, drawn=False), seed))
     return evidence, prepare(evidence)
 

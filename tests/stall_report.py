@@ -1,7 +1,7 @@
 """Stalls of the computer while tests in real time run: reported, and with `--excuse-stalls` a reason why a test may fail.
 
-A loop in real time keeps its promises only while the computer runs. What the timers of the product saw decides; where they get
-no real-time priority, a thread of this process looks how late it wakes.
+A loop in real time is in time only while the computer runs. The product's timers measure the stalls; where they get no
+real-time priority, a thread of this process measures how late it wakes.
 """
 
 import threading
@@ -30,7 +30,7 @@ class Watch(Protocol):
 
 
 class _Thread:
-    """Stands in for the timers: without a priority it also counts the time in which others kept it from its core."""
+    """Replaces the timers: without a priority it also counts the time in which other programs used its core."""
 
     def __init__(self) -> None:
         self._found: list[Pause] = []
@@ -47,8 +47,8 @@ class _Thread:
             last_ns = now_ns
 
     def poll(self) -> list[Pause]:
-        found, self._found = self._found, []
-        return found
+        stalls, self._found = self._found, []
+        return stalls
 
     def close(self) -> None:
         self._over.set()
@@ -63,7 +63,7 @@ class Stalls:
         self.found: dict[str, list[Pause]] = {}
 
     def _take(self, test: str) -> None:
-        if long := [one for one in self.watch.poll() if one.until_ns - one.from_ns >= LEAST_NS]:
+        if long := [pause for pause in self.watch.poll() if pause.until_ns - pause.from_ns >= LEAST_NS]:
             self.found.setdefault(test, []).extend(long)
 
     @pytest.hookimpl(wrapper=True)
@@ -78,10 +78,10 @@ class Stalls:
         return report
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
-        every = [one for some in self.found.values() for one in some]
+        every = [pause for stalls in self.found.values() for pause in stalls]
         terminalreporter.write_line(f"computer {words(every)}")
-        for test, some in self.found.items():
-            terminalreporter.write_line(f"  during {test}: {words(some)}")
+        for test, stalls in self.found.items():
+            terminalreporter.write_line(f"  during {test}: {words(stalls)}")
         for report in terminalreporter.stats.get("xfailed", []):
             terminalreporter.write_line(
                 f"NOT JUDGED {report.nodeid}: the computer {report.wasxfail}\n{report.longreprtext}"
@@ -95,7 +95,7 @@ def words(stalls: list[Pause]) -> str:
     """`stalled 2 times, longest 41 ms`."""
     if not stalls:
         return f"never stalled for {LEAST_NS / 1e6:g} ms"
-    longest_ms = max(one.until_ns - one.from_ns for one in stalls) / 1e6
+    longest_ms = max(stall.until_ns - stall.from_ns for stall in stalls) / 1e6
     return f"stalled {len(stalls)} time{'s' * (len(stalls) > 1)}, longest {longest_ms:.0f} ms"
 
 

@@ -90,8 +90,8 @@ class Run:
         until_s = time.monotonic() + START_S
         while time.monotonic() < until_s and self.process.poll() is None:
             if self.log.exists() and self.log.stat().st_size > 100_000:
-                found = {role(pid): pid for pid in children_of(self.process.pid)}
-                return {name: found[name] for name in ROLES if name in found}
+                pids = {role(pid): pid for pid in children_of(self.process.pid)}
+                return {name: pids[name] for name in ROLES if name in pids}
             time.sleep(0.05)
         return {}
 
@@ -145,9 +145,9 @@ def burners(number: int) -> Generator[None]:
     try:
         yield
     finally:
-        for one in made:
-            one.kill()
-            one.wait()
+        for process in made:
+            process.kill()
+            process.wait()
 
 
 def measure(options: argparse.Namespace, folder: Path) -> list[Came]:
@@ -157,7 +157,7 @@ def measure(options: argparse.Namespace, folder: Path) -> list[Came]:
     arguments = ["--scenario", options.scenario, *options.more]
     if options.seconds:
         arguments += ["--set", f"duration_s={options.seconds}"]
-    found: list[Came] = []
+    results: list[Came] = []
     print(HEADER)
     for turn in range(options.runs):
         for program in options.program:
@@ -167,9 +167,9 @@ def measure(options: argparse.Namespace, folder: Path) -> list[Came]:
             # the same stops for each program
             stop_at_random(runs, stops, random.Random(f"{options.seed} {turn}"))
             for run in runs:
-                found.append(run.end())
-                print(found[-1].row, flush=True)
-    return found
+                results.append(run.end())
+                print(results[-1].row, flush=True)
+    return results
 
 
 def main() -> int:
@@ -194,16 +194,16 @@ def main() -> int:
     options = parser.parse_args()
     options.program = options.program or [HERE]
     with tempfile.TemporaryDirectory() as folder, burners((os.cpu_count() or 1) if options.burn else 0):
-        found = measure(options, Path(folder))
+        results = measure(options, Path(folder))
     for program in options.program:
-        own = [came for came in found if came.program == program]
+        runs = [came for came in results if came.program == program]
         print(
-            f"{program}: {len(own)} runs, {sum(len(came.stops) for came in own)} stops; exit 0 in "
-            f"{sum(came.status == 0 for came in own)}; lost {sum(came.blocks for came in own)} blocks and "
-            f"{sum(came.messages for came in own)} messages of the log, {sum(came.missed for came in own)} blocks of the "
-            f"controller; p50 {median(came.p50_us for came in own):.0f} us"
+            f"{program}: {len(runs)} runs, {sum(len(came.stops) for came in runs)} stops; exit 0 in "
+            f"{sum(came.status == 0 for came in runs)}; lost {sum(came.blocks for came in runs)} blocks and "
+            f"{sum(came.messages for came in runs)} messages of the log, {sum(came.missed for came in runs)} blocks of the "
+            f"controller; p50 {median(came.p50_us for came in runs):.0f} us"
         )
-    return 0 if all(came.messages == came.missed == 0 for came in found) else 1
+    return 0 if all(came.messages == came.missed == 0 for came in results) else 1
 
 
 if __name__ == "__main__":

@@ -40,16 +40,16 @@ def guard() -> None:
 
 def bench_of_the_controller() -> None:
     """The rig with its judge, with the controller and with the rules."""
-    from cockpit.bank.cost import step_cost_ratio
-    from cockpit.bank.scenario import load_bank
-    from cockpit.bank.suite import warm_up
+    from bench.control.cost import step_cost_ratio
+    from bench.control.scenario import load_bank
+    from bench.control.suite import warm_up
 
     warm_up(load_bank()[0])
     step_cost_ratio()
 
 
 def diagnosis() -> None:
-    """The model alone and four rigs at once, of a rig that a spring moves and of one that a motor force moves."""
+    """The model alone and four rigs at once, for a rig moved by a spring and for a rig moved by a motor force."""
     import numpy as np
 
     from diagnosis.hypotheses.hypothesis import NOTHING

@@ -1,4 +1,4 @@
-"""The loop check, before a rig is armed: every sensor lives, and the exciter is heard at each tone; its gain is measured."""
+"""The loop check before a rig is armed: every sensor is alive, the exciter is heard at each tone, and its gain is measured."""
 
 import math
 
@@ -17,16 +17,16 @@ from bridge.guard.states import enter, trip
 from bridge.kernel import Record, kernel
 
 _TWO_PI = 2.0 * math.pi
-_QUIET_S = 0.5  # in which the sensors are listened to; a 16-bit converter shows some noise in it
-_TONE_S = 0.2  # a tone; its first half is the exciter's start
-_NOISY = 3  # channels with noise, the first; a place of an encoder repeats its number while it stands
-_HEARD = 4.0  # power of the tone over that of the noise from which it counts as heard
-_WILD = 20.0  # factor either way of the rigid mount's gain; a mount may resonate tenfold
+_QUIET_S = 0.5  # of listening to the sensors at rest; long enough for a 16-bit converter to show some noise
+_TONE_S = 0.2  # per tone; its first half is the exciter's start
+_NOISY = 3  # the first channels, which have noise; an encoder at rest repeats its number
+_HEARD = 4.0  # ratio of the power of the tone to the power of the noise from which the tone counts as heard
+_WILD = 20.0  # largest factor either way from a rigid mount's gain; a mount may resonate tenfold
 
 
 @kernel
 def check_tone(p: Record, s: Record) -> tuple[float, float]:
-    """Frequency and amplitude of the check's present tone; an amplitude of 0 before the first and after the last."""
+    """Frequency and amplitude of the check's present tone; amplitude 0 before the first and after the last tone."""
     at = _tone(p, s.check_blocks)
     if at < 0 or at >= p.tones:
         return s.frequency_Hz, 0.0
@@ -46,7 +46,7 @@ def _blocks(p: Record, time_s: float) -> int:
 
 @kernel
 def follow_check(p: Record, s: Record, block: Record, square_mps2: float) -> None:
-    """Take a block of samples of the check; go to ARMED at its end, to READY where the gain is another one, or to FAULT.
+    """Add a block of samples to the check; at its end go to ARMED, to READY if the gain has changed, or to FAULT.
 
     Args:
         p, s: records of `bridge.guard.records`.
@@ -70,7 +70,7 @@ def follow_check(p: Record, s: Record, block: Record, square_mps2: float) -> Non
     s.check_blocks += 1
     if at >= p.tones:
         if s.amplitude_m == 0.0:
-            s.square_mps2, s.vibration_mps = 0.0, 0.0  # of its own tones; what vibrates next is not louder by them
+            s.square_mps2, s.vibration_mps = 0.0, 0.0  # the check's tones must not add to the next vibration
             _end(p, s)
         return
     if at < 0:
@@ -92,19 +92,19 @@ def follow_check(p: Record, s: Record, block: Record, square_mps2: float) -> Non
 
 @kernel
 def _end(p: Record, s: Record) -> None:
-    """Compare the gain with the one that was accepted last, and arm where it is the same, or there is none."""
+    """Compare the gain with the last accepted gain; arm if it is the same, or if none was accepted."""
     if s.accepted[0] == 0.0:
         s.accepted[:] = s.gain
         enter(s, ARMED, FIRST_CHECK)
     elif gain_change(p, s) > p.gain_change:
         enter(s, READY, GAIN_CHANGED)
-    else:  # the accepted gain stays what it was, or small changes would add up
+    else:  # the accepted gain is kept, or small changes would add up
         enter(s, ARMED, CHECK_PASSED)
 
 
 @kernel
 def gain_change(p: Record, s: Record) -> float:
-    """Largest factor, either way, between the gains of the last check and those that were accepted."""
+    """Largest factor, either way, between the gains of the last check and the accepted gains."""
     largest = 1.0
     for at in range(p.tones):
         ratio = s.gain[at] / s.accepted[at]
@@ -125,8 +125,8 @@ def _judge(p: Record, s: Record, at: int) -> None:
 
 
 @kernel
-def tell_gain(p: Record, s: Record, block: Record) -> None:
-    """Write one tone of the last check, and the gain there, into a block, each block the next; zeros where none was passed."""
+def write_gain(p: Record, s: Record, block: Record) -> None:
+    """Write one tone of the last check and its gain into a block, the next tone into each next block; zeros without a check."""
     at = s.block % p.tones
     block.check_Hz = p.tone_Hz[at] if s.verified == 1 else 0.0
     block.check_gain = s.gain[at] if s.verified == 1 else 0.0

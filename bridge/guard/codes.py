@@ -1,4 +1,4 @@
-"""States and causes of the guard as plain numbers for kernels, and the words of a person to it."""
+"""States and causes of the guard as plain numbers for kernels, and the operator's orders to the guard."""
 
 from bridge.wire import stickslip_pb2 as wire
 
@@ -32,7 +32,7 @@ FIRST_CHECK, GAIN_CHANGED, GAIN_ACCEPTED = (
 SENSOR_FROZEN, SENSOR_NOT_FINITE, EXCITER_SILENT, EXCITER_WILD = (
     int(cause) for cause in (wire.SENSOR_FROZEN, wire.SENSOR_NOT_FINITE, wire.EXCITER_SILENT, wire.EXCITER_WILD)
 )
-LIMITS = OVERTRAVEL, DRIVE_MAX, DRIVE_RATIO, LOUD, BAND, HEAT, DUTY  # those with a level and a time to hold
+LIMITS = OVERTRAVEL, DRIVE_MAX, DRIVE_RATIO, LOUD, BAND, HEAT, DUTY  # limits with a level and a hold time
 
 STOP, RESET, ARM, DISARM, ACCEPT_GAIN = (
     int(word)

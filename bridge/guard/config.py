@@ -1,4 +1,4 @@
-"""The table `[guard]` of a rig file: what the exciter may do, whatever a controller commands. Nothing raises a limit online."""
+"""The table `[guard]` of a rig file: limits for the exciter that no controller can exceed. No limit can be raised online."""
 
 from typing import Annotated
 
@@ -7,14 +7,14 @@ from pydantic import Field, model_validator
 from bridge.config import Strict, Two
 
 Positive = Annotated[float, Field(gt=0)]
-_LONGEST_S = 1e9  # 30 years; a time far beyond is no number of blocks
+_LONGEST_S = 1e9  # 30 years; a far longer time overflows the count of blocks
 HoldTime = Annotated[float, Field(ge=0, le=_LONGEST_S)]
 Share = Annotated[float, Field(gt=0, le=1)]
 MOST_BANDS = 8
 
 
 class Level(Strict):
-    """A limit: the command is held at `alarm`, and beyond `abort` for `hold_s` the rig goes to FAULT."""
+    """A limit: the command is held at `alarm`; above `abort` for `hold_s` the rig goes to FAULT."""
 
     alarm: Positive
     abort: Positive
@@ -36,17 +36,17 @@ class HeatConfig(Strict):
     resistance_K_per_W: Positive = Field(default=20.0, description="From the stack to its surroundings.")
     time_s: Positive = Field(default=60.0, description="Time constant.")
     rise_max_K: Positive = Field(default=30.0, description="Largest rise above the surroundings.")
-    alarm_share: Share = Field(default=0.8, description="Of rise_max_K, from which it is told; from 1 on it trips.")
+    alarm_share: Share = Field(default=0.8, description="Share of rise_max_K that is reported; at 1 the guard trips.")
 
 
 class GuardConfig(Strict):
-    """The guard of one rig. Stroke, frequencies and slew are those of `[piezo]`, unless they are narrower here."""
+    """The guard of one rig. Stroke, frequencies and slew default to `[piezo]`; a value here may be narrower."""
 
     stroke_m: Level | None = Field(
         default=None, description="Not given: piezo.amplitude_max_m, abort at 1.5 times that."
     )
     velocity_mps: Level | None = Field(
-        default=None, description="Of the commanded v_a. Not given: what the stroke gives at the highest frequency."
+        default=None, description="Of the commanded v_a. Not given: the v_a of the stroke at the highest frequency."
     )
     velocity_ratio: Level = Field(
         default=Level(alarm=3.0, abort=4.0, hold_s=0.1),
@@ -56,32 +56,32 @@ class GuardConfig(Strict):
         default=Level(alarm=3.0, abort=4.0, hold_s=0.1), description="Measured v_a over the drive's velocity."
     )
     forbidden_Hz: Annotated[list[Two], Field(max_length=MOST_BANDS)] = Field(
-        default=[], description="Bands [low, high] in which nothing is vibrated."
+        default=[], description="Bands [low, high] without vibration."
     )
-    band_hold_s: HoldTime = Field(default=0.2, description="Of commands outside of the bands, until it trips.")
+    band_hold_s: HoldTime = Field(default=0.2, description="Time of commands in a forbidden band until it trips.")
     duty: Level = Field(
-        default=Level(alarm=1.0, abort=1.0), description="Share of the time in which it vibrates; 1: no limit."
+        default=Level(alarm=1.0, abort=1.0), description="Share of the time with vibration; 1: no limit."
     )
     duty_window_s: Positive = Field(default=60.0, description="Time constant of that share.")
     heat: HeatConfig = HeatConfig()
     drive_memory_s: Positive = Field(
         default=0.5,
-        description="Time constant in which the drive's velocity is forgotten: a vibration outlasts its move.",
+        description="Time constant of the memory of the drive's velocity: a vibration outlasts its move.",
     )
-    # The vibration is ramped to zero after 50 ms; from here on it does not come back by itself. Smaller: with 0.5 s a computer
-    # that stalls for 0.5 s leaves the axis without its controller until an operator arms it. Larger: with 1 s a controller that
-    # is restarted 1 s later (`controller-restarted` in deploy/faults) vibrates again, above 1.5 set points for 1.6 s.
+    # The vibration is ramped to zero after 50 ms without a command; after this time it does not resume by itself. Smaller: with
+    # 0.5 s a computer that stalls for 0.5 s leaves the axis without its controller until an operator arms it. Larger: with 1 s a
+    # controller restarted 1 s later (`controller-restarted` in deploy/faults) vibrates again, above 1.5 set points for 1.6 s.
     command_lost_s: Annotated[HoldTime, Field(gt=0)] = Field(
-        default=0.75, description="Without a fresh command, until the rig is DISARMED."
+        default=0.75, description="Time without a fresh command until the rig is DISARMED."
     )
     check_Hz: Annotated[list[Positive], Field(max_length=8)] = Field(
         default=[], description="Frequencies of the loop check, rising. Not given: five over piezo's range."
     )
     gain_change: Annotated[float, Field(ge=1.05, le=2.0)] = Field(
         default=1.25,
-        description="Factor either way from the gain that was accepted last, beyond which a loop check asks for a person's word.",
+        description="Largest factor either way from the last accepted gain; beyond it a loop check asks the operator.",
     )
-    check_share: Share = Field(default=0.1, description="Of the stroke, at which the loop check vibrates.")
+    check_share: Share = Field(default=0.1, description="Amplitude of the loop check, as a share of the stroke.")
 
     @model_validator(mode="after")
     def _in_order(self) -> "GuardConfig":
@@ -97,14 +97,14 @@ _WEAKER_IF_LARGER = ("velocity_ratio", "loud_ratio", "band_hold_s", "drive_memor
 
 
 def wider(config: GuardConfig) -> str:
-    """The limits that protect less than the defaults, in words; empty: none does."""
+    """The limits that protect less than the defaults, as text; empty without any."""
     default = GuardConfig()
-    found: list[str] = []
+    weaker: list[str] = []
     for name in _WEAKER_IF_LARGER:
         ours, theirs = getattr(config, name), getattr(default, name)
         if isinstance(ours, Level):
             parts = [(f"{name}.{part}", getattr(ours, part), getattr(theirs, part)) for part in Level.model_fields]
         else:
             parts = [(name, ours, theirs)]
-        found += [f"{key} = {value:g} (default {usual:g})" for key, value, usual in parts if value > usual]
-    return ", ".join(found)
+        weaker += [f"{key} = {value:g} (default {usual:g})" for key, value, usual in parts if value > usual]
+    return ", ".join(weaker)

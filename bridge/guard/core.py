@@ -1,11 +1,11 @@
-"""The guard, block by block: `accept` each command, `allow` a vibration for the block, `look` at the samples of the block."""
+"""The guard, block by block: `accept` each command, `allow` a vibration for the next block, `look` at its samples."""
 
 import math
 
 from bridge.guard.check import check_tone, follow_check
 from bridge.guard.codes import ACTIVE, ARMED, ARMED_BY_SCENARIO, CHECKING, COMMAND_LOST, DISARMED, NO_CAUSE, SLEW_RATE
+from bridge.guard.estimates import see_drive, see_vibration
 from bridge.guard.limits import held, watch
-from bridge.guard.senses import see_drive, see_vibration
 from bridge.guard.states import enter, note_vibration
 from bridge.kernel import Record, kernel
 
@@ -14,9 +14,9 @@ NO_COMMAND = -1  # as the unsigned number of the wire: bridge.wire.messages.NO_B
 
 @kernel
 def accept(p: Record, s: Record, command: Record) -> bool:
-    """Whether a command counts: of this run, newer than the last, of a block that was sent, and made of numbers.
+    """Whether a command is valid: of this run, newer than the last, finite, and the answer to a block already sent.
 
-    A controller that begins anew counts from 0, so after a time without fresh commands any number is newer.
+    A restarted controller counts from 0, so after a time without fresh commands any number is newer.
     """
     sequence, block = int(command.sequence), int(command.block)
     numbers = math.isfinite(command.frequency_Hz) and math.isfinite(command.amplitude_m)
@@ -30,11 +30,11 @@ def accept(p: Record, s: Record, command: Record) -> bool:
 
 @kernel
 def allow(p: Record, s: Record, command_block: int, frequency_Hz: float, amplitude_m: float) -> None:
-    """Set `frequency_Hz` and `amplitude_m` of the block to come, from the command in force.
+    """Set `frequency_Hz` and `amplitude_m` of the next block, from the command in force.
 
     Args:
         p, s: records of `bridge.guard.records`.
-        command_block: block that the command answers, NO_COMMAND before the first.
+        command_block: block answered by the command, NO_COMMAND before the first.
         frequency_Hz, amplitude_m: of the command.
 
     """
@@ -47,7 +47,7 @@ def allow(p: Record, s: Record, command_block: int, frequency_Hz: float, amplitu
             target_Hz, target_m = frequency_Hz, held(p, s, frequency_Hz, amplitude_m)
         elif (
             s.heard == 1 or s.cause != ARMED_BY_SCENARIO
-        ):  # whom a person arms has a controller; a simulated rig may wait for its own
+        ):  # an operator arms only with a controller; a simulated rig may wait for its controller
             s.limit = COMMAND_LOST
             s.lost_blocks += 1
             if s.lost_blocks > p.lost_blocks:
@@ -58,7 +58,7 @@ def allow(p: Record, s: Record, command_block: int, frequency_Hz: float, amplitu
     elif s.state == CHECKING:
         target_Hz, target_m = check_tone(p, s)
     if target_m > 0.0:
-        s.frequency_Hz = target_Hz  # a vibration that fades keeps its frequency
+        s.frequency_Hz = target_Hz  # a fading vibration keeps its frequency
     slewed_m = min(max(target_m, s.amplitude_m - p.slew_m_per_block), s.amplitude_m + p.slew_m_per_block)
     if slewed_m != target_m and s.limit == NO_CAUSE:
         s.limit = SLEW_RATE
@@ -68,7 +68,7 @@ def allow(p: Record, s: Record, command_block: int, frequency_Hz: float, amplitu
 
 @kernel
 def look(p: Record, s: Record, block: Record) -> None:
-    """Take the samples of the block that was vibrated as `allow` said; the next block begins."""
+    """Process the samples of the block that vibrated as `allow` set; the next block begins."""
     see_drive(p, s, block)
     see_vibration(p, s, block)
     if s.state == CHECKING:

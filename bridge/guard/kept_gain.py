@@ -1,4 +1,4 @@
-"""The exciter's gain that the loop check of a rig found and that was accepted, kept over restarts: a file a rig."""
+"""The accepted exciter gain of a rig's loop check, kept over restarts: one file per rig."""
 
 import json
 import time
@@ -15,8 +15,8 @@ class KeptGain:
     """The accepted gain of one rig at each tone of its loop check.
 
     Args:
-        rig: its name, as the rig file has it.
-        tones_Hz: of its check; gains at other tones tell nothing of it.
+        rig: its name in the rig file.
+        tones_Hz: of its check; gains at other tones are not comparable.
 
     """
 
@@ -25,7 +25,7 @@ class KeptGain:
         self._rig, self._tones_Hz = rig, [float(tone_Hz) for tone_Hz in tones_Hz]
 
     def load(self) -> list[float]:
-        """The gains; none where nothing was kept, or what is there cannot be read or is of other tones."""
+        """The gains; empty if no gains were kept, or the file is unreadable or of other tones."""
         try:
             with open(self.path, "rb") as file:
                 table: Any = json.loads(file.read(_MOST_BYTES))
@@ -36,7 +36,7 @@ class KeptGain:
         return gains if right and all(0.0 < gain < float("inf") for gain in gains) else []
 
     def save(self, gains: Sequence[float]) -> None:
-        """Keep gains. Raises OSError where they cannot be written."""
+        """Keep gains. Raises OSError if they cannot be written."""
         table = {"rig": self._rig, "tones_Hz": self._tones_Hz, "gain": [float(gain) for gain in gains]}
         self.path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         write_whole(self.path, json.dumps(table | {"at": time.strftime("%Y-%m-%dT%H:%M:%S%z")}))

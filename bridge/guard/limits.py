@@ -1,4 +1,4 @@
-"""The limits: each holds the command at its alarm level, and trips where its abort level is passed for its time."""
+"""The limits: each holds the command at its alarm level, and trips after too long a time above its abort level."""
 
 import math
 
@@ -8,12 +8,12 @@ from bridge.guard.states import trip
 from bridge.kernel import Record, kernel
 
 _TWO_PI = 2.0 * math.pi
-_TOLD_PARTS = 10  # of the time until it trips, after one of which a loud vibration is told
+_REPORT_PARTS = 10  # a loud vibration is reported after 1/10 of the time until it trips
 
 
 @kernel
 def passes(p: Record, s: Record, limit: int, value: float) -> bool:
-    """Whether a value keeps to the alarm level of a limit, else `limit` is set; trips beyond the abort level for too long."""
+    """Whether a value is within the alarm level of a limit, else set `limit`; trip after too long above the abort level."""
     i = limit - FIRST
     s.over_blocks[i] = s.over_blocks[i] + 1 if value > p.abort[i] else 0
     if s.over_blocks[i] > p.hold_blocks[i]:
@@ -26,7 +26,7 @@ def passes(p: Record, s: Record, limit: int, value: float) -> bool:
 
 @kernel
 def exciter_gain(p: Record, s: Record, frequency_Hz: float) -> float:
-    """Delivered over commanded v_a at a frequency, as the loop check found it; between its tones by a straight line."""
+    """Delivered over commanded v_a at a frequency, from the loop check; linear between its tones."""
     if frequency_Hz <= p.tone_Hz[0]:
         return s.gain[0]
     for i in range(1, p.tones):
@@ -62,31 +62,31 @@ def held(p: Record, s: Record, frequency_Hz: float, amplitude_m: float) -> float
     if s.verified == 1:
         per_m *= exciter_gain(p, s, frequency_Hz)
         ratio = per_m * amplitude_m / max(s.drive_mps, 1e-12)
-        told = s.limit
+        before = s.limit
         if passes(p, s, DRIVE_RATIO, ratio):
             s.ratio_blocks = 0
         else:
             result_m = min(result_m, p.alarm[DRIVE_RATIO - FIRST] * s.drive_mps / per_m)
             s.ratio_blocks += 1
             if s.ratio_blocks <= p.window_blocks:
-                s.limit = told  # a start of the drive, which is seen as late as that
+                s.limit = before  # not reported: the drive starts, and its velocity is seen with this delay
     return result_m
 
 
 @kernel
 def watch(p: Record, s: Record) -> None:
-    """Follow warmth, duty and loudness of what vibrates now."""
+    """Update warmth, duty and loudness of the present vibration."""
     warmth = p.heat_per_Hz_m2 * s.frequency_Hz * s.amplitude_m * s.amplitude_m
     s.heat += p.heat_share * (warmth - s.heat)
     s.duty += p.duty_share * ((1.0 if s.amplitude_m > 0.0 else 0.0) - s.duty)
     passes(p, s, HEAT, s.heat)
     passes(p, s, DUTY, s.duty)
     loud = s.vibration_mps / max(s.drive_mps, 1e-12) if s.amplitude_m > 0.0 else 0.0
-    told = s.limit
+    before = s.limit
     if passes(p, s, LOUD, loud):
         s.loud_blocks = 0
         return
     s.loud_blocks += 1
-    starts = s.vibration_mps <= p.alarm[LOUD - FIRST] * s.fastest_mps  # the drive, whose velocity is seen late
-    if starts or _TOLD_PARTS * s.loud_blocks <= p.hold_blocks[LOUD - FIRST]:
-        s.limit = told  # or a machine that stops shakes its base for a moment
+    starts = s.vibration_mps <= p.alarm[LOUD - FIRST] * s.fastest_mps  # the drive, whose velocity is seen with a delay
+    if starts or _REPORT_PARTS * s.loud_blocks <= p.hold_blocks[LOUD - FIRST]:
+        s.limit = before  # not reported: the drive starts, or a stopping machine shakes its base for a moment

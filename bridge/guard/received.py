@@ -1,4 +1,4 @@
-"""The commands that a rig's process receives: those that mean something, in order; all others are counted, told and dropped."""
+"""Commands received by a rig's process: valid ones in order; all others are counted, reported and dropped."""
 
 import collections
 from typing import Any
@@ -10,16 +10,16 @@ from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
 from bridge.wire.topics import COMMAND
 from bridge.wire.zenoh_link import Received
 
-# beyond any exciter that vibrates a machine; a rig limits what is smaller to its own stroke and band
+# beyond any exciter that vibrates a machine; smaller values are limited by the rig to its stroke and band
 _LARGEST_M = 1e-3
 _HIGHEST_HZ = 1e6
 
 
-class Commands:
-    """Between the receiving thread, which calls `push`, and the loop of the rig, which calls `take`.
+class CommandQueue:
+    """Queue between the receiving thread, which calls `push`, and the loop of the rig, which calls `take`.
 
     Args:
-        complaints: where what is wrong is told.
+        complaints: reports the dropped commands.
 
     """
 
@@ -29,7 +29,7 @@ class Commands:
         self._came = 0  # written by the receiving thread alone
         self._read = 0
         self._lost = 0
-        self._newest = 0  # block that the newest command answers
+        self._newest = 0  # block answered by the newest command
 
     def push(self, received: Received) -> None:
         """Add a command."""
@@ -37,28 +37,26 @@ class Commands:
         self._came += 1
 
     def take(self, block: int) -> list[tuple[Received, int]]:
-        """The commands that came since the last call, each with the block that it answers.
+        """The commands since the last call, each with the block that it answers.
 
-        `block`: the number of the next block; a command cannot answer it yet.
+        `block`: the number of the next block, which no command can answer yet.
         """
-        found: list[tuple[Received, int]] = []
+        commands: list[tuple[Received, int]] = []
         for _ in range(len(self._waiting)):
             received = self._waiting.popleft()
             self._read += 1
             answered = self.answered(received, block)
             if answered is not None:
-                found.append((received, answered))
-        # of those that came, what was neither read nor waits; one that is being added now counts the next time
+                commands.append((received, answered))
+        # received commands that were neither read nor wait; a command being added now counts at the next call
         lost = self._came - self._read - len(self._waiting) - self._lost
         if lost > 0:
             self._lost += lost
-            self._complaints.note(
-                FLOOD, COMMAND.name, "more than can be read in a block: the oldest were dropped", lost
-            )
-        return found
+            self._complaints.note(FLOOD, COMMAND.name, "too many for one block: the oldest were dropped", lost)
+        return commands
 
     def answered(self, received: Received, block: int) -> int | None:
-        """The block that a command answers; None for one that is dropped."""
+        """The block that a command answers; None for a dropped command."""
         try:
             command: Any = COMMAND_LAYOUT.read(received.payload, COMMAND.name)[0]
         except Fault as fault:
@@ -70,7 +68,7 @@ class Commands:
             int(command.block),
         )
         if not (0.0 <= amplitude_m <= _LARGEST_M and 0.0 <= frequency_Hz <= _HIGHEST_HZ):
-            text = f"{amplitude_m:g} m at {frequency_Hz:g} Hz is no vibration: dropped"
+            text = f"{amplitude_m:g} m at {frequency_Hz:g} Hz is not a vibration: dropped"
             self._complaints.note(BAD_MESSAGE, f"{COMMAND.name} amplitude", text)
             return None
         if answered >= block:

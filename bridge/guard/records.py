@@ -1,4 +1,4 @@
-"""The numbers a guard runs on: parameters derived once from the rig file, and everything that changes."""
+"""The records of a guard: parameters derived once from the rig file, and the changing state."""
 
 import math
 from typing import Any, NamedTuple
@@ -26,11 +26,11 @@ from bridge.guard.config import MOST_BANDS, GuardConfig, Level
 from bridge.kernel import record
 
 CHANNELS = 5
-FIRST = min(LIMITS)  # causes of limits are counted from here in the tables below
+FIRST = min(LIMITS)  # the tables below count the causes of limits from here
 MOST_TONES = 8
 _RING = 256  # block means of the drive's position: 50 ms of blocks of 0.25 ms
-_DRIVE_WINDOW_S = 0.05  # of the drive's velocity; shorter: noise. Longer: late, which only loosens a limit that brakes
-_LOUD_FILTER_S = 0.01  # of the measured v_a; shorter: a slip that shakes the base counts as vibration
+_DRIVE_WINDOW_S = 0.05  # of the drive's velocity. Shorter: noise; longer: a delay, which loosens a limit while braking
+_LOUD_FILTER_S = 0.01  # of the measured v_a. Shorter: a slip that shakes the base counts as vibration
 _TONES = 5
 
 PARAMS = np.dtype(
@@ -74,28 +74,28 @@ STATE = np.dtype(
 RING = _RING
 
 
-class Exciter(NamedTuple):
-    """What the rig file says of the exciter and its blocks."""
+class ExciterLimits(NamedTuple):
+    """The exciter and its blocks, from the rig file."""
 
     stroke_m: float
     frequency_min_Hz: float
     frequency_max_Hz: float
-    slew_m_per_s: float  # 0: at once
+    slew_m_per_s: float  # 0: no limit
     block_s: float
     samples_per_block: int
     command_timeout_s: float
 
 
 def build(
-    config: GuardConfig, exciter: Exciter, run: int, arm: bool = False, stop_kept: bool = False
+    config: GuardConfig, exciter: ExciterLimits, run: int, arm: bool = False, stop_kept: bool = False
 ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    """Parameters and memory of a guard at power-up.
+    """Parameters and state of a guard at power-up.
 
     Args:
         config, exciter: of the rig file.
         run: the number that each command must carry.
-        arm: the rig is simulated, and its scenario says so.
-        stop_kept: a person's stop of an earlier run holds.
+        arm: the rig is simulated, and its scenario arms it.
+        stop_kept: the operator's stop of an earlier run holds.
 
     """
     params = record(PARAMS)
@@ -149,7 +149,7 @@ def build(
     return params, state
 
 
-def _tones(config: GuardConfig, exciter: Exciter) -> list[float]:
+def _tones(config: GuardConfig, exciter: ExciterLimits) -> list[float]:
     """Frequencies of the loop check, evenly over the exciter's range, none forbidden."""
     spaced = np.linspace(exciter.frequency_min_Hz, exciter.frequency_max_Hz, _TONES + 2)[1:-1]
     return [tone for tone in spaced if not any(low <= tone <= high for low, high in config.forbidden_Hz)]

@@ -1,4 +1,4 @@
-"""The states of a rig, and what leads from one to another. Nothing arms by itself: not after a freeze, a restart, a new link."""
+"""The states of a rig and their transitions. Nothing arms by itself: not after a freeze, a restart or a new link."""
 
 from bridge.guard.codes import (
     ACCEPT_GAIN,
@@ -28,7 +28,7 @@ from bridge.kernel import Record, kernel
 
 @kernel
 def enter(s: Record, state: int, cause: int) -> None:
-    """Go to a state; another state begins anew what is counted in it."""
+    """Go to a state; a change of state resets the counters of the state."""
     if s.state != state:
         s.lost_blocks, s.check_blocks, s.heard = 0, 0, 0
         s.over_blocks[:] = 0
@@ -37,18 +37,18 @@ def enter(s: Record, state: int, cause: int) -> None:
 
 @kernel
 def trip(s: Record, cause: int) -> None:
-    """Go to FAULT, which stays until a person resets it; the first cause stays, too, but for a person's stop."""
+    """Go to FAULT until the operator resets it; the first cause is kept, except that the operator's stop replaces it."""
     if s.state != FAULT:
         enter(s, FAULT, cause)
 
 
 @kernel
-def obey(s: Record, word: int) -> bool:
-    """Take a person's word, or that of the process that ends; whether it changed the state.
+def apply_order(s: Record, word: int) -> bool:
+    """Apply an order of the operator or of the ending process. Returns whether it changed the state.
 
-    A stop is taken in every state. ARM is taken in DISARMED, in ARMED without a check, and in READY where the gain has changed:
-    it begins a check; in READY else it arms. ACCEPT_GAIN does the same, and arms where the gain has changed. A rig in FAULT must
-    be reset first.
+    A stop is valid in every state. ARM begins a check in DISARMED, in ARMED without a check, and in READY after a change of the
+    gain; otherwise it arms in READY. ACCEPT_GAIN does the same, but arms after a change of the gain. A rig in FAULT must be
+    reset first.
     """
     before = s.state
     if word == STOP:
@@ -72,7 +72,7 @@ def obey(s: Record, word: int) -> bool:
 
 @kernel
 def note_vibration(s: Record) -> None:
-    """ARMED becomes ACTIVE where it vibrates, and again ARMED where it is at rest."""
+    """ARMED becomes ACTIVE when the vibration starts, and ARMED again when it ends."""
     if s.state == ARMED and s.amplitude_m > 0.0:
         s.state, s.cause = ACTIVE, VIBRATION_BEGAN
     elif s.state == ACTIVE and s.amplitude_m == 0.0:

@@ -1,19 +1,21 @@
 """Run logs: every message of a run in one MCAP file.
 
-library, live            what every log begins with; whether one is being recorded
+library, live            the header of every log; the lock of a log that is being recorded
 mcap_chunks, runlog      writing in small chunks, so that a kill costs at most one chunk
-viewers                  topics for the viewers of other programs
-storage                  the files of a log: which they are, what is done where one fails, whether a byte was changed
+viewers/                 topics for the viewers of other programs
+storage/                 the files of a log: their order, the reaction to a failing disk, proof that no byte was changed
 block_rows               the messages of many blocks as the bytes of a chunk
 screen                   which messages go into a log
 recorder                 the process that writes every message on the bus
 log_reader, logfile      reading without seeking, whole or cut; its topics as arrays
 chunk_messages           where the messages are in the bytes of chunks
-reading                  chunks of any compression, and the definitions of channels
-damage, recover          what could not be read; a cut log made whole
-check                    faults of a log: of its schemas, of each channel (for evidence too), and all of them together
+reading/                 chunks of any compression, and the definitions of channels
+damage, recover          losses found by the reader; a cut log made whole
+check/                   faults of a log: of its schemas, of each channel (for evidence too), and all of them together
 topic_watch              missing messages, duplicates and clock jumps of one topic
-watches                  events and percentiles of a log, in a memory that does not grow
+watches/                 events and percentiles of a log, in a memory that does not grow
 in_charge, pause_events  when the rig had no controller; stalls of the computer
 finding                  one fault of a log or of evidence, and its place
+metadata                 configurations and versions that the processes of a run wrote into its log
+pause_writer             writing the computer's stalls into the log that is being recorded, in the time of its run
 """

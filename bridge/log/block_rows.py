@@ -9,12 +9,12 @@ from mcap.opcode import Opcode
 
 from bridge.wire.messages import Records
 
-FIELDS_BYTES = 22  # of a message record, between its length and its payload
+FIELDS_BYTES = 22  # in a message record, between its length and its payload
 _INDEX_ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
 
 
-class Rows(NamedTuple):
-    """The message records of a stretch of a chunk, and where they begin."""
+class MessageRows(NamedTuple):
+    """The message records of a part of a chunk, and their places."""
 
     data: memoryview  # of bytes
     entries: dict[int, npt.NDArray[Any]]  # by channel: log time [ns] and offset in `data` of each message
@@ -28,7 +28,7 @@ def _record(payload_bytes: int) -> np.dtype[Any]:
 
 
 def _fill(place: npt.NDArray[Any], channel: int, messages: Records, log_ns: npt.NDArray[np.int64]) -> None:
-    """Write message records into the places for them; `place` has the shape of their order."""
+    """Write message records into `place`, whose shape gives their order."""
     payloads = messages.view(f"V{messages.dtype.itemsize}").reshape(place.shape)
     place["opcode"], place["channel"] = Opcode.MESSAGE, channel
     place["length"] = FIELDS_BYTES + messages.dtype.itemsize
@@ -40,13 +40,13 @@ def _fill(place: npt.NDArray[Any], channel: int, messages: Records, log_ns: npt.
 
 def rows(
     each: Mapping[int, Records], after: Mapping[int, Records], log_ns: npt.NDArray[np.int64] | None = None
-) -> Rows:
+) -> MessageRows:
     """Lay messages out in order of time.
 
     Args:
-        each: by channel, the messages of topics that every block has, [blocks].
-        after: by channel, those of topics that have one after every so many blocks, [blocks / so many]; may be empty.
-        log_ns: log time of the blocks, where `after` is empty; the time of the run if not given.
+        each: topics with one message per block, by channel, [blocks].
+        after: topics with one message after every n blocks, by channel, [blocks / n]; may be empty.
+        log_ns: log time of the blocks, for an empty `after`; default: the time of the run.
 
     """
     blocks = len(next(iter(each.values())))
@@ -54,7 +54,7 @@ def rows(
     block = np.dtype([(str(channel), _record(table.dtype.itemsize)) for channel, table in each.items()])
     last = [(str(channel), _record(table.dtype.itemsize)) for channel, table in after.items()]
     group = np.dtype([("blocks", block, (blocks // groups,)), *last])
-    laid_out = np.empty(groups, group)  # without gaps, and every place is filled
+    laid_out = np.empty(groups, group)  # without gaps; every byte is filled
     starts = np.arange(groups, dtype=np.uint64) * np.uint64(group.itemsize)
     of_block = np.arange(blocks // groups, dtype=np.uint64) * np.uint64(block.itemsize)
     entries: dict[int, npt.NDArray[Any]] = {}
@@ -73,4 +73,4 @@ def rows(
         entries[channel]["log_time"] = log_times
         entries[channel]["offset"] = (offsets + np.uint64(fields[str(channel)][1])).ravel()
     times = next(iter(each.values()))["t_ns"] if log_ns is None else log_ns
-    return Rows(laid_out.view(np.uint8).data, entries, int(times[0]), int(times[-1]))
+    return MessageRows(laid_out.view(np.uint8).data, entries, int(times[0]), int(times[-1]))

@@ -1,4 +1,4 @@
-"""Places of the messages in the bytes of chunks: from their indexes where these are right, else by a walk through the records."""
+"""Places of the messages in the bytes of chunks: from their indexes if these are right, else by a walk through the records."""
 
 import struct
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from mcap.opcode import Opcode
 
-_RECORD = struct.Struct("<BQ")  # opcode, length of what follows
+_RECORD = struct.Struct("<BQ")  # opcode, length of the content
 HEAD = np.dtype(  # of a message record, before its payload
     [
         ("opcode", "u1"),
@@ -31,18 +31,18 @@ Column = npt.NDArray[np.int64]
 
 
 class Chunked(NamedTuple):
-    """A chunk, uncompressed, or messages that stand in no chunk."""
+    """An uncompressed chunk, or messages outside of chunks."""
 
     data: bytes
-    indexes: list[bytes]  # contents of the index records after it, which may be missing, damaged or of another chunk
+    indexes: list[bytes]  # contents of the index records after it, which may be missing, damaged or from another chunk
 
 
-class Walk(NamedTuple):
-    """What a walk through the records of a chunk met."""
+class ChunkWalk(NamedTuple):
+    """The result of a walk through the records of a chunk."""
 
     offsets: Column  # of the messages
-    others: list[tuple[int, bytes]]  # opcode and content of the records that are no messages
-    broken: int  # stretches of bytes that are no whole record
+    others: list[tuple[int, bytes]]  # opcode and content of all other records
+    broken: int  # number of byte stretches without a whole record
 
 
 @dataclass(eq=False)
@@ -51,10 +51,10 @@ class Messages:
 
     data: Bytes  # of the chunks
     heads: npt.NDArray[Any]  # [messages], with the fields length, channel, sequence, log_ns and publish_ns
-    channel: npt.NDArray[np.uint16]  # of each, [messages]; numpy sorts so short numbers five times as fast as long ones
+    channel: npt.NDArray[np.uint16]  # [messages]; numpy sorts 16-bit numbers five times as fast as 64-bit numbers
     start: Column  # of the payload in `data`, [messages]
-    others: Sequence[tuple[int, bytes]] = ()  # records between them, definitions for the most part: opcode and content
-    broken: int = 0  # stretches of bytes between them that are no whole record
+    others: Sequence[tuple[int, bytes]] = ()  # records between them, mostly definitions: opcode and content
+    broken: int = 0  # number of byte stretches between them without a whole record
 
     @cached_property
     def by_channel(self) -> "dict[int, Messages]":
@@ -69,7 +69,7 @@ class Messages:
         }
 
     def of(self, channels: Sequence[int]) -> "Messages":
-        """The messages of some channels, in file order."""
+        """The messages of the given channels, in file order."""
         return self._some(np.flatnonzero(np.isin(self.channel, channels)))
 
     def _some(self, rows: Column) -> "Messages":
@@ -83,7 +83,7 @@ class Messages:
 
     @cached_property
     def stacked(self) -> Bytes | None:
-        """The payloads one below the other, [messages, size]; None where they are of several sizes."""
+        """The payloads one below the other, [messages, size]; None if their sizes differ."""
         lengths = self.heads["length"]
         if not len(lengths) or (lengths != lengths[0]).any():
             return None
@@ -109,7 +109,7 @@ def messages_of(chunks: Sequence[Chunked]) -> Messages:
 
 
 def _indexed(chunks: Sequence[Chunked], begins: Column) -> Column:
-    """Offsets of the messages as the indexes tell them, in file order; nothing is checked."""
+    """Offsets of the messages according to the indexes, in file order, unchecked."""
     parts = [
         np.frombuffer(content, _INDEX_ENTRY, offset=_INDEX_HEAD_BYTES)["offset"].astype(np.int64) + begin
         for chunk, begin in zip(chunks, begins, strict=False)
@@ -121,26 +121,26 @@ def _indexed(chunks: Sequence[Chunked], begins: Column) -> Column:
 
 
 def _heads(data: Bytes, offsets: Column) -> npt.NDArray[Any] | None:
-    """The bytes at the offsets, read as heads of messages, [messages]; None where one lies outside of the data."""
+    """The bytes at the offsets, read as heads of messages, [messages]; None if an offset lies outside of the data."""
     if not len(offsets) or offsets[0] < 0 or offsets[-1] > len(data) - HEAD.itemsize:
         return None
     return cut(data, offsets, HEAD.itemsize).view(HEAD)
 
 
 def _tile(begins: Column, offsets: Column, heads: npt.NDArray[Any]) -> bool:
-    """Whether the chunks consist of messages at these offsets and of nothing else, so that a walk would find the same."""
+    """Whether the chunks consist of messages at these offsets and of nothing else, so that a walk gives the same result."""
     ends = offsets + _RECORD.size + heads["length"].astype(np.int64)
     messages = (heads["opcode"] == Opcode.MESSAGE) & (heads["length"] >= _FIELDS_BYTES)
     whole = offsets[0] == 0 and (ends[:-1] == offsets[1:]).all() and ends[-1] == begins[-1] and messages.all()
-    # no message goes on from one chunk into the next
+    # no message crosses the border of two chunks
     return bool(
         whole and (offsets[np.minimum(np.searchsorted(offsets, begins[:-1]), len(offsets) - 1)] == begins[:-1]).all()
     )
 
 
-def _walked(data: bytes) -> Walk:
-    """The records of a chunk, found from one to the next."""
-    found: list[int] = []
+def _walked(data: bytes) -> ChunkWalk:
+    """Walk the records of a chunk in order."""
+    offsets: list[int] = []
     others: list[tuple[int, bytes]] = []
     broken = 0
     at, end = 0, len(data)
@@ -153,22 +153,22 @@ def _walked(data: bytes) -> Walk:
         if opcode != Opcode.MESSAGE:
             others.append((opcode, data[begin : begin + length]))
         elif length >= _FIELDS_BYTES:
-            found.append(at)
+            offsets.append(at)
         else:
             broken += 1
         at = begin + length
-    return Walk(np.array(found, np.int64), others, broken)
+    return ChunkWalk(np.array(offsets, np.int64), others, broken)
 
 
 def _as_bytes(heads: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """The same without fields: numpy copies these as a whole, and records with fields one field after the other."""
+    """The heads without fields: numpy copies these in one go, and records with fields field by field."""
     return heads.view(f"V{HEAD.itemsize}")
 
 
 def cut(data: Bytes, starts: Column, size: int) -> npt.NDArray[Any]:
-    """`size` bytes of the data from each start on, [starts] of raw elements."""
+    """`size` bytes of the data from each start, [starts] of raw elements."""
     if not len(starts):
         return np.empty(0, f"V{size}")
-    # every place of the data as the start of an element: numpy then copies whole elements, without an index for each byte
+    # the data seen as overlapping elements, one at every byte: numpy then copies whole elements, without an index per byte
     overlapping: npt.NDArray[Any] = np.ndarray((len(data) - size + 1,), f"V{size}", data, 0, (1,))
     return overlapping[starts]

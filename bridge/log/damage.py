@@ -1,4 +1,4 @@
-"""What of a log could not be read: counted by a reader, told as findings."""
+"""Parts of a log that could not be read: counted by the reader, reported as findings."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -18,7 +18,7 @@ class Damage(NamedTuple):
     bad_records: int = 0  # number of definitions, tables, messages or stretches of bytes that cannot be read
     nameless: int = 0  # messages of a channel whose definition is lost: their topic cannot be known
     missing: int = 0  # messages that the file's own count has and that were not found
-    before: str = ""  # what had been lost of the log that this one was saved from, in words
+    before: str = ""  # earlier losses of the log that this log was recovered from, as text
     first_bad: str = ""  # why the first message that is whole cannot be read
 
     @property
@@ -28,18 +28,18 @@ class Damage(NamedTuple):
         return self.closed and not any(lost)
 
     def and_also(self, **more: int) -> "Damage":
-        """With more of it: the names of fields and what to add to each."""
+        """Add counts to the given fields."""
         return self._replace(**{name: getattr(self, name) + count for name, count in more.items()})
 
 
 def also_before(damage: Damage, lost: str) -> Damage:
-    """With what had been lost before, in the words of the file."""
+    """Add an earlier loss, in the words of the file."""
     known = damage.before.split("; ") if damage.before else []
     return damage if not lost or lost in known else damage._replace(before="; ".join([*known, lost]))
 
 
 def lost_in_words(damage: Damage) -> str:
-    """What could not be read, in words; empty when all could."""
+    """The losses as text; empty for a log without losses."""
     parts = [f"{counted(damage.cut_bytes, 'byte')} of an open chunk at the end"] if damage.cut_bytes else []
     parts += [counted(damage.bad_chunks, "damaged chunk")] if damage.bad_chunks else []
     if damage.bad_records:
@@ -55,13 +55,13 @@ def lost_in_words(damage: Damage) -> str:
 
 def damage_findings(damage: Damage, path: Path) -> list[Finding]:
     """A finding for each kind of loss in a log."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     remedy = f"`stickslip log recover {path}` saves the rest"
     if not damage.closed:
         text = f"has no end, {damage.cut_bytes} bytes of an open chunk were lost; {remedy}"
-        found.append(Finding("cut", path.name, text, max(damage.cut_bytes, 1)))
+        findings.append(Finding("cut", path.name, text, max(damage.cut_bytes, 1)))
     if damage.bad_chunks:
-        found.append(
+        findings.append(
             Finding(
                 "damaged",
                 path.name,
@@ -72,22 +72,22 @@ def damage_findings(damage: Damage, path: Path) -> list[Finding]:
     if damage.bad_records:
         first = f", first: {damage.first_bad}" if damage.first_bad else ""
         text = f"{damage.bad_records} definitions, messages or stretches of bytes make no sense{first}; {remedy}"
-        found.append(Finding("damaged", path.name, text, damage.bad_records))
+        findings.append(Finding("damaged", path.name, text, damage.bad_records))
     if damage.nameless:
         whose = counted(damage.nameless, "message belongs", "messages belong")
         text = f"{whose} to a channel whose definition is lost: the topic cannot be known"
-        found.append(Finding("damaged", path.name, text, damage.nameless))
+        findings.append(Finding("damaged", path.name, text, damage.nameless))
     if damage.missing:
         text = f"the file's own count has {counted(damage.missing, 'message')} more than are in it"
-        found.append(Finding("damaged", path.name, text, damage.missing))
+        findings.append(Finding("damaged", path.name, text, damage.missing))
     if damage.before:
         text = f"was saved from a log that was not whole; how many messages are missing is not known: {damage.before}"
-        found.append(Finding("recovered", path.name, text))
-    return found
+        findings.append(Finding("recovered", path.name, text))
+    return findings
 
 
 def foreign_in_words(foreign: dict[str, int]) -> list[str]:
-    """One line for messages of other programs' topics, which were passed over; none where there are none."""
+    """One line on the skipped messages of other programs; empty if there are none."""
     if not foreign:
         return []
     names = [topic or "a topic without a name" for topic in foreign]

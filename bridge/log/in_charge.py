@@ -13,11 +13,11 @@ from bridge.wire.messages import Records
 from bridge.wire.words import words
 
 NO_COMMAND = (1 << 64) - 1  # in `Applied.command_block`: the rig has none, before the first or on its way out
-# A longer fallback is no stall: the controller is absent. Smaller: a controller that stalls for 0.5 s counts as absent. Larger:
-# slips without a controller count as slips in a stall. The bus drops a frozen process after its lease, 1.5 s.
+# A longer fallback means that the controller is absent, not stalled. Smaller: a controller that stalls for 0.5 s counts as
+# absent. Larger: slips without a controller count as slips in a stall. The bus drops a frozen process after its lease, 1.5 s.
 GONE_S = 1.0
 UNANSWERED_SHARE = 0.01  # of the blocks: more without an answer is a fault; every busy desktop has fewer now and then
-WEAK_S = 1.0  # of one reason that says the vibration does not do its work: more is a fault
+WEAK_S = 1.0  # longest time of a reason for ineffective vibration; above it the log has a fault
 _MOST_STRETCHES = 1000  # that a result lists; of more, only their time
 
 
@@ -31,7 +31,7 @@ class InCharge(NamedTuple):
     unanswered: int  # blocks that no command answers, fallback included
     answerable: int  # blocks from the first command on
     controller_until_s: float | None  # of a controller that was not there until the end: its last step; None: it was
-    reasons_s: dict[str, float]  # time of each reason that says the vibration does not do its work
+    reasons_s: dict[str, float]  # time of each reason for ineffective vibration
 
     @property
     def alone(self) -> bool:
@@ -40,25 +40,25 @@ class InCharge(NamedTuple):
 
     def sentences(self) -> list[tuple[str, str, bool]]:
         """Code, words, and whether it is a fault, of each event that an operator should know."""
-        told: list[tuple[str, str, bool]] = []
+        rows: list[tuple[str, str, bool]] = []
         if self.fallbacks:
             where = f", first from {self.stretches[0][0]:.2f} s on" if self.stretches else ""
             text = (
                 f"the rig was without a fresh command for {self.fallback_s:.2f} s, {counted(self.fallbacks, 'time')}{where}, "
                 f"the longest {self.longest_fallback_s:.2f} s: no controller was in charge then"
             )
-            told.append(("FALLBACK", text, self.longest_fallback_s > GONE_S))
+            rows.append(("FALLBACK", text, self.longest_fallback_s > GONE_S))
         if self.controller_until_s is not None:
             text = f"the controller's last step was at {self.controller_until_s:.2f} s, and the rig went on without it"
-            told.append(("CONTROLLER_LOST", text, True))
+            rows.append(("CONTROLLER_LOST", text, True))
         if self.unanswered:
             share = self.unanswered / max(self.answerable, 1)
             text = f"{counted(self.unanswered, 'block')} of {self.answerable} have no command that answers them"
-            told.append(("UNANSWERED", text, share > UNANSWERED_SHARE))
-        helps = {one.word: one.help for one in words() if one.column == "reason"}
+            rows.append(("UNANSWERED", text, share > UNANSWERED_SHARE))
+        helps = {word.word: word.help for word in words() if word.column == "reason"}
         for name, seconds in self.reasons_s.items():
-            told.append((name, f"for {seconds:.2f} s: {helps[name]}", seconds > WEAK_S))
-        return told
+            rows.append((name, f"for {seconds:.2f} s: {helps[name]}", seconds > WEAK_S))
+        return rows
 
     def findings(self) -> list[Finding]:
         """A finding for each fault."""
@@ -90,7 +90,7 @@ class ChargeWatch:
         self._reasons = dict.fromkeys(map(wire.Reason.Value, WEAK_REASONS), 0)
 
     def applied(self, records: Records) -> None:
-        """Take what the rig did, [blocks]."""
+        """Take the states applied by the rig, [blocks]."""
         if not len(records):
             return
         t_ns = records["t_ns"].astype(np.int64)

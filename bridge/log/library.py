@@ -1,4 +1,4 @@
-"""What every run log of this project begins with, for its writer and its reader alike."""
+"""The header of every run log of this project, for writer and reader alike."""
 
 import struct
 
@@ -6,14 +6,14 @@ from bridge.faults import Fault
 from bridge.wire.payloads import READABLE_VERSIONS, SCHEMA_VERSION
 
 MAGIC = b"\x89MCAP0\r\n"  # of every MCAP file, at its beginning and at its end
-HEAD = struct.Struct("<BQ")  # of every record: opcode, length of what follows
+HEAD = struct.Struct("<BQ")  # of every record: opcode, length of the content
 _OURS = "stickslip schema "
 LIBRARY = f"{_OURS}{SCHEMA_VERSION}"  # in the header of the file
 READABLE = tuple(f"{_OURS}{version}" for version in READABLE_VERSIONS)
 
 
 def refuse_other_version(path: object, library: str) -> None:
-    """Raise Fault BAD_LOG for a log that another version of this project wrote; another program's name says nothing."""
+    """Raise Fault BAD_LOG for a log of another schema version of this project; other programs' library names are accepted."""
     if library.startswith(_OURS) and library not in READABLE:
         known = " or ".join(map(repr, READABLE))
         line = f"{path}: written by {library!r}: must be {known}; take the version of stickslip that wrote it"

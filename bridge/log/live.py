@@ -1,4 +1,4 @@
-"""Whether a log is being recorded: its writer holds a lock on the file, which nobody else may then write or replace."""
+"""The lock of a log that is being recorded: other processes must neither write nor replace the file."""
 
 import fcntl
 from pathlib import Path
@@ -26,7 +26,7 @@ def refuse_a_live_log(path: Path, option: str) -> None:
         try:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
         except BlockingIOError:
-            line = f"{path}: is being recorded: must be closed before it is replaced, or what follows is lost"
+            line = f"{path}: is being recorded: must be closed before it is replaced, or the rest of the run is lost"
             raise Fault("LOG_WRITE", f"{line}; wait for the end of the run, or give another {option}") from None
         except OSError:  # a file system without locks
             return

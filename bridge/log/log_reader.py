@@ -21,7 +21,7 @@ from bridge.log.library import HEAD, MAGIC, READABLE, refuse_other_version
 from bridge.log.reading.chunk_bytes import (
     LARGEST_CHUNK_BYTES,
     UNREADABLE,
-    Record,
+    FileRecord,
     next_chunk,
     next_record,
     opened,
@@ -30,19 +30,19 @@ from bridge.log.reading.chunk_bytes import (
 from bridge.log.reading.definitions import Definitions
 from bridge.log.storage.parts import LOST, OF_FILES, parts_of
 
-# Uncompressed bytes of all chunks for a byte of the log, and what any log may have besides. Data that compress to nothing, as
-# zeros, still cost 16 bytes of index a message, so that not even a block of 200 samples of zeros reaches 200.
+# Largest ratio of uncompressed bytes to the size of the log, and an allowance for short logs. A message of zeros compresses to
+# nothing but still costs 16 bytes of index, so even a block of 200 zeros per channel stays below 200.
 _LARGEST_RATIO = 200
 _ANYWAY_BYTES = 1 << 24
 _FOOTER_BYTES = 20
-# of chunks that are taken apart at once; with less the calls cost more than the work, as a chunk of 0.1 s holds 0.1 MB
+# bytes of chunks parsed at once. Smaller: call overhead dominates, as a chunk of 0.1 s holds 0.1 MB
 AT_ONCE_BYTES = 1 << 19
 _DEFINITIONS = (Opcode.SCHEMA, Opcode.CHANNEL)
-_MOST_NAMES = 3  # of the schemas of another program's file that are told
+_MOST_NAMES = 3  # schemas of another program that a message lists
 
 
 class _Group(NamedTuple):
-    """Chunks, or messages outside of chunks, that a second thread takes apart."""
+    """Chunks, or messages outside of chunks, that a second thread parses."""
 
     apart: "Future[_Apart]"
     end_bytes: int  # place of their end in the file
@@ -51,12 +51,12 @@ class _Group(NamedTuple):
 class _Apart(NamedTuple):
     """The messages of a group."""
 
-    messages: Messages | None  # None where no chunk of it can be read
+    messages: Messages | None  # None if none of its chunks can be read
     bad_chunks: int
 
 
 class _Filling:
-    """The group that is read at present: chunks with their indexes, and messages outside of chunks."""
+    """The group being read: chunks with their indexes, and messages outside of chunks."""
 
     def __init__(self) -> None:
         self._parts: list[tuple[Chunk | bytes | None, list[bytes]]] = []
@@ -64,7 +64,7 @@ class _Filling:
         self.bytes = 0  # uncompressed, as the chunks claim
 
     def add_chunk(self, chunk: Chunk | None) -> list[bytes]:
-        """One more chunk; the list for its indexes, which follow it."""
+        """Add a chunk, and return the list for the indexes that follow it."""
         self._end_loose()
         indexes: list[bytes] = []
         self._parts.append((chunk, indexes))
@@ -72,7 +72,7 @@ class _Filling:
         return indexes
 
     def add_message(self, content: bytes) -> None:
-        """One more message outside of chunks."""
+        """Add a message outside of chunks."""
         self._loose.append(HEAD.pack(Opcode.MESSAGE, len(content)) + content)
         self.bytes += len(content) + HEAD.size
 
@@ -82,14 +82,14 @@ class _Filling:
             self._loose = []
 
     def taken(self, end_bytes: int, worker: ThreadPoolExecutor) -> _Group | None:
-        """Everything read so far, which is then forgotten; None where there is nothing."""
+        """Submit everything read so far to the worker; None if nothing was read."""
         self._end_loose()
         parts, self._parts, self.bytes = self._parts, [], 0
         return _Group(worker.submit(_taken_apart, parts), end_bytes) if parts else None
 
 
 def _taken_apart(parts: list[tuple[Chunk | bytes | None, list[bytes]]]) -> _Apart:
-    """The messages of a group; the chunks that are damaged are counted."""
+    """The messages of a group, and the number of its damaged chunks."""
     chunks: list[Chunked] = []
     for part, indexes in parts:
         data = part if isinstance(part, bytes) else unpacked(part)
@@ -97,7 +97,7 @@ def _taken_apart(parts: list[tuple[Chunk | bytes | None, list[bytes]]]) -> _Apar
             chunks.append(Chunked(data, indexes))
     messages = messages_of(chunks) if chunks else None
     for mine in messages.by_channel.values() if messages is not None else ():
-        _ = mine.stacked  # computed in this thread, as the caller has more to do
+        _ = mine.stacked  # computed here, because the caller's thread has more work
     return _Apart(messages, len(parts) - len(chunks))
 
 
@@ -107,7 +107,7 @@ class LogReader:
     Any MCAP file with topics of this project is a log, whichever program wrote it last.
 
     Args:
-        path: the first file; the files that go on from it are read too.
+        path: the first file; the files that continue it are read too.
         alone: read no other file.
 
     """
@@ -118,36 +118,36 @@ class LogReader:
         self.damage = Damage(0, 0, closed=False)
         self.header: Header | None = None
         self.metadata: dict[str, dict[str, str]] = {}
-        self.foreign: dict[str, int] = {}  # messages of topics of other programs, which are passed over
+        self.foreign: dict[str, int] = {}  # skipped messages in topics of other programs
         self.attachments: list[tuple[Path, int, int]] = []  # file, first byte and number of bytes of the content
         self.size_bytes = 0
         self.position_bytes = 0  # end of the part that was read
         self._definitions = Definitions(path)
         self._any_own = False
         self._claimed_bytes = 0  # uncompressed size of the chunks so far
-        self._stated: int | None = None  # messages of the present file by its own count
+        self._stated: int | None = None  # number of messages according to the file's statistics
 
     @property
     def schemas(self) -> dict[int, Schema]:
-        """The schemas of the file that is read at present, by their number."""
+        """The schemas of the file being read, by number."""
         return self._definitions.schemas
 
     @property
     def channels(self) -> dict[int, Channel]:
-        """The channels of the file that is read at present, by their number."""
+        """The channels of the file being read, by number."""
         return self._definitions.channels
 
     def count_bad_messages(self, count: int, why: str) -> None:
-        """Add `count` messages that are whole but not messages of their topic to the damage, and why the first of them is not."""
+        """Add `count` whole messages that do not fit their topic to the damage; `why` is the fault of the first."""
         if count:
             self.damage = self.damage.and_also(bad_records=count)._replace(first_bad=self.damage.first_bad or why)
 
     def topic(self, channel_id: int) -> str | None:
-        """The topic of a channel of this project; None where the channel is another program's, or its definition is lost."""
+        """The topic of a channel of this project; None if it belongs to another program, or its definition is lost."""
         return self._definitions.topic(channel_id) if self._definitions.find(channel_id) else None
 
     def pass_over(self, channel_id: int, messages: int) -> None:
-        """Count messages of a channel that has no topic."""
+        """Count messages of a channel without a topic of this project."""
         if self._definitions.find(channel_id):
             name = self.channels[channel_id].topic
             self.foreign[name] = self.foreign.get(name, 0) + messages
@@ -155,7 +155,7 @@ class LogReader:
             self.damage = self.damage.and_also(nameless=messages)
 
     def messages(self) -> Iterator[Messages]:
-        """The messages of one chunk after the other, of several small ones at once.
+        """The messages of the log, in groups of chunks.
 
         Raises Fault BAD_LOG when the file is not a run log.
         """
@@ -185,16 +185,16 @@ class LogReader:
         self._must_be_ours()
 
     def _begin(self, path: Path) -> None:
-        """Forget what held for the file before: each numbers its channels for itself."""
+        """Reset the state of the previous file: channel numbers are valid within one file only."""
         self._any_own |= self._definitions.any_own()
         self.damage = self.damage._replace(closed=False)
         self._definitions = Definitions(path)
         self._stated = None
 
     def _some_at_once(self, path: Path, size_bytes: int, before_bytes: int) -> Iterator[Messages]:
-        # A second thread takes a group apart while the caller works on the group before; with 2, 4 and 8 groups ahead no log is
-        # read faster, and 8 hold 13 MB more. Definitions wait in the same list, so that each holds for the messages after it.
-        ahead: list[_Group | Record] = []
+        # A second thread parses a group while the caller works on the previous group. With 2, 4 and 8 groups ahead no log is read
+        # faster, and 8 hold 13 MB more. Definitions wait in the same list, so that each applies to the messages after it.
+        ahead: list[_Group | FileRecord] = []
         with path.open("rb") as file, ThreadPoolExecutor(max_workers=1) as worker:
             for item in self._items(file, worker, size_bytes):
                 if isinstance(item, _Group):
@@ -205,9 +205,9 @@ class LogReader:
             for item in ahead:
                 yield from self._taken_in(item, before_bytes)
 
-    def _taken_in(self, item: _Group | Record, before_bytes: int) -> Iterator[Messages]:
-        """Learn a definition, or hand out the messages of a group."""
-        if isinstance(item, Record):
+    def _taken_in(self, item: _Group | FileRecord, before_bytes: int) -> Iterator[Messages]:
+        """Store a definition, or return the messages of a group."""
+        if isinstance(item, FileRecord):
             self._learn(item.opcode, item.content)
             return
         messages, bad_chunks = item.apart.result()
@@ -222,10 +222,10 @@ class LogReader:
                 self._learn(opcode, content)
         yield messages
 
-    def _items(self, file: IO[bytes], worker: ThreadPoolExecutor, size_bytes: int) -> Iterator[_Group | Record]:
+    def _items(self, file: IO[bytes], worker: ThreadPoolExecutor, size_bytes: int) -> Iterator[_Group | FileRecord]:
         """Groups of chunks, and the records between them, in file order."""
         if file.read(len(MAGIC)) != MAGIC:
-            line = f"{self.path}: {size_bytes} bytes, no MCAP file (its first 8 bytes say so); give a run log"
+            line = f"{self.path}: {size_bytes} bytes, no MCAP file (its first 8 bytes differ); give a run log"
             raise Fault("BAD_LOG", line)
         whole_bytes = len(MAGIC)
         filling = _Filling()
@@ -274,26 +274,26 @@ class LogReader:
             self.damage = self.damage.and_also(cut_bytes=size_bytes - whole_bytes)
 
     def _refuse_a_bomb(self, chunk: Chunk | None) -> None:
-        """Raise Fault BAD_LOG for chunks that claim more than a run of their size can hold; nothing was uncompressed then."""
+        """Raise Fault BAD_LOG for chunks that claim more data than a log of this size can hold, before any is uncompressed."""
         if chunk is None or not chunk.compression:
             return
         self._claimed_bytes += chunk.uncompressed_size
         most_bytes = _ANYWAY_BYTES + _LARGEST_RATIO * self.size_bytes
-        told = f"{self.path}: {self.size_bytes / 1e3:.0f} kB"
+        line = f"{self.path}: {self.size_bytes / 1e3:.0f} kB"
         if chunk.uncompressed_size > LARGEST_CHUNK_BYTES:
             rule = f"must be at most {LARGEST_CHUNK_BYTES / 1e6:.0f} MB"
-            told += f": holds a chunk of {chunk.uncompressed_size / 1e6:.0f} MB: {rule}"
+            line += f": holds a chunk of {chunk.uncompressed_size / 1e6:.0f} MB: {rule}"
         elif self._claimed_bytes > most_bytes:
             rule = f"must be at most {most_bytes / 1e6:.0f} MB for a log of its size"
-            told += f": would unpack to more than {self._claimed_bytes / 1e6:.0f} MB: {rule}"
+            line += f": would unpack to more than {self._claimed_bytes / 1e6:.0f} MB: {rule}"
         else:
             return
-        raise Fault("BAD_LOG", f"{told}; it was made to fill the memory or is damaged: do not trust it")
+        raise Fault("BAD_LOG", f"{line}; it was made to fill the memory or is damaged: do not trust it")
 
     def _must_be_ours(self) -> None:
         """Raise Fault BAD_LOG for a file without a topic of this project."""
         foreign = self._definitions.foreign_schemas()
-        # of a run that was cut before its first definition
+        # a run that was cut before its first definition
         began = self.header is not None and self.header.library in READABLE
         if self._any_own or (began and not foreign):
             return
@@ -306,14 +306,14 @@ class LogReader:
         raise Fault("BAD_LOG", f"{self.path}: {lost}; {why}")
 
     def _after_damage(self, file: IO[bytes], from_bytes: int, size_bytes: int) -> int | None:
-        """Start of the next whole chunk after bytes that cannot be read; None when there is none."""
+        """Start of the next whole chunk after bytes that cannot be read; None if no chunk follows."""
         start = next_chunk(file, from_bytes + 1, size_bytes)
         if start is not None:
             self.damage = self.damage.and_also(bad_records=1)
             return start
         if size_bytes - from_bytes > len(MAGIC):
             file.seek(size_bytes - len(MAGIC))
-            if file.read() == MAGIC:  # what is behind the damage has no chunk: the index, or messages without one
+            if file.read() == MAGIC:  # no chunk follows the damage, only the index or messages outside of chunks
                 self.damage = self.damage.and_also(bad_records=1)._replace(closed=True)
         return None
 

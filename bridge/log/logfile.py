@@ -19,7 +19,7 @@ from bridge.log.damage import Damage
 from bridge.log.log_reader import LogReader
 from bridge.log.metadata import configuration_of
 from bridge.log.reading.definitions import DERIVED
-from bridge.log.storage.chain import Chain
+from bridge.log.storage.chain import HashChain
 from bridge.log.storage.parts import chain_of_log, later_names
 from bridge.log.watches.arrays import median
 from bridge.wire import stickslip_pb2 as wire
@@ -31,7 +31,7 @@ STREAMING = ("sensors", "applied", "command", "trace", "state", "announce")
 _LAYOUTS = {"applied": APPLIED, "command": COMMAND, "trace": TRACE, "state": STATE, "announce": ANNOUNCE}
 _DEFAULT_SAMPLES = 20
 _COUNTED_BLOCKS = 100  # for their number of samples; a chunk of a run in real time holds as many
-_FIRST_BYTES = 1 << 26  # of the memory for a topic: that of a short run does not grow
+_FIRST_BYTES = 1 << 26  # initial memory for a topic; a short run never outgrows it
 
 
 class Piece(NamedTuple):
@@ -44,7 +44,7 @@ class Piece(NamedTuple):
 
 
 def iter_pieces(reader: LogReader, only: Container[str] | None = None) -> Iterator[Piece]:
-    """Every message of a log, chunk by chunk, in memory that does not grow with the log; none of what is there for viewers.
+    """Every message of a log, chunk by chunk, in constant memory; topics made for viewers are skipped.
 
     Bytes that are not a message of their topic are left out and counted in the reader's damage, messages of other programs in
     its `foreign`. With `only` other topics are skipped. Raises Fault BAD_LOG when the file is not a run log of this project.
@@ -78,11 +78,11 @@ def iter_pieces(reader: LogReader, only: Container[str] | None = None) -> Iterat
 
 def _samples(messages: Messages) -> int:
     """Samples of a channel in a sensor block: the most frequent number at the beginning, as single blocks may be wrong."""
-    found: Counter[int] = Counter()
+    sizes: Counter[int] = Counter()
     for payload in messages.payloads(_COUNTED_BLOCKS):
         with contextlib.suppress(Fault):
-            found[len(parsed(wire.SensorBlock, payload, "/sensors").drive_force_N) or _DEFAULT_SAMPLES] += 1
-    return found.most_common(1)[0][0] if found else _DEFAULT_SAMPLES
+            sizes[len(parsed(wire.SensorBlock, payload, "/sensors").drive_force_N) or _DEFAULT_SAMPLES] += 1
+    return sizes.most_common(1)[0][0] if sizes else _DEFAULT_SAMPLES
 
 
 def _stacked(messages: Messages, layout: Layout, topic: str) -> tuple[Bytes, npt.NDArray[np.int64], str]:
@@ -108,7 +108,7 @@ def _stacked(messages: Messages, layout: Layout, topic: str) -> tuple[Bytes, npt
 
 
 def _without_remedy(fault: Fault) -> str:
-    """The place and the rule of a fault: its remedy is that of a message on the bus."""
+    """The place and the rule of a fault. Its remedy concerns messages on the bus, so it is cut off."""
     return fault.line.partition("; ")[0]
 
 
@@ -130,7 +130,7 @@ def _readable(topic: str, payloads: list[bytes]) -> tuple[list[int], str]:
 def block_period_ns(sensors: Records) -> float:
     """Time between two sensor blocks [ns], from their numbers and times; 1 ms where these do not show it."""
     numbers, steps_ns = np.diff(sensors["sequence"].astype(np.int64)), np.diff(sensors["t_ns"])
-    forward = (numbers > 0) & (steps_ns > 0)  # a clock that stands shows no period
+    forward = (numbers > 0) & (steps_ns > 0)  # a stopped clock shows no period
     if forward.any():
         return median(steps_ns[forward] / numbers[forward])
     if len(sensors) and sensors["t_ns"][0] > 0:
@@ -159,7 +159,7 @@ class RunData(NamedTuple):
     events: list[wire.Event]
     headers: dict[str, dict[str, str]]  # by role: schema_version, configuration, versions
     damage: Damage
-    chain: Chain  # whether the bytes are those that were written
+    chain: HashChain  # whether the bytes are those that were written
     foreign: dict[str, int]  # messages of topics of other programs, which were passed over
 
     def configuration(self, role: str) -> dict[str, Any]:
@@ -200,19 +200,19 @@ class _Stack:
 def read_run(path: Path) -> RunData:
     """Read a log, whole or cut, all of its files, into memory. Raises Fault BAD_LOG when it is not a run log of this project."""
     check_log_file(path)
-    with ThreadPoolExecutor(max_workers=1) as beside:
-        chain = beside.submit(chain_of_log, path)
+    with ThreadPoolExecutor(max_workers=1) as worker:
+        chain = worker.submit(chain_of_log, path)
         return _read(LogReader(path), path, chain)
 
 
 def check_log_file(path: Path) -> None:
-    """Raise Fault BAD_LOG when `path` is no file; of a lost first file of a log it names the next."""
+    """Raise Fault BAD_LOG if `path` is not a file; if the first file of a log is lost, the message names the next file."""
     later = [] if os.path.lexists(path) else later_names(path)
-    there = f"{later[0].name} beside it seems to be a later part of that log; " if later else ""
-    check_file(path, "BAD_LOG", f"{there}give the path of a run log, .mcap")
+    other = f"{later[0].name} in the same folder seems to be a later part of that log; " if later else ""
+    check_file(path, "BAD_LOG", f"{other}give the path of a run log, .mcap")
 
 
-def _read(reader: LogReader, path: Path, chain: "Future[Chain]") -> RunData:
+def _read(reader: LogReader, path: Path, chain: "Future[HashChain]") -> RunData:
     # joined as bytes: numpy would join the fields of the records and drop the tags between them
     stored = {name: _Stack() for name in STREAMING}
     dtypes: dict[str, np.dtype[Any]] = {name: layout.dtype for name, layout in _LAYOUTS.items()}

@@ -1,10 +1,10 @@
 """Writing MCAP with the records of the library `mcap`, but with messages packed directly into their chunk.
 
-The library's Writer takes 5.5 us for a message, and a block has four messages: each takes a fifth of the time of a block in a
-lockstep run. A message that is packed in place takes 1 us. The tests read the files back with the library's readers.
+The library's Writer takes 5.5 us per message: with four messages per block, a fifth of the time of a block in a lockstep run.
+Packing a message in place takes 1 us. The tests read the files back with the library's readers.
 
-Each chunk is followed by a link of the hash chain (`chain`). The index of the chunks, some 170 bytes each, waits for the end of
-the file in a temporary file without a name: a run of days would fill the memory with it.
+Each chunk is followed by a link of the hash chain (`chain`). The index of the chunks, some 170 bytes each, is collected in an
+unnamed temporary file until the log ends: in memory it would grow without bound during a run of days.
 """
 
 import hashlib
@@ -35,7 +35,7 @@ from mcap.records import (
     SummaryOffset,
 )
 
-from bridge.log.block_rows import Rows
+from bridge.log.block_rows import MessageRows
 from bridge.log.library import MAGIC
 from bridge.log.storage.chain import link_record
 
@@ -43,8 +43,8 @@ _MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log ti
 _MESSAGE_FIELDS_BYTES = 22
 _INDEX_HEAD = struct.Struct("<BQHI")
 _INDEX_ENTRY = struct.Struct("<QQ")
-_INDEX_IN_MEMORY_BYTES = 1 << 16  # some 400 chunks; larger: more memory, smaller: short runs need a temporary file
-_COPIED_BYTES = 1 << 18  # of that file at once
+_INDEX_IN_MEMORY_BYTES = 1 << 16  # some 400 chunks. Larger: more memory; smaller: short runs need a temporary file
+_COPIED_BYTES = 1 << 18  # of the temporary file, copied at once
 
 
 class _Open(NamedTuple):
@@ -62,20 +62,20 @@ def _encoded(*records: McapRecord) -> bytes:
 
 
 class ChunkWriter:
-    """An MCAP file that is written to `stream`; each `flush` ends a chunk. Not thread safe. Methods raise OSError.
+    """An MCAP file written to `stream`; each `flush` ends a chunk. Not thread safe. Methods raise OSError.
 
     Args:
         stream: the file.
-        library: what the file says of who wrote it.
-        folder: for the temporary file of the index, on the disk of the log; that of the system if not given.
+        library: the program name in the header of the file.
+        folder: for the temporary file of the index, on the disk of the log; default: the system's folder.
 
-    `more` is asked with the bytes of each chunk that ends, and the entries of its index by channel, for messages to go with it.
+    `more` is called with the bytes of each chunk that ends and its index entries by channel; it may return messages to add.
 
     """
 
     def __init__(self, stream: IO[bytes], library: str, folder: Path | None = None) -> None:
         self._stream = stream
-        self._hash = hashlib.sha256()  # of what follows the last link, begun with that link
+        self._hash = hashlib.sha256()  # of the bytes after the last link, starting with that link
         self._whole_hash = self._hash.copy()
         self._whole_links = self.links = 0
         self.first_link = self.last_link = ""  # SHA-256, hexadecimal
@@ -84,7 +84,7 @@ class ChunkWriter:
         self._chunks = 0
         self._unsure = 0
         self._compress = zstandard.ZstdCompressor(level=1).compress
-        self.more: Callable[[bytes, dict[int, list[bytes]]], Rows | None] | None = None
+        self.more: Callable[[bytes, dict[int, list[bytes]]], MessageRows | None] | None = None
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
         self._metadata_indexes: list[MetadataIndex] = []
@@ -161,7 +161,7 @@ class ChunkWriter:
             self._chunk_first_ns = log_time_ns
         self._offset += len(head) + len(payload)
 
-    def add_rows(self, rows: Rows) -> None:
+    def add_rows(self, rows: MessageRows) -> None:
         """Put the messages of many blocks into the open chunk."""
         chunk = self._chunk
         for channel_id, entries in rows.entries.items():
@@ -182,12 +182,12 @@ class ChunkWriter:
 
     @property
     def unsure_messages(self) -> int:
-        """Number of messages that have not reached the file, those of the open chunk among them."""
+        """Number of messages that have not reached the file, including the open chunk."""
         opened = sum(sum(map(len, entries)) for entries in self._chunk.entries.values()) // _INDEX_ENTRY.size
         return self._unsure + opened
 
     def flush(self) -> None:
-        """Close the open chunk, write it with its index, and hand everything to the operating system."""
+        """Close the open chunk, write it with its index, and pass everything to the operating system."""
         if self._offset:
             data = b"".join(self._chunk.parts)
             more = self.more and self.more(data, self._chunk.entries)
@@ -243,23 +243,23 @@ class ChunkWriter:
         self._index.write(record)
 
     def take_open(self) -> tuple["_Open", int, int, int]:
-        """Take the open chunk away, for `put_open` of the writer of another file with the same channels."""
+        """Remove the open chunk and return it, for `put_open` of the writer of another file with the same channels."""
         taken = self._chunk, self._offset, self._chunk_first_ns, self._chunk_last_ns
         self._chunk, self._offset = _Open([], {}), 0
         return taken
 
     def put_open(self, taken: tuple["_Open", int, int, int]) -> None:
-        """Go on with a chunk that another writer began; this one must have none."""
+        """Continue with the open chunk of another writer; this writer must have no open chunk."""
         self._chunk, self._offset, self._chunk_first_ns, self._chunk_last_ns = taken
 
     def note_whole(self) -> None:
-        """Remember that all so far has reached the file: `give_up` closes the file from here."""
+        """Note that everything so far has reached the file: `give_up` continues from here."""
         self._whole_hash = self._hash.copy()
         self._whole_links = self.links
         self._unsure = 0
 
     def give_up(self, stream: IO[bytes]) -> None:
-        """Go on in `stream`, the same file cut back to where `note_whole` was called last; what was not written is left out."""
+        """Continue in `stream`, the same file cut back to the last `note_whole`; later messages are dropped."""
         self._stream = stream
         self._hash = self._whole_hash.copy()
         self.links = self._whole_links

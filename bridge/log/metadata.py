@@ -1,4 +1,4 @@
-"""What the processes of a run say of themselves in its log: JSON that another program, or damage, may have made anything."""
+"""Configurations and versions that the processes of a run wrote into its log: JSON that may be damaged or altered."""
 
 import json
 import math
@@ -12,26 +12,26 @@ Metadata = Mapping[str, Mapping[str, str]]  # of a log: its tables by name, each
 
 
 def table_of(metadata: Metadata, name: str, key: str, path: Path) -> dict[str, Any]:
-    """The JSON object under `key` of the table `name`. Raises Fault BAD_LOG when there is none."""
+    """The JSON object under `key` of the table `name`. Raises Fault BAD_LOG for a log without it."""
     text = metadata.get(name, {}).get(key)
     if text is None:
         line = (
-            f"{path}: holds no {key} of the {name}; it was not there when it was recorded, or a tool left it out since"
+            f"{path}: holds no {key} of the {name}; it was not written during the recording, or a tool removed it later"
         )
         if "import" in metadata:
-            line = f"{path}: is measured data of another program, imported, without a {name}: there is no run to judge"
+            line = f"{path}: is imported data of another program, without a {name}: it holds no run to judge"
         reads = "`log info`, `log check`, `log export`, `plot`" if "import" in metadata else "`log check`, `log export`"
         remedy = f"{reads} and `look` read it, and `diagnose` in an evidence folder"
         raise Fault("BAD_LOG", f"{line}; {remedy}")
     table = _parsed(text, f"{path}: the {key} of the {name}")
     if not isinstance(table, dict):
-        line = f"{path}: the {key} of the {name} is no table: must be a JSON object"
+        line = f"{path}: the {key} of the {name}: must be a JSON object"
         raise Fault("BAD_LOG", f"{line}; take another copy of the log")
     return table
 
 
 def texts_of(metadata: Metadata, name: str, key: str, path: Path) -> list[str]:
-    """The JSON list of texts under `key` of the table `name`, empty when it is not there. Raises Fault BAD_LOG."""
+    """The JSON list of texts under `key` of the table `name`, empty if absent. Raises Fault BAD_LOG."""
     where = f"{path}: the {key} of the {name}"
     values = _parsed(metadata.get(name, {}).get(key, "[]"), where)
     if not isinstance(values, list) or not all(isinstance(value, str) for value in values):
@@ -40,7 +40,7 @@ def texts_of(metadata: Metadata, name: str, key: str, path: Path) -> list[str]:
 
 
 def source_of_import(metadata: Metadata, path: Path) -> str:
-    """The file of another program that a log was made from; empty for the log of a run. Raises Fault BAD_LOG."""
+    """The source file of an imported log; empty for the log of a run. Raises Fault BAD_LOG."""
     if "import" not in metadata:
         return ""
     source = _parsed(metadata["import"].get("source", '"another program"'), f"{path}: the source of the import")
@@ -51,7 +51,7 @@ def _parsed(text: str, where: str) -> Any:
     try:
         return json.loads(text)
     except (ValueError, RecursionError):  # also Python's own limits: integers of 4300 digits, brackets 1000 deep
-        raise Fault("BAD_LOG", f"{where} is damaged, no JSON; take another copy of the log") from None
+        raise Fault("BAD_LOG", f"{where} is damaged, not JSON; take another copy of the log") from None
 
 
 def configuration_of(metadata: Metadata, role: str, path: Path) -> dict[str, Any]:

@@ -10,16 +10,16 @@ from bridge.wire.pauses import Pause, PauseWatch
 from bridge.wire.topics import APPLIED
 from bridge.wire.zenoh_link import Received
 
-_LOOK_S = 0.1  # between two looks at the timers; what a PAUSE on the bus comes late by
-_EVERY = 10  # of so many messages of the plant one tells the time: 100 a second are enough for a clock
-_WINDOW_NS = 1_000_000_000  # a clock of another computer drifts by some 0.05 ms in it
+_LOOK_S = 0.1  # between two polls of the timers: the delay of a PAUSE on the bus
+_EVERY = 10  # the clock is set by every tenth message of the plant: 100 a second are enough
+_WINDOW_NS = 1_000_000_000  # in which the clock of another computer drifts by some 0.05 ms
 
 
 class RunClock:
-    """The time of the run as this computer's clock tells it.
+    """The time of the run on this computer's clock.
 
-    A message comes later than it was due, never sooner: of the last one to two seconds the soonest counts. It was under way
-    for some 0.1 to 0.2 ms, by which the time of the run is told too early.
+    A message arrives late, never early, so the earliest of the last one to two seconds counts. It travels for some 0.1 to 0.2 ms;
+    the time of the run is too early by that much.
     """
 
     def __init__(self) -> None:
@@ -28,7 +28,7 @@ class RunClock:
         self._until_ns = 0
 
     def note(self, arrival_ns: int, due_ns: int) -> None:
-        """A message that was due at `due_ns` of the run came at `arrival_ns` of time.perf_counter_ns."""
+        """Note a message that was due at `due_ns` of the run and arrived at `arrival_ns` of time.perf_counter_ns."""
         began_ns = arrival_ns - due_ns
         if arrival_ns >= self._until_ns:
             self._until_ns, self._before, self._soonest = arrival_ns + _WINDOW_NS, self._soonest, None
@@ -41,7 +41,7 @@ class RunClock:
 
 
 class PauseWriter:
-    """Writes the pauses that a watch sees into a log.
+    """Writes the stalls reported by a watch into a log.
 
     Args:
         log: the log, which sends its events on the bus.
@@ -61,25 +61,25 @@ class PauseWriter:
             log.add_event(WATCH, text, holds=True)
 
     def note(self, received: Received) -> None:
-        """Set the clock after a message of the plant, and tell of pauses where it is time to look."""
+        """Set the clock by a message of the plant, and write new stalls if a poll is due."""
         if received.topic is APPLIED:
             if self._heard % _EVERY == 0:
                 applied = APPLIED_LAYOUT.read(received.payload, APPLIED.name)[0]
                 self._clock.note(received.arrival_ns, int(applied.t_ns) + int(applied.late_ns))
             self._heard += 1
-        self.tell_when_due()
+        self.report_when_due()
 
-    def tell_when_due(self) -> None:
-        """Tell of pauses where it is time to look."""
+    def report_when_due(self) -> None:
+        """Poll the timers if due, and write new stalls."""
         if time.monotonic() > self._due_s:
             self._due_s = time.monotonic() + _LOOK_S
-            self._tell_all(self._watch.poll())
+            self._write_all(self._watch.poll())
 
     def finish(self) -> None:
-        """Tell of the last pauses."""
-        self._tell_all(self._watch.poll(all_of_them=True))
+        """Write the last stalls."""
+        self._write_all(self._watch.poll(all_of_them=True))
 
-    def _tell_all(self, pauses: list[Pause]) -> None:
+    def _write_all(self, pauses: list[Pause]) -> None:
         for pause in pauses:
             from_ns = self._clock.run_ns(pause.from_ns)
             if from_ns is not None and from_ns >= 0:

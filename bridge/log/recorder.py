@@ -21,19 +21,19 @@ from bridge.wire.payloads import SCHEMA_VERSION, parsed, refuse_other_schema
 from bridge.wire.topics import CONTROLLER_EVENT, PLANT_EVENT, RECORDER_EVENT, TOPICS
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
 
-_INBOX_LIMIT = 1 << 16  # messages, 15 s of a run at 4100 messages/s; smaller loses messages while the disk is busy
-_QUIET_S = 0.3  # silence after the last END from which no message is under way
+_INBOX_LIMIT = 1 << 16  # messages, 16 s of a run at 4100 messages/s; smaller: messages are lost while the disk is busy
+_QUIET_S = 0.3  # silence after the last END from which no message can still arrive
 _PLANT_LOST_S = 1.0  # silence from which a plant that left the bus counts as lost
-_GIVEN_UP_S = 30.0  # without a rig the recording ends then
-_LOOK_S = 0.05  # longest wait for a message; what a stop and the age of a chunk can be late by
-_STOP_S = 3.0  # longest recording after a stop; the plant fades out within 1 s, and a rig may never end
-# Between two turns of Python's threads while both have work; 5 ms by default. After a slow disk the loop works off what waits:
-# with 5 ms the thread that receives takes 200 messages a second of the 4100 that come, and the rig's link drops the others.
+_GIVEN_UP_S = 30.0  # wait for a lost rig; the recording then ends
+_LOOK_S = 0.05  # longest wait for a message: the delay of a stop and of the end of a chunk
+_STOP_S = 3.0  # longest recording after a stop; the plant fades out within 1 s, but a foreign rig may never end
+# Switch interval of Python's threads while both have work; the default is 5 ms. After a slow disk the loop works off its backlog:
+# with 5 ms the receiving thread takes only 200 of the 4100 messages per second, and the rig's link drops the others.
 _SWITCH_S = 5e-5
-_TOLD_S = 1.0  # between two words about messages that did not fit into the inbox
+_REPORT_S = 1.0  # between two reports of messages that did not fit into the inbox
 _ALOUD = frozenset(
     {"LOG_LOST", "LOG_REPLACED", "LOG_WRITE", "DISK_SLOW", "DROPPED"}
-)  # events that a person must see at once
+)  # events that are also printed for the operator
 
 
 def run(
@@ -58,10 +58,10 @@ def run(
         stop: ends the recording.
         ready: called when the roles have answered, before the log is begun.
         rotation: when the log goes on in a new file.
-        say: tells of the life of this process, for a person.
+        say: reports the state of this process to the operator.
 
-    Raises Fault NO_PEER, NOT_SECURE, PEER_DIED, BAD_MESSAGE for a header of a schema version that is not known, LOG_WRITE,
-    LOG_LOST; the last two at the end, in real time, as the run goes on meanwhile.
+    Raises Fault NO_PEER, NOT_SECURE, PEER_DIED, BAD_MESSAGE for a header of an unknown schema version, LOG_WRITE, LOG_LOST. In
+    real time the last two are raised at the end, as the run continues.
 
     """
     sys.setswitchinterval(_SWITCH_S)
@@ -71,38 +71,38 @@ def run(
         for topic in TOPICS:
             if topic.logged and topic.sender != "recorder":
                 bus.listen(topic, inbox.push)
-        say("waiting", f"for what {' and '.join(roles)} say of themselves, at most {bus_config.wait_s:g} s")
+        say("waiting", f"for the headers of {' and '.join(roles)}, at most {bus_config.wait_s:g} s")
         headers = bus.headers(roles, bus_config.wait_s, stop)
-        say("joined", " and ".join(headers) or "nobody said anything of itself")
+        say("joined", " and ".join(headers) or "no process sent a header")
         for header in headers.values():
             refuse_other_schema(header)
         ready()
         bus.serve_header(wire.Header(role="recorder", schema_version=SCHEMA_VERSION))
         send = bus.publisher(RECORDER_EVENT)
 
-        def tell(event: wire.Event) -> None:
+        def on_event(event: wire.Event) -> None:
             send(event.SerializeToString())
             if event.code in _ALOUD:
                 print(f"stickslip: warning: {event.code}: {event.text}", file=sys.stderr, flush=True)
 
-        log = RunLog(path, lockstep, rotation, patient=not lockstep, on_event=tell)
+        log = RunLog(path, lockstep, rotation, patient=not lockstep, on_event=on_event)
         log.add_metadata("run", about)
         for role in sorted(headers):
             log.add_header(headers[role])
         with contextlib.ExitStack() as ending:
             pauses = None
             send = bus.publisher(RECORDER_EVENT)
-            if lockstep:  # beside plant and controller
+            if lockstep:  # runs with plant and controller
                 realtime.claim(realtime.core(bus_config.port + 1), realtime.LOCKSTEP_PRIORITY)
             else:
                 realtime.claim(None, realtime.RECORDER_PRIORITY)
                 watch = ending.enter_context(contextlib.closing(PauseWatch()))
                 pauses = PauseWriter(log, watch)
             bus.announce()
-            say("running", f"all that is said from now on goes into {path}")
+            say("running", f"recording all messages into {path}")
             complaints = Complaints(log.add_event)
             lost_plant = _record(log, bus, inbox, stop, pauses, complaints)
-            complaints.tell_when_due(all_of_it=True)
+            complaints.report_when_due(all_of_it=True)
             if pauses is not None:
                 pauses.finish()
         log.close()
@@ -110,7 +110,7 @@ def run(
             "ended", "stopped" if stop.is_set() else "with the rig" if not lost_plant else "the rig left without an END"
         )
     if lost_plant:
-        raise Fault("PEER_DIED", f"the plant went away before its end; {path} was closed with all that came")
+        raise Fault("PEER_DIED", f"the plant went away before its end; {path} was closed with every message received")
 
 
 def _record(
@@ -119,7 +119,7 @@ def _record(
     """Write until plant and controller have ended. Returns whether the plant left the bus without an END."""
     dropped = _Dropped(log, inbox)
     lost_plant = _until_the_end(log, bus, inbox, stop, pauses, dropped, complaints)
-    dropped.tell(at_once=True)
+    dropped.report(at_once=True)
     return lost_plant
 
 
@@ -140,7 +140,7 @@ def _until_the_end(
     while True:
         if stop.is_set():
             until_s = min(until_s, time.monotonic() + _STOP_S)
-        dropped.tell()
+        dropped.report()
         if time.monotonic() > until_s:
             return False
         asked_s = time.monotonic()
@@ -149,35 +149,35 @@ def _until_the_end(
         if passed or realtime.was_paused(asked_s, asked_s + _LOOK_S):
             heard_s = time.monotonic()
         if passed:
-            for one in passed:
+            for message in passed:
                 try:
-                    log.write(one.topic, one.payload)
+                    log.write(message.topic, message.payload)
                     if pauses is not None:
-                        pauses.note(one)
-                    if one.topic in {PLANT_EVENT, CONTROLLER_EVENT}:
-                        event = parsed(wire.Event, one.payload, one.topic.name)
+                        pauses.note(message)
+                    if message.topic in {PLANT_EVENT, CONTROLLER_EVENT}:
+                        event = parsed(wire.Event, message.payload, message.topic.name)
                         if event.code == "END":
-                            ended.add(one.topic.sender)
+                            ended.add(message.topic.sender)
                 except Fault as fault:
                     if fault.kind.code != "BAD_MESSAGE":
                         raise
-                    screen.unreadable(one, fault)  # a wrong message of one client must not end the recording
-            complaints.tell_when_due()
+                    screen.unreadable(message, fault)  # a wrong message of one client must not end the recording
+            complaints.report_when_due()
             continue
         log.flush_when_due()
         if pauses is not None:
-            pauses.tell_when_due()
+            pauses.report_when_due()
         quiet_s = time.monotonic() - heard_s
         if stop.is_set() and quiet_s > _QUIET_S:
             return False
-        complaints.tell_when_due()
-        there = bus.alive("plant")
-        # an END of a rig that stays is a stranger's
-        if "plant" in ended and not there and ("controller" in ended or quiet_s > _QUIET_S):
+        complaints.report_when_due()
+        present = bus.alive("plant")
+        # an END is ignored while the rig is on the bus: it may be forged
+        if "plant" in ended and not present and ("controller" in ended or quiet_s > _QUIET_S):
             return False
-        seen = seen or there
-        if there or not seen or quiet_s < _PLANT_LOST_S:
-            lost = lost and not there
+        seen = seen or present
+        if present or not seen or quiet_s < _PLANT_LOST_S:
+            lost = lost and not present
         elif not lost:
             lost = True
             why = "the plant left the bus before its end" if bus.linked() else "the link to the plant is down"
@@ -187,16 +187,16 @@ def _until_the_end(
 
 
 class _Dropped:
-    """Tells of messages that did not fit into the inbox, once a second at most."""
+    """Reports messages that did not fit into the inbox, at most once a second."""
 
     def __init__(self, log: RunLog, inbox: Inbox) -> None:
         self._log, self._inbox = log, inbox
-        self._told = 0
+        self._reported = 0
         self._due_s = 0.0
 
-    def tell(self, at_once: bool = False) -> None:
-        new = self._inbox.dropped - self._told
+    def report(self, at_once: bool = False) -> None:
+        new = self._inbox.dropped - self._reported
         if new and (at_once or time.monotonic() > self._due_s):
-            self._due_s = time.monotonic() + _TOLD_S
-            self._told += new
+            self._due_s = time.monotonic() + _REPORT_S
+            self._reported += new
             self._log.add_event("DROPPED", f"{new} messages: the recorder was too slow")

@@ -1,4 +1,4 @@
-"""A cut or damaged log made whole: every message that can be read, in a new file with an index."""
+"""Recovery of a cut or damaged log: every readable message, in a new file with an index."""
 
 import json
 from pathlib import Path
@@ -31,25 +31,25 @@ class _Copy:
         self.reader = reader
         self.messages = 0
         self.nameless = 0
-        said = None if merged else part_of(reader.path)
-        begins = said.begins if said else ""
+        place = None if merged else part_of(reader.path)
+        begins = place.begins if place else ""
         writer.add_metadata(RECOVERED, {"from": reader.path.name, "begins": begins})
-        if said and said.number:
-            place = {"number": said.number, "begins": begins, "follows": said.follows}
-            writer.add_metadata(PART, {key: json.dumps(value) for key, value in place.items()})
+        if place and place.number:
+            fields = {"number": place.number, "begins": begins, "follows": place.follows}
+            writer.add_metadata(PART, {key: json.dumps(value) for key, value in fields.items()})
         self._schema_ids: dict[tuple[str, str, bytes], int] = {}
         self._channel_ids: dict[tuple[str, str, int, tuple[tuple[str, str], ...]], int] = {}
         self._kept: set[str] = set()
 
     def take_metadata(self) -> None:
-        """Tables that are new."""
+        """Write the tables that are new."""
         for name, fields in self.reader.metadata.items():
             if name not in self._kept:
                 self.writer.add_metadata(name, fields)
                 self._kept.add(name)
 
     def _take_schema(self, schema_id: int) -> int:
-        """Define a schema in the new log, and return its number there; 0, as in the old one, for no schema."""
+        """Define a schema in the new log, and return its new number; 0, as in the old log, for no schema."""
         schema = self.reader.schemas.get(schema_id)
         if schema is None:
             return 0
@@ -59,8 +59,8 @@ class _Copy:
         return self._schema_ids[key]
 
     def take_channel(self, channel_id: int) -> int | None:
-        """Define a channel in the new log as it is in the old one, and return its number there; None where that is lost."""
-        self.reader.topic(channel_id)  # looks for a definition that is missing
+        """Define a channel of the old log in the new log, and return its new number; None if its definition is lost."""
+        self.reader.topic(channel_id)  # searches for a missing definition
         channel = self.reader.channels.get(channel_id)
         if channel is None:
             return None
@@ -71,7 +71,7 @@ class _Copy:
         return self._channel_ids[key]
 
     def take(self, messages: Messages) -> None:
-        """Messages and what defines them. Those of a channel without a definition have no topic, and are counted as lost."""
+        """Write messages and their definitions. Messages of a channel without a definition have no topic; they count as lost."""
         self.take_metadata()
         ids = {
             channel_id: self.take_channel(channel_id) for channel_id in {*self.reader.channels, *messages.by_channel}
@@ -86,8 +86,8 @@ class _Copy:
                 self.messages += 1
         self.writer.flush()
 
-    def tell_lost(self) -> None:
-        """Write what is lost into the new log: it looks whole, and nobody could know later."""
+    def record_losses(self) -> None:
+        """Record the losses in the new log, which looks whole: they could not be known later."""
         damage = self.damage()
         if words := lost_in_words(damage):
             damage = also_before(damage, f"{self.reader.path.name}: {words}")
@@ -95,15 +95,14 @@ class _Copy:
             self.writer.add_metadata(LOST, {"what": damage.before})
 
     def damage(self) -> Damage:
-        """What is not in the new log."""
+        """The losses of the new log."""
         return self.reader.damage.and_also(nameless=self.nameless)
 
 
 def recover(path: Path, out: Path) -> Recovered:
-    """Write every readable message of a log to `out`, with an index, under the topics that its definitions give them.
+    """Write every readable message of a log to `out`, with an index, in the topics given by its definitions.
 
-    `out` may be `path`: then each file of a log of several that is cut or damaged is made whole in its place. Else all of them
-    become one.
+    If `out` is `path`, each cut or damaged file of the log is recovered in its place. Otherwise all files are merged into one.
 
     Raises Fault BAD_LOG when nothing can be read, LOG_WRITE when `out` cannot be written or is being recorded.
     """
@@ -116,19 +115,19 @@ def recover(path: Path, out: Path) -> Recovered:
         return _saved(LogReader(path), out, merged=False)
     saved = [_saved(LogReader(part, alone=True), part, merged=False, only_damaged=True) for part in parts]
     damage = Damage(
-        sum(one.damage.cut_bytes for one in saved),
-        sum(one.damage.bad_chunks for one in saved),
-        all(one.damage.closed for one in saved),
-        sum(one.damage.bad_records for one in saved),
-        sum(one.damage.nameless for one in saved),
-        sum(one.damage.missing for one in saved),
-        "; ".join(one.damage.before for one in saved if one.damage.before),
+        sum(part.damage.cut_bytes for part in saved),
+        sum(part.damage.bad_chunks for part in saved),
+        all(part.damage.closed for part in saved),
+        sum(part.damage.bad_records for part in saved),
+        sum(part.damage.nameless for part in saved),
+        sum(part.damage.missing for part in saved),
+        "; ".join(part.damage.before for part in saved if part.damage.before),
     )
-    return Recovered(sum(one.messages for one in saved), damage, sum(one.attachments for one in saved))
+    return Recovered(sum(part.messages for part in saved), damage, sum(part.attachments for part in saved))
 
 
 def _saved(reader: LogReader, out: Path, merged: bool, only_damaged: bool = False) -> Recovered:
-    """Write every readable message to `out`; with `only_damaged` nothing where all can be read."""
+    """Write every readable message to `out`; with `only_damaged` only if something cannot be read."""
     refuse_a_live_log(out, "--out")
     try:
         new = Replacement(out)
@@ -137,10 +136,10 @@ def _saved(reader: LogReader, out: Path, merged: bool, only_damaged: bool = Fals
             for chunk in reader.messages():
                 copy.take(chunk)
             copy.take_metadata()
-            copy.tell_lost()
+            copy.record_losses()
             copy.writer.finish()
             if not copy.messages and not only_damaged:
-                line = f"{reader.path}: holds no message that can be read, so nothing can be saved; the file stays as it is"
+                line = f"{reader.path}: holds no readable message, so nothing can be saved; the file is unchanged"
                 raise Fault("BAD_LOG", line)
             if not only_damaged or (copy.messages and not reader.damage.whole):
                 new.finish()

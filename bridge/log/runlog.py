@@ -1,4 +1,4 @@
-"""Writing a run log: MCAP with schemas, in chunks of 0.1 s, so that a kill loses little; in as many files as it takes."""
+"""Writing a run log: MCAP with schemas, in chunks of 0.1 s, so that a kill loses little; in one file or several."""
 
 import contextlib
 import json
@@ -11,7 +11,7 @@ from bridge.faults import Fault
 from bridge.log.block_rows import rows
 from bridge.log.mcap_chunks import ChunkWriter
 from bridge.log.storage.afterwards import file_end
-from bridge.log.storage.chain import Chain
+from bridge.log.storage.chain import HashChain
 from bridge.log.storage.log_files import LogFiles, Rotation
 from bridge.log.storage.parts import PART, parts_of
 from bridge.log.viewers import foxglove_log
@@ -21,23 +21,23 @@ from bridge.wire.messages import Records
 from bridge.wire.payloads import file_descriptor_set, parsed, sequence_and_time
 from bridge.wire.topics import RECORDER_EVENT, SCOPE, TOPICS, Topic
 
-# Duration of a chunk. Longer: a kill loses more (it loses the open chunk, at most 0.25 s). Shorter: larger files.
+# Duration of a chunk. Longer: a kill loses more (at most the open chunk, 0.25 s). Shorter: larger files.
 FLUSH_PERIOD_S = 0.1
 LARGEST_CHUNK_BYTES = 1 << 20  # ends a chunk earlier; lockstep may fill more than this in 0.1 s
-_LATEST_MESSAGES = 256  # largest lag of a delayed message, in numbers; a larger lag means that the sender restarted
+_LATEST_MESSAGES = 256  # largest delay of a message, in numbers; a larger step back means that the sender restarted
 NO_ROTATION = Rotation()
 
 
 class RunLog:
-    """One log that is being written. Not thread safe: one thread owns it. Raises Fault LOG_WRITE.
+    """A log that is being written. Not thread safe: one thread owns it. Raises Fault LOG_WRITE.
 
-    Where its file was taken away or the disk is full, it goes on in a new file as soon as it can; `close` then raises the fault.
+    If its file is taken away or the disk is full, it continues in a new file as soon as possible; `close` then raises the fault.
 
     Args:
         path: the first file; its folder is made.
         lockstep: log times are simulated times, so that the same run gives the same bytes.
         rotation: when to go on in a new file.
-        patient: a full disk is no end: the log waits for room, and counts what is not recorded.
+        patient: a full disk does not end the log: it waits for space, and counts the messages lost until then.
         on_event: called with every event of the recorder.
 
     """
@@ -56,20 +56,20 @@ class RunLog:
         self._on_event = on_event
         self._next: dict[str, int] = {}
         self._events = 0
-        self._holding: dict[str, str] = {}  # texts of events that hold for the whole log, by code
+        self._holding: dict[str, str] = {}  # texts of events that are valid for the whole log, by code
         self._due_s = time.monotonic() + FLUSH_PERIOD_S
         self._scope = ScopeMaker()
-        self._tables: dict[str, dict[str, str]] = {}  # of metadata, which every file has
+        self._tables: dict[str, dict[str, str]] = {}  # metadata, repeated in every file
         self._channels: dict[str, int] = {}
         old = parts_of(path)[1:] if path.is_file() else []
         self._files = LogFiles(path, self, rotation, patient)
-        for part in old:  # of the log that is replaced
+        for part in old:  # of the replaced log
             with contextlib.suppress(OSError):
                 part.unlink()
         self._files.begin()
 
     def begin(self, writer: ChunkWriter, number: int, begins: str, follows: str) -> None:
-        """Write what a file of the log begins with."""
+        """Write the beginning of a file of the log: schemas, channels, place in the log, tables."""
         schemas: dict[str, int] = {}
         for topic in (*TOPICS, SCOPE):
             if topic.logged:
@@ -79,9 +79,9 @@ class RunLog:
                 self._channels[topic.name] = writer.add_channel(
                     "/" + topic.name, "protobuf", schemas[name], {"rate_Hz": f"{topic.rate_Hz:g}"}
                 )
-        said = writer.add_schema(foxglove_log.SCHEMA, "protobuf", foxglove_log.FILES.SerializeToString())
+        schema_id = writer.add_schema(foxglove_log.SCHEMA, "protobuf", foxglove_log.FILES.SerializeToString())
         name = foxglove_log.TOPIC
-        self._channels[name] = writer.add_channel("/" + name, "protobuf", said, {"rate_Hz": "0"})
+        self._channels[name] = writer.add_channel("/" + name, "protobuf", schema_id, {"rate_Hz": "0"})
         writer.more = lambda data, entries: self._scope.of_chunk(data, entries, self._channels)
         if number:
             place = {"number": number, "begins": begins, "follows": follows}
@@ -94,10 +94,10 @@ class RunLog:
         """The metadata of the log so far, by name."""
         return self._tables
 
-    def chain(self) -> Chain:
-        """The hash chain of the closed log, known from writing; only the last bytes are read back."""
+    def chain(self) -> HashChain:
+        """The hash chain of the closed log, known from writing; only the end of the file is read back."""
         files = self._files
-        return Chain(files.links, files.begins, files.last_link, [], 0, True, file_end(self.path), True)
+        return HashChain(files.links, files.begins, files.last_link, [], 0, True, file_end(self.path), True)
 
     def add_header(self, header: wire.Header) -> None:
         """Write the configuration and versions of one process, so that a run can be repeated from its log alone."""
@@ -126,7 +126,7 @@ class RunLog:
         if sequence > expected:
             self.add_event("GAP", f"/{topic.name}: {sequence - expected} lost before {sequence}", t_ns)
         if sequence + _LATEST_MESSAGES < expected:
-            self.add_event("RESTART", f"/{topic.name}: {sequence} after {expected - 1}: its sender began anew", t_ns)
+            self.add_event("RESTART", f"/{topic.name}: {sequence} after {expected - 1}: its sender restarted", t_ns)
             expected = 0
         if sequence >= expected:
             expected = sequence + 1
@@ -138,11 +138,11 @@ class RunLog:
         self.flush_when_due()
 
     def write_blocks(self, each: Mapping[Topic, Records], after: Mapping[Topic, Records]) -> None:
-        """Write the messages of blocks of a lockstep run, which follow one another without a gap.
+        """Write the messages of consecutive blocks of a lockstep run.
 
         Args:
-            each: topics with one message a block, [blocks].
-            after: topics with one message after every so many blocks, [blocks / so many]; may be empty.
+            each: topics with one message per block, [blocks].
+            after: topics with one message after every n blocks, [blocks / n]; may be empty.
 
         """
         by_channel = [{self._channels[topic.name]: table for topic, table in part.items()} for part in (each, after)]
@@ -152,7 +152,7 @@ class RunLog:
             writer.add_rows(made)
 
     def flush(self) -> None:
-        """End the open chunk, look after the file, and go on in a new one where that is due. Raises Fault LOG_WRITE."""
+        """End the open chunk, check the file, and start a new file if due. Raises Fault LOG_WRITE."""
         self._files.guarded(ChunkWriter.flush)
         self._files.look_after()
 
@@ -165,9 +165,9 @@ class RunLog:
             self.flush()
 
     def add_event(self, code: str, text: str, t_ns: int | None = None, holds: bool = False) -> wire.Event:
-        """Write an event of the recorder, and return it; its time is `t_ns`, or that of the latest message.
+        """Write an event of the recorder, and return it; its time is `t_ns`, or the time of the latest message.
 
-        `holds`: for the whole log, so that it is said again where the file that begins with it was taken away.
+        `holds`: the event is valid for the whole log; it is repeated if the first file is taken away.
         """
         if holds:
             self._holding[code] = text
@@ -180,8 +180,8 @@ class RunLog:
             self._on_event(event)
         return event
 
-    def say_again(self) -> None:
-        """Write the events again that hold for the whole log."""
+    def repeat_events(self) -> None:
+        """Repeat the events that are valid for the whole log."""
         for code, text in self._holding.items():
             self.add_event(code, text)
 
@@ -198,11 +198,11 @@ class RunLog:
         writer = self._files.writer
         if writer is not None:
             log_time_ns = event.t_ns if self._lockstep else time.time_ns()
-            said = foxglove_log.of_event(event, log_time_ns)
-            writer.add_message(self._channels[foxglove_log.TOPIC], log_time_ns, said, event.t_ns, 0)
+            payload = foxglove_log.of_event(event, log_time_ns)
+            writer.add_message(self._channels[foxglove_log.TOPIC], log_time_ns, payload, event.t_ns, 0)
 
     def close(self) -> None:
-        """Write the index and close the file. Raises Fault LOG_WRITE, LOG_LOST: what happened to the log until now."""
+        """Write the index and close the file. Raises Fault LOG_WRITE, LOG_LOST for failures during the run."""
         self._scope.ends = True
         writer = self._files.writer
         if writer is not None and not writer.open_bytes and (rest := self._scope.rest(self._channels)) is not None:

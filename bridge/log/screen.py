@@ -1,20 +1,20 @@
-"""Which messages go into a log: those whose numbers go on. A stranger's are counted, told and left out."""
+"""Filter of the log: only messages whose numbers continue are written. Others are counted, reported and dropped."""
 
 from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.block_numbers import BlockNumbers, Verdict
+from bridge.wire.block_numbers import BlockNumbers, NumberCheck
 from bridge.wire.complaints import BAD_MESSAGE, FOREIGN, Complaints
 from bridge.wire.inbox import Received
 from bridge.wire.payloads import parsed, sequence_and_time
 
-_HELD = 7  # messages of another count that are kept: they are written where the eighth makes that count believed
+_HELD = 7  # messages of another count that are kept; the eighth confirms the count, and all are written
 
 
 class Screen:
-    """Judges what comes from the bus, topic by topic.
+    """Judges the messages of the bus, topic by topic.
 
     Args:
-        complaints: where what is wrong is told.
+        complaints: reports the dropped messages.
 
     """
 
@@ -25,11 +25,11 @@ class Screen:
         self._lengths: dict[str, int] = {}  # of the last message that was read, by topic
 
     def passed(self, received: Received) -> list[Received]:
-        """What is to be written now: the message, nothing, or with it those that were held until its count was believed."""
+        """The messages to write now: this message, none, or this message after those held until its count was confirmed."""
         topic = received.topic
         try:
             self._check(received)
-            if not topic.rate_Hz:  # events and announcements are rare, and their senders may begin anew
+            if not topic.rate_Hz:  # events and announcements are rare, and their senders may restart the count
                 return [received]
             sequence, _ = sequence_and_time(received.payload, topic.message)
         except Fault as fault:
@@ -42,19 +42,19 @@ class Screen:
             text = f"numbers far from {(before or 0) - 1}: not written; is a second sender on this prefix?"
             self._complaints.note(FOREIGN, topic.name, text, numbers.strays - strays)
         held = self._held.setdefault(topic.name, [])
-        if verdict is Verdict.STRAY:
+        if verdict is NumberCheck.STRAY:
             held.append(received)
             del held[:-_HELD]
             return []
-        believed = [*held, received] if verdict is not Verdict.AGAIN and numbers.jumped else [received]
-        if verdict is not Verdict.AGAIN:
+        believed = [*held, received] if verdict is not NumberCheck.AGAIN and numbers.jumped else [received]
+        if verdict is not NumberCheck.AGAIN:
             held.clear()
         return believed
 
     def _check(self, received: Received) -> None:
-        """Raise Fault BAD_MESSAGE for what is no message of its topic; one that is as long as the last one is not parsed.
+        """Raise Fault BAD_MESSAGE unless it is a message of its topic; a message as long as the previous one is not parsed.
 
-        A link that is made anew may hand over the first messages under a wrong key.
+        A re-established link may deliver the first messages under a wrong key.
         """
         name, length = received.topic.name, len(received.payload)
         if received.topic.rate_Hz and self._lengths.get(name) == length:
@@ -63,9 +63,9 @@ class Screen:
         if isinstance(message, wire.Event) and not message.code:
             raise Fault("BAD_MESSAGE", f"{name}: an event without a code")
         if isinstance(message, wire.Announce) and message.holds_from_ns < message.t_ns:
-            raise Fault("BAD_MESSAGE", f"{name}: announces what is past")
+            raise Fault("BAD_MESSAGE", f"{name}: announces a time in the past")
         self._lengths[name] = length
 
     def unreadable(self, received: Received, fault: Fault) -> None:
-        """A message cannot be read, and is left out."""
+        """Report and drop a message that cannot be read."""
         self._complaints.note(BAD_MESSAGE, received.topic.name, f"{fault.line.partition(': ')[2]}: not written")

@@ -1,17 +1,20 @@
-"""Numbers and times of one topic of a log: missing messages, duplicates, jumps of a clock."""
+"""Numbers and times of the messages of one topic: missing messages, duplicates, clock jumps."""
 
 import numpy as np
 
+from bridge.arrays import Indices
 from bridge.log.finding import Finding
-from bridge.log.watches.arrays import Integers, steps
+from bridge.log.watches.arrays import steps
 from bridge.units import counted
 from bridge.wire.messages import Records
 
-# Difference of t_ns and the message numbers up to which a clock is right; rounding to whole nanoseconds is far below.
+# Tolerance between t_ns and the message numbers; rounding to whole nanoseconds stays far below it.
 _CLOCK_TOLERANCE_NS = 1000
-_REMEMBERED_NUMBERS = 1 << 20  # missing numbers that are kept, to tell a late message from a duplicate; costs memory
+_REMEMBERED_NUMBERS = (
+    1 << 20
+)  # missing numbers that are stored, to distinguish a late message from a duplicate; costs memory
 
-# Numbers by which a message may come late. A number 0 after a higher one begins another run; the recorder has the same rule.
+# Largest delay of a message, in numbers. A number 0 after a higher number starts a new run; the recorder has the same rule.
 _LATEST = 256
 
 
@@ -30,7 +33,7 @@ class TopicWatch:
         self._duplicates = self._late = 0
         self._first_duplicate = self._first_late = 0
         self._restarted_at: list[int] = []
-        self.jumps = self.standing = 0  # steps of the clock that do not follow the numbers; those of 0
+        self.jumps = self.standing = 0  # clock steps that do not follow the numbers; zero steps among them
         self.first_jump = (0, 0)  # number, step less the expected one [ns]
         self._first_step_ns = 0
         self._arrived_before = 0
@@ -40,7 +43,7 @@ class TopicWatch:
 
     @property
     def missing(self) -> int:
-        """Messages between the first and the last that never came."""
+        """Messages missing between the first and the last."""
         return len(self._missing_numbers) + sum(map(len, self._gaps_for_good))
 
     @property
@@ -48,13 +51,13 @@ class TopicWatch:
         """The number after the highest."""
         return self._highest + 1
 
-    def add(self, records: Records, log_time_ns: Integers, period_ns: float) -> None:
+    def add(self, records: Records, log_time_ns: Indices, period_ns: float) -> None:
         """Check the next messages.
 
         Args:
             records: of the topic, [messages].
             log_time_ns: time of arrival, [messages].
-            period_ns: time between two numbers where the sender counts it; 0 where times only must not go back.
+            period_ns: time between two numbers if the sender counts it; 0 if times only must not go back.
 
         """
         if not len(records):
@@ -78,7 +81,7 @@ class TopicWatch:
             while at < len(number) and step[at] == 1 and number[at] <= self._highest:
                 self._odd_number(int(number[at]), int(number[at]) - 1)
                 at += 1
-        # the running maximum; `_odd_number` sets it back at a restart
+        # the running maximum; `_odd_number` resets it at a restart
         self._highest = max(self._highest, int(number[-1]))
         forward = step > 0
         off_ns = step_ns - period_ns * step
@@ -128,11 +131,11 @@ class TopicWatch:
     def findings(self) -> list[Finding]:
         """A finding for each kind of fault of the topic."""
         where = "/" + self.topic
-        found: list[Finding] = []
+        findings: list[Finding] = []
 
         def add(kind: str, text: str, times: int) -> None:
             if times:
-                found.append(Finding(kind, where, text, times))
+                findings.append(Finding(kind, where, text, times))
 
         if self.restarts:
             ends = ", ".join(str(number) for number in self._restarted_at[:3])
@@ -143,14 +146,16 @@ class TopicWatch:
             )
         gaps = [*self._gaps_for_good, *_ranges(self._missing_numbers)]
         if gaps:
-            where_to = f"{counted(len(gaps), 'gap')}, first {gaps[0][0]} to {gaps[0][-1]}"
-            add("gap", f"{counted(self.missing, 'message')} missing in {where_to}", self.missing)
+            where_to = f" in {len(gaps)} gaps, first {gaps[0][0]} to {gaps[0][-1]}"
+            if len(gaps) == 1:
+                where_to = f": {gaps[0][0]}" + (f" to {gaps[0][-1]}" if len(gaps[0]) > 1 else "")
+            add("gap", f"{counted(self.missing, 'message')} lost{where_to}", self.missing)
         if self.topic == "sensors" and self.first_number > 0:
-            add("gap", f"begins with block {self.first_number}: those before were not recorded", self.first_number)
+            add("gap", f"begins with block {self.first_number}: earlier blocks were not recorded", self.first_number)
         times = counted(self._duplicates, "place")
-        add("duplicate", f"numbers come a second time at {times}, first {self._first_duplicate}", self._duplicates)
+        add("duplicate", f"repeated numbers at {times}, first {self._first_duplicate}", self._duplicates)
         late = counted(self._late, "message")
-        add("order", f"{late} came after a later one, first {self._first_late}", self._late)
+        add("order", f"{late} arrived after a later message, first {self._first_late}", self._late)
         places, step = counted(self.jumps, "place"), f"a step of {self._first_step_ns / 1e6:g} ms"
         text = f"t_ns does not follow the numbers at {places}, first {self.first_jump[0]}: {step}"
         add("clock-jump", text, self.jumps)
@@ -158,14 +163,14 @@ class TopicWatch:
         places = counted(self._arrived_before, "place")
         text = f"log_time goes back at {places}, first {number}: by {-step_ns / 1e6:g} ms"
         add("log-time-back", text, self._arrived_before)
-        return found
+        return findings
 
 
 def _ranges(numbers: set[int]) -> list[range]:
-    """The numbers as ranges without a gap, in order."""
+    """The numbers as contiguous ranges, in order."""
     ordered = np.array(sorted(numbers), np.int64)
     return [
-        range(int(own[0]), int(own[-1]) + 1)
-        for own in np.split(ordered, np.flatnonzero(np.diff(ordered) > 1) + 1)
-        if len(own)
+        range(int(run[0]), int(run[-1]) + 1)
+        for run in np.split(ordered, np.flatnonzero(np.diff(ordered) > 1) + 1)
+        if len(run)
     ]

@@ -1,11 +1,11 @@
 """Tables of other programs.
 
-readers            reading any of them; kinds says which it is, table is what comes of it
-text               text tables: dialect, encoding, head, rows
+readers            reading of any table; kinds detects the format, table holds the result
+text/              text tables: dialect, encoding, head, rows
 sheet, mat, hdf5, tdms, ros_log   workbooks, MATLAB, HDF5, TDMS, messages of ROS 2
-cells, unit_words  cells as numbers or times; units as people write them
-one_clock          channels of several clocks on one
-own_times          channels that have columns of times of their own
+cells, unit_words  cells as numbers or times; spellings of units
+one_clock          channels of several clocks, resampled to one clock
+own_times          channels with separate columns of times
 writers, matfile   writing CSV, Parquet and MATLAB, in batches of rows
 export             a run log as tables, a file for each topic
 """

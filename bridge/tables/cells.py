@@ -1,4 +1,4 @@
-"""Cells of a stored column as numbers or as times: what is neither is NaN, and a finding says where."""
+"""Cells of a stored column as numbers or as times: any other cell is NaN, and a finding reports its place."""
 
 import calendar
 import datetime as dt
@@ -7,36 +7,39 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pyarrow as pa
 
+from bridge.arrays import Floats
 from bridge.faults import Fault
 from bridge.log.finding import Finding
 from bridge.units import counted
 
-Floats = npt.NDArray[np.float64]
 _SHOWN = 60  # characters of a cell in a finding
-_MOST_BAD = 0.5  # share of cells that are neither empty nor numbers, from which a column is one of words
-# blanks and apostrophes that part thousands, all of which are written as one in a dialect
+_MOST_BAD = 0.5  # share of non-empty cells without a number, from which a column counts as text
+# blanks and apostrophes that separate thousands; a dialect names only the first of each
 BLANKS = (" ", "\xa0", "\u202f", "\u2009")
 APOSTROPHES = ("'", "\u2019")
-# hours, minutes and seconds, behind a third colon milliseconds (`:1` is one); with a fraction behind the second number, minutes
+# hours, minutes and seconds, after a third colon milliseconds (`:1` is 1 ms); with a fraction after the second number, minutes
 # and seconds
 _CLOCK = re.compile(r"(\d{1,3}):(\d{2})(?::(\d{2}(?:[.,]\d+|:\d{1,3}(?![\d:]))?)|([.,]\d+))?\s*([AaPp][Mm])?")
 _DATE = re.compile(r"(\d{1,4})([-./])(\d{1,2})\2(\d{1,4})")
-# a month by its English name or its first letters, as MATLAB writes it: `05-Mar-2024`
+# a month by its English name or abbreviation, as MATLAB writes it: `05-Mar-2024`
 _BY_NAME = re.compile(r"(\d{1,2})[- ./]([A-Za-z]{3,9})[- ./](\d{4}|\d{2})(?!\d)")
 _MONTHS = {name.lower(): at for names in (calendar.month_abbr, calendar.month_name) for at, name in enumerate(names)}
 _MONTHS["sept"] = 9
-_ORDERS = ("mdy", "dmy", "ymd")  # of a date's numbers: with strokes as in the United States, if nothing tells otherwise
+_ORDERS = (
+    "mdy",
+    "dmy",
+    "ymd",
+)  # of the numbers of a date: with slashes as in the United States, unless the dates exclude it
 _ZONE = re.compile(r"\s*(?:Z|UTC|[+-]\d{2}:?\d{2})$")
 _DAY_S, _HOUR_S = 86400.0, 3600.0
 
 
 def numbers(values: Any, where: str, decimal: str, thousands: str) -> tuple[Floats, list[Finding]]:
-    """A column as float64 [rows], NaN where a cell is empty or no number; and a finding for the latter.
+    """A column as float64 [rows], NaN for a cell that is empty or not a number; and a finding for the latter.
 
-    Raises Fault BAD_TABLE when most cells are no numbers.
+    Raises Fault BAD_TABLE if most cells are not numbers.
     """
     if isinstance(values, pa.ChunkedArray):
         kind: Any = values.type
@@ -57,7 +60,7 @@ def numbers(values: Any, where: str, decimal: str, thousands: str) -> tuple[Floa
 
 
 def number_in(text: str, decimal: str, thousands: str) -> float | None:
-    """The number in a cell; None where there is none."""
+    """The number in a cell, or None."""
     word = text.strip()
     if thousands:
         for mark in BLANKS if thousands == " " else APOSTROPHES if thousands == "'" else (thousands,):
@@ -90,7 +93,7 @@ def _from_text(texts: list[str], where: str, decimal: str, thousands: str) -> tu
             result[row] = value
     if not bad:
         return result, []
-    # rows as a person counts them: the first row under the names is 1
+    # rows are counted from 1, below the names
     first = f"row {bad[0] + 1} = {texts[bad[0]][:_SHOWN]!r}"
     if len(bad) > _MOST_BAD * filled:
         raise Fault("BAD_TABLE", f"{where}: {first}: must be a number; name another column")
@@ -100,9 +103,9 @@ def _from_text(texts: list[str], where: str, decimal: str, thousands: str) -> tu
 
 
 def seconds(values: Any, where: str) -> tuple[Floats | None, list[Finding]]:
-    """Times in a column, in s from its first one, [rows]; None where the column holds no times.
+    """Times in a column, in s from its first one, [rows]; None if the column holds no times.
 
-    Dates, clock times and both are understood; over midnight a clock goes on counting.
+    Dates, clock times and both are read; clock times continue over midnight.
     """
     stamps: Any = None
     if isinstance(values, pa.ChunkedArray):
@@ -110,7 +113,7 @@ def seconds(values: Any, where: str) -> tuple[Floats | None, list[Finding]]:
         if pa.types.is_timestamp(kind) or pa.types.is_date(kind):
             stamps = values.cast(pa.timestamp("ns"), safe=False).cast(pa.int64()).to_numpy()
         elif pa.types.is_time(kind):
-            times = [np.nan if one is None else _of_day(one) for one in values.to_pylist()]
+            times = [np.nan if time is None else _of_day(time) for time in values.to_pylist()]
             stamps = _counted_on(np.asarray(times, np.float64)) * 1e9
         elif pa.types.is_duration(kind):
             stamps = values.cast(pa.duration("ns"), safe=False).cast(pa.int64()).to_numpy()
@@ -131,10 +134,10 @@ def seconds(values: Any, where: str) -> tuple[Floats | None, list[Finding]]:
     stamps = np.asarray(stamps)
     started = stamps[np.isfinite(stamps)]
     from_first = (stamps - started[0]) * 1e-9 if len(started) else stamps * 1e-9
-    return from_first.astype(np.float64), [_said(where)]
+    return from_first.astype(np.float64), [_time_finding(where)]
 
 
-def _said(where: str) -> Finding:
+def _time_finding(where: str) -> Finding:
     return Finding("time", where, "holds times: counted in seconds from the first row")
 
 
@@ -153,28 +156,28 @@ def _times_from_text(texts: list[str], where: str) -> tuple[Floats | None, list[
     texts = [_with_numbers(text) for text in texts] if _BY_NAME.search(filled) else texts
     order = _order_of(texts)
     stamps = [_time_in(text, order) for text in texts]
-    # a calendar in seconds would cost microseconds of its digits
+    # seconds of the calendar would lose the digits of microseconds
     began = next((day for day, _ in filter(None, stamps)), 0)
     if filled.count(":") > 2 and _counts_frames(texts):
         return None, []
-    times = [None if one is None else (one[0] - began) * _DAY_S + one[1] for one in stamps]
+    times = [None if stamp is None else (stamp[0] - began) * _DAY_S + stamp[1] for stamp in stamps]
     if sum(time is None for time in times) > _MOST_BAD * len(texts):
         return None, []
     raw = np.array([np.nan if time is None else time for time in times])
     counted_on = raw if began else _counted_on(raw)
     first = counted_on[np.isfinite(counted_on)][0]
     bad = [row for row, time in enumerate(times) if time is None]
-    found = [_said(where)]
+    findings = [_time_finding(where)]
     if bad:
         text = (
             f"{counted(len(bad), 'cell')} without a time, first row {bad[0] + 1} = {texts[bad[0]][:_SHOWN]!r}; left out"
         )
-        found.append(Finding("not-finite", where, text, len(bad)))
-    return counted_on - first, found
+        findings.append(Finding("not-finite", where, text, len(bad)))
+    return counted_on - first, findings
 
 
 def _counts_frames(texts: list[str]) -> bool:
-    """Whether frames or hundredths stand behind the third colon of clock times: never three digits, as milliseconds have."""
+    """Whether frames or hundredths follow the third colon of clock times: milliseconds have three digits at least once."""
     thirds = [
         clock[3].partition(":")[2] for text in texts if (clock := _CLOCK.search(text)) and ":" in (clock[3] or "")
     ]
@@ -182,20 +185,20 @@ def _counts_frames(texts: list[str]) -> bool:
 
 
 def _order_of(texts: list[str]) -> str:
-    """The order of day, month and year in a column: what most of its dates can have, and puts them nearest to each other."""
+    """The order of day, month and year in a column: valid for most dates, then with the shortest span of dates."""
     dates = {(date[2], *_numbers_of(date)) for text in texts if (date := _DATE.search(text)) is not None}
-    stroke = any(mark == "/" for mark, *_ in dates)
+    slash = any(mark == "/" for mark, *_ in dates)
 
     def unlikely(order: str) -> tuple[int, int, bool]:
         days = [_day(parts, order) for _, *parts in dates]
-        there = [day for day in days if day is not None]
-        return len(days) - len(there), max(there, default=0) - min(there, default=0), not stroke and order == "mdy"
+        valid = [day for day in days if day is not None]
+        return len(days) - len(valid), max(valid, default=0) - min(valid, default=0), not slash and order == "mdy"
 
     return min(_ORDERS, key=unlikely)
 
 
 def _with_numbers(text: str) -> str:
-    """A date as ISO writes it where its month has a name; other texts as they are."""
+    """A date with the name of a month in ISO form; other texts unchanged."""
     date = _BY_NAME.search(text)
     month = _MONTHS.get(date[2].lower()) if date else None
     if date is None or month is None:
@@ -209,7 +212,7 @@ def _numbers_of(date: re.Match[str]) -> tuple[int, int, int]:
 
 
 def _day(parts: Sequence[int], order: str) -> int | None:
-    """The day of a date in the calendar; None where there is no such date."""
+    """The ordinal day of a date; None for an impossible date."""
     year, month, day = (parts[order.index(part)] for part in "ymd")
     try:
         return dt.date(year + (2000 if year < 100 else 0), month, day).toordinal()
@@ -218,14 +221,14 @@ def _day(parts: Sequence[int], order: str) -> int | None:
 
 
 def _time_in(text: str, order: str) -> tuple[int, float] | None:
-    """Day (0 without a date) and second of a date, a clock time or both; None where there is none."""
+    """Day (0 without a date) and second of a date, a clock time or both; None for other texts."""
     word = _ZONE.sub("", text.strip())
     clock = _CLOCK.search(word)
     date = _DATE.search(word)
     rest = word
-    for found in (clock, date):
-        if found is not None:
-            rest = rest.replace(found[0], "", 1)
+    for match in (clock, date):
+        if match is not None:
+            rest = rest.replace(match[0], "", 1)
     if (clock is None and date is None) or rest.strip(" T,;\t"):
         return None
     day = 0 if date is None else _day(_numbers_of(date), order)
@@ -256,7 +259,7 @@ def _of_day(time: Any) -> float:
 
 
 def _counted_on(times_s: Floats) -> Floats:
-    """Clock times that go on over midnight, and minutes and seconds that go on over the hour, [rows]."""
+    """Clock times that continue over midnight, and minutes and seconds that continue over the hour, [rows]."""
     around_s = _DAY_S if np.nanmax(times_s, initial=0.0) >= _HOUR_S else _HOUR_S
     back = np.concatenate([[0.0], np.diff(times_s)]) < -0.5 * around_s
     return times_s + np.cumsum(back) * around_s
@@ -269,6 +272,6 @@ def is_text(kind: Any) -> bool:
 
 
 def texts_of(column: Any) -> list[str]:
-    """The cells of an Arrow column of texts; an empty one is ""."""
-    cells = (one.decode(errors="replace") if isinstance(one, bytes) else one for one in column.to_pylist())
+    """The cells of an Arrow column of texts; an empty cell is ""."""
+    cells = (cell.decode(errors="replace") if isinstance(cell, bytes) else cell for cell in column.to_pylist())
     return ["" if cell is None else cell for cell in cells]

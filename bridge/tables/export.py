@@ -1,4 +1,4 @@
-"""A run log as tables for other programs, streamed: the memory needed does not grow with the log."""
+"""A run log as tables for other programs, streamed, so that the memory does not grow with the log."""
 
 import contextlib
 from collections.abc import Callable
@@ -28,7 +28,7 @@ class Exported(NamedTuple):
 
 
 def check_request(to: Path, topics: list[str], from_s: float, until_s: float) -> None:
-    """Raise Fault CONFIG when the suffix of `to`, a topic or the times cannot be used."""
+    """Raise Fault CONFIG if the suffix of `to`, a topic or the times are invalid."""
     if to.suffix not in SUFFIXES:
         raise Fault("CONFIG", f"--to {to}: must end in {', '.join(SUFFIXES)}; choose one of these formats")
     unknown = [topic for topic in topics if topic not in STREAMING]
@@ -51,7 +51,7 @@ def export(
 
     `to` ends in .parquet, .csv or .mat. With several topics, .parquet and .csv get a file for each topic, FILE.TOPIC.parquet.
     Only rows with from_s <= t_s < until_s are written. `progress` is called with the share of the log that was read, 0 to 1.
-    A table that is there is replaced with `overwrite` only.
+    An existing table is replaced only with `overwrite`.
 
     Raises Fault BAD_LOG, BAD_MESSAGE, BAD_TABLE, CONFIG, LOG_WRITE; nothing unfinished is left behind.
     """
@@ -60,7 +60,7 @@ def export(
     for file in _files(to, topics).values():
         refuse_to_lose([path], "the log", "--to", file)
         if file.is_file() and not overwrite:
-            line = f"--to {file}: is there already, and would be lost; choose another name, or add --overwrite"
+            line = f"--to {file}: exists already, and would be lost; choose another name, or add --overwrite"
             raise Fault("CONFIG", line)
     reader = LogReader(path)
     owners: list[TableWriter | MatFile] = []

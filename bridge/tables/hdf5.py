@@ -8,9 +8,9 @@ import numpy as np
 from bridge.tables.mat import table_of
 from bridge.tables.table import Table
 
-_DEEPEST = 8  # groups one in the other
+_DEEPEST = 8  # nested groups
 _UNIT_KEYS = ("unit", "units", "Unit", "Units", "unit_string")
-_OF_MATLAB = {"#refs#", "#subsystem#"}  # where MATLAB keeps what variables refer to
+_OF_MATLAB = {"#refs#", "#subsystem#"}  # MATLAB's groups for the targets of references
 
 
 def read_hdf5(path: Path) -> Table:
@@ -23,16 +23,16 @@ def read_hdf5(path: Path) -> Table:
         table = table_of(path, variables)
 
         def keep_unit(name: str, item: Any) -> None:
-            told = next((item.attrs[key] for key in _UNIT_KEYS if key in item.attrs), "")
-            if isinstance(told, bytes | str):
-                table.units[name.replace("/", ".")] = told.decode(errors="replace") if isinstance(told, bytes) else told
+            unit = next((item.attrs[key] for key in _UNIT_KEYS if key in item.attrs), "")
+            if isinstance(unit, bytes | str):
+                table.units[name.replace("/", ".")] = unit.decode(errors="replace") if isinstance(unit, bytes) else unit
 
         file.visititems(keep_unit)
         return table
 
 
 def _value(file: Any, item: Any, of_matlab: bool, depth: int) -> Any:
-    """A group as a dictionary, a dataset as an array, an array of references as a list of what they lead to."""
+    """A group as a dictionary, a dataset as an array, an array of references as a list of their targets."""
     import h5py
 
     if depth > _DEEPEST:
@@ -42,8 +42,7 @@ def _value(file: Any, item: Any, of_matlab: bool, depth: int) -> Any:
         return _of_structs(inner) if of_matlab else inner
     data: Any = item[()]
     if item.dtype == h5py.ref_dtype:
-        found = [_value(file, file[one], of_matlab, depth + 1) for one in np.ravel(data) if one]
-        return _listed(found)
+        return _listed([_value(file, file[target], of_matlab, depth + 1) for target in np.ravel(data) if target])
     if _is_text(item):
         return "".join(chr(int(code)) for code in np.ravel(data))
     array = np.asarray(data)
@@ -67,7 +66,7 @@ def _listed(values: list[Any]) -> Any:
 
 
 def _of_structs(fields: dict[str, Any]) -> Any:
-    """An array of structs where every field is an array of as many objects; else the struct itself."""
+    """An array of structs if all fields are arrays of equally many objects; else the struct itself."""
     lengths = {
         len(value) if isinstance(value, np.ndarray) and value.dtype == object else 0 for value in fields.values()
     }

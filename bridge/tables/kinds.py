@@ -1,4 +1,4 @@
-"""What kind of file a table is, from its first bytes; a suffix may be in any case, and wrong."""
+"""The format of a table file, from its first bytes; its suffix may be wrong."""
 
 from pathlib import Path
 from typing import Literal
@@ -26,7 +26,7 @@ _PACKED = (
     (b"7z\xbc\xaf\x27\x1c", "7-Zip"),
     (b"Rar!", "RAR"),
 )
-_HDF5_AT = 512  # MATLAB v7.3 writes its own head before the HDF5
+_HDF5_AT = 512  # MATLAB v7.3 writes a head of 512 bytes before the HDF5 data
 _BY_SUFFIX: dict[str, Kind] = {
     ".parquet": "parquet",
     ".mat": "mat",
@@ -38,22 +38,22 @@ _BY_SUFFIX: dict[str, Kind] = {
 
 
 def _first_in_archive(start: bytes) -> bytes:
-    """The name of the first file in an archive that begins so; empty where it is none."""
+    """The name of the first file in a zip archive with these first bytes; empty for other files."""
     length = int.from_bytes(start[_ZIP_NAME_LENGTH], "little") if start.startswith(_ZIP) else 0
     return start[_ZIP_NAME : _ZIP_NAME + length]
 
 
 def kind_of(path: Path) -> Kind:
-    """The kind of a table: by its marks; by its suffix where a damaged file has none; else text.
+    """The format of a table: by its magic bytes; for a damaged file without them by its suffix; else text.
 
-    Raises Fault BAD_TABLE when the file is packed, or one of NumPy.
+    Raises Fault BAD_TABLE for a compressed file and for a file of NumPy.
     """
     with path.open("rb") as file:
         start = file.read(_HDF5_AT + 8)
     if start[_HDF5_AT:].startswith(b"\x89HDF"):
         return "hdf5"
     if start.startswith(_NUMPY) or _first_in_archive(start).endswith(b".npy"):
-        line = f"{path.name}: holds arrays of NumPy, which do not say what is a time and what a force; write them as columns"
+        line = f"{path.name}: holds NumPy arrays, without names for time and force; write them as columns"
         how = 'numpy.savetxt("NAME.csv", numpy.column_stack([t, F]), delimiter=",", header="t (s),F (N)", comments="")'
         raise Fault("BAD_TABLE", f"{line} of a text: {how}")
     for mark, kind in _MARKS:
@@ -61,5 +61,5 @@ def kind_of(path: Path) -> Kind:
             return kind
     for mark, name in _PACKED:
         if start.startswith(mark):
-            raise Fault("BAD_TABLE", f"{path.name}: is packed by {name}; unpack it, and give the file that is in it")
+            raise Fault("BAD_TABLE", f"{path.name}: is packed by {name}; unpack it, and give the unpacked file")
     return _BY_SUFFIX.get(path.suffix.lower(), "text")

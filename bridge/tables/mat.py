@@ -1,4 +1,4 @@
-"""Variables of a MATLAB file: vectors, matrices, and structs in structs."""
+"""Variables of a MATLAB file: vectors, matrices and nested structs."""
 
 import subprocess
 import sys
@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from bridge.tables.table import Clock, Table
+from bridge.tables.table import ChannelClock, Table
 
-_DEEPEST = 8  # structs one in the other
-_MOST_COLUMNS = 4096  # of a file: a matrix of more columns than that is a picture
+_DEEPEST = 8  # nested structs
+_MOST_COLUMNS = 4096  # of a matrix; more columns are a picture
 
 
 def read_mat(path: Path) -> Table:
     """Variables of a file of MATLAB v5 to v7, by name: `NAME`, `NAME.FIELD`, `NAME[0]` for elements and columns of a matrix.
 
-    What dSPACE ControlDesk writes (X and Y with Name, Data, Unit) has its signals by their Name as well, each on its raster.
+    Signals of dSPACE ControlDesk (X and Y with Name, Data, Unit) are listed by their Name as well, each on its raster.
     """
     variables = {name: value for name, value in _loaded(path).items() if not name.startswith("__")}
     return table_of(path, variables)
@@ -72,31 +72,31 @@ def _add_dspace(table: Table, name: str, value: Any) -> None:
     if fields is None or not {"X", "Y"} <= fields.keys():
         return
     rasters, signals = _structs(fields["X"]), _structs(fields["Y"])
-    times = [(f"{name}.X" + (f"[{i}]" if len(rasters) > 1 else ""), one) for i, one in enumerate(rasters)]
-    for i, one in enumerate(signals):
+    times = [(f"{name}.X" + (f"[{i}]" if len(rasters) > 1 else ""), raster) for i, raster in enumerate(rasters)]
+    for i, signal in enumerate(signals):
         key = f"{name}.Y[{i}]"
-        if "Data" not in one:
+        if "Data" not in signal:
             continue
-        data = np.atleast_1d(one["Data"]).ravel()
+        data = np.atleast_1d(signal["Data"]).ravel()
         if len(signals) == 1:
             table.columns[f"{key}.Data"] = data
-        label = _text(one.get("Name"))
+        label = _text(signal.get("Name"))
         keys = [f"{key}.Data", *([label] if label and label not in table.columns else [])]
         table.columns.update(dict.fromkeys(keys, data))
-        raster = _raster(one, rasters)
+        raster = _raster(signal, rasters)
         for at in keys:
-            if unit := _text(one.get("Unit")):
+            if unit := _text(signal.get("Unit")):
                 table.units[at] = unit
             if raster is not None and len(raster) == len(data):
-                table.clocks[at] = Clock(0.0, 0.0, raster)
-    for key, one in times:
-        if unit := _text(one.get("Unit")):
+                table.clocks[at] = ChannelClock(0.0, 0.0, raster)
+    for key, axis in times:
+        if unit := _text(axis.get("Unit")):
             table.units[f"{key}.Data"] = unit
 
 
 def _raster(signal: dict[str, Any], rasters: list[dict[str, Any]]) -> Any:
-    """The instants of a signal [samples], by its XIndex, from 0 or from 1; None where its raster has none."""
-    data = [np.atleast_1d(one["Data"]).ravel().astype(np.float64) for one in rasters if "Data" in one]
+    """The instants of a signal [samples], by its XIndex, from 0 or from 1; None without a matching raster."""
+    data = [np.atleast_1d(raster["Data"]).ravel().astype(np.float64) for raster in rasters if "Data" in raster]
     if len(data) == 1:
         return data[0]
     length = len(np.atleast_1d(signal["Data"]).ravel())
@@ -105,14 +105,14 @@ def _raster(signal: dict[str, Any], rasters: list[dict[str, Any]]) -> Any:
     for number in (at - 1, at):
         if 0 <= number < len(data) and len(data[number]) == length:
             return data[number]
-    return next((one for one in data if len(one) == length), None)
+    return next((times for times in data if len(times) == length), None)
 
 
 def _structs(value: Any) -> list[dict[str, Any]]:
     if _fields(value) is not None:
         return [_fields(value) or {}]
-    found = (_fields(one) for one in np.atleast_1d(np.asarray(value, object)).ravel())
-    return [one for one in found if one is not None]
+    structs = (_fields(item) for item in np.atleast_1d(np.asarray(value, object)).ravel())
+    return [struct for struct in structs if struct is not None]
 
 
 def _text(value: Any) -> str:
@@ -126,7 +126,7 @@ def _text(value: Any) -> str:
 
 
 def _loaded(path: Path) -> dict[str, Any]:
-    """The variables of a MATLAB file, read first in a process of its own: a damaged file may crash SciPy's compiled reader."""
+    """The variables of a MATLAB file, read first in a separate process: a damaged file may crash SciPy's compiled reader."""
     import scipy.io
 
     trial = "import sys, scipy.io; scipy.io.loadmat(sys.argv[1])"

@@ -1,7 +1,7 @@
 """MATLAB v5 files written column by column, so that a log larger than the memory can be exported.
 
-scipy writes a variable from one array in memory. Here each column grows in a file beside the result, and the files are joined at
-the end. Layout: MathWorks, MAT-File Format, version 5 (uncompressed elements, little endian).
+SciPy writes a variable from one array in memory. Here each column grows in a temporary file, and the files are joined at the end.
+Layout: MathWorks, MAT-File Format, version 5 (uncompressed elements, little endian).
 """
 
 import shutil
@@ -67,7 +67,7 @@ def file_head() -> bytes:
 
 
 class ColumnStruct:
-    """A variable `name` that is a struct of column vectors; it grows on disk, in `folder`, with a file for each column."""
+    """A variable `name`, a struct of column vectors; it grows on disk, in `folder`, with a file for each column."""
 
     def __init__(self, name: str, folder: Path) -> None:
         self.name = name
@@ -86,7 +86,7 @@ class ColumnStruct:
         self.rows += len(next(iter(columns.values())))
 
     def write_to(self, out: IO[bytes]) -> None:
-        """Write the variable and remove the columns. Raises Fault BAD_TABLE when the variable is too large for the format."""
+        """Write the variable and remove the columns. Raises Fault BAD_TABLE if the variable is too large for the format."""
         heads: list[bytes] = []
         for name in self._files:
             kind, matrix_class = _NUMBERS[self._dtypes[name].str]

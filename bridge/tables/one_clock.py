@@ -1,22 +1,21 @@
-"""Channels that were sampled on clocks of their own, brought to one.
+"""Channels that were sampled on separate clocks, resampled to one clock.
 
-A file that merges topics of different rates leaves most cells empty; LabVIEW and dSPACE give every channel a rate and a start.
-The channel with most samples keeps its instants, where all are measured; the others are interpolated to them.
+In a file of topics with different rates most cells are empty; LabVIEW and dSPACE give every channel a rate and a start. The
+channel with most samples keeps its instants, within the time that all channels cover; the others are interpolated to them.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.log.finding import Finding
 from bridge.units import counted
 
-Floats = npt.NDArray[np.float64]
-# Share of empty cells of a channel from which its rows are its own. Smaller: a sensor that dropped out is interpolated.
+# Share of empty cells from which a channel has separate rows. Smaller: a sensor that dropped out is interpolated.
 _OWN_ROWS = 0.1
-_GAP_STEPS = 10.0  # usual steps of a channel; nothing is interpolated over a longer one
-_SAME_S = 1e-3  # of a step: two instants that differ by less are one
+_GAP_STEPS = 10.0  # median steps of a channel; a longer gap is not interpolated
+_SAME_S = 1e-3  # of a step: two instants that differ by less are equal
 
 
 class Sampled(NamedTuple):
@@ -27,17 +26,17 @@ class Sampled(NamedTuple):
 
 
 def with_own_rows(t_s: Floats, columns: dict[str, Floats]) -> bool:
-    """Whether channels [rows] have rows of their own: one has many empty cells, and is full in between."""
+    """Whether a channel [rows] has separate rows: many empty cells, spread over the file."""
     return any(_has_own_rows(t_s, values) for values in columns.values())
 
 
 def _has_own_rows(t_s: Floats, values: Floats) -> bool:
     empty = ~np.isfinite(values) & np.isfinite(t_s)
     rows = np.flatnonzero(~empty)
-    # a column that begins later or ends sooner than the others is empty there, and full in between
+    # a column that begins later or ends sooner than the others is empty only at its ends
     if len(rows) < 2 or empty[rows[0] : rows[-1]].mean() <= _OWN_ROWS:
         return False
-    # a sensor that failed leaves one long stretch; rows of its own are spread over the file
+    # a failed sensor leaves one long gap; separate rows are spread over the file
     return float(np.quantile(np.diff(rows), 0.9)) <= 20.0 * float(np.median(np.diff(rows))) and rows[-1] - rows[
         0
     ] > 0.5 * len(t_s)
@@ -45,60 +44,64 @@ def _has_own_rows(t_s: Floats, values: Floats) -> bool:
 
 def own_rows(t_s: Floats, columns: dict[str, Floats]) -> dict[str, Sampled]:
     """Each channel at its own rows alone."""
-    found: dict[str, Sampled] = {}
+    channels: dict[str, Sampled] = {}
     for name, values in columns.items():
         filled = np.isfinite(values) & np.isfinite(t_s) if _has_own_rows(t_s, values) else np.ones(len(t_s), np.bool_)
-        found[name] = Sampled(t_s[filled], values[filled])
-    return found
+        channels[name] = Sampled(t_s[filled], values[filled])
+    return channels
 
 
 def on_one_clock(channels: dict[str, Sampled], file: str) -> tuple[Floats, dict[str, Floats], list[Finding]]:
-    """The instants [rows] and the channels at them, [rows] each; NaN in gaps of a channel. With a finding for each that moved.
+    """The instants [rows] and the channels at them, [rows] each; NaN in gaps. With a finding for each interpolated channel.
 
-    Instants before the last channel starts, and after the first one ends, are left out.
+    Instants before the last channel starts, and after the first channel ends, are left out.
     """
     base = max(channels, key=lambda name: len(channels[name].times_s))
     times_s = channels[base].times_s
-    if all(_same(one.times_s, times_s) for one in channels.values()):
-        return times_s, {name: one.values for name, one in channels.items()}, []
-    first_s = max(float(one.times_s[0]) for one in channels.values())
-    last_s = min(float(one.times_s[-1]) for one in channels.values())
+    if all(_same(channel.times_s, times_s) for channel in channels.values()):
+        return times_s, {name: channel.values for name, channel in channels.items()}, []
+    first_s = max(float(channel.times_s[0]) for channel in channels.values())
+    last_s = min(float(channel.times_s[-1]) for channel in channels.values())
     step_s = _step_s(times_s)
     inside = (times_s >= first_s - _SAME_S * step_s) & (times_s <= last_s + _SAME_S * step_s)
     kept_s = times_s[inside]
     findings: list[Finding] = []
     columns: dict[str, Floats] = {}
-    for name, one in channels.items():
-        if _same(one.times_s, times_s):
-            columns[name] = one.values[inside]
+    for name, channel in channels.items():
+        if _same(channel.times_s, times_s):
+            columns[name] = channel.values[inside]
             continue
-        columns[name] = _interpolated(kept_s, one)
-        own_Hz, late_s = 1.0 / _step_s(one.times_s), float(one.times_s[0] - times_s[0])
+        columns[name] = _interpolated(kept_s, channel)
+        rate_Hz, late_s = 1.0 / _step_s(channel.times_s), float(channel.times_s[0] - times_s[0])
         late = (
             f" and begins {late_s:.6g} s {'later' if late_s > 0 else 'earlier'} ({base} at {times_s[0]:.6g} s)"
             if late_s
             else ""
         )
-        text = f"has its own clock of {own_Hz:.6g} Hz{late}: interpolated to that of {base}, {1.0 / step_s:.6g} Hz"
+        text = (
+            f"has its own clock of {rate_Hz:.6g} Hz{late}: interpolated to the clock of {base}, {1.0 / step_s:.6g} Hz"
+        )
         findings.append(Finding("clock", f"{file}: {name}", text))
     if lost := int((~inside).sum()):
-        text = f"{counted(lost, 'row')} left out, in which another channel is not there"
+        text = f"{counted(lost, 'row')} left out, in which another channel has no data"
         findings.append(Finding("cut", f"{file}: {base}", text, lost))
     return kept_s, columns, findings
 
 
-def _same(one_s: Floats, other_s: Floats) -> bool:
-    return len(one_s) == len(other_s) and bool(np.allclose(one_s, other_s, rtol=0.0, atol=_SAME_S * _step_s(other_s)))
+def _same(first_s: Floats, other_s: Floats) -> bool:
+    return len(first_s) == len(other_s) and bool(
+        np.allclose(first_s, other_s, rtol=0.0, atol=_SAME_S * _step_s(other_s))
+    )
 
 
 def _step_s(times_s: Floats) -> float:
     return float(np.median(np.diff(times_s))) if len(times_s) > 1 else 1.0
 
 
-def _interpolated(at_s: Floats, one: Sampled) -> Floats:
-    """A channel at other instants [rows], straight from sample to sample; NaN in its gaps."""
-    order = np.argsort(one.times_s, kind="stable")
-    times_s, values = one.times_s[order], one.values[order]
+def _interpolated(at_s: Floats, channel: Sampled) -> Floats:
+    """A channel at other instants [rows], linear between samples; NaN in its gaps."""
+    order = np.argsort(channel.times_s, kind="stable")
+    times_s, values = channel.times_s[order], channel.values[order]
     result = np.interp(at_s, times_s, values)
     before = np.clip(np.searchsorted(times_s, at_s, side="right") - 1, 0, len(times_s) - 2)
     wide = np.diff(times_s)[before] > _GAP_STEPS * _step_s(times_s)

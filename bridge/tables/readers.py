@@ -1,4 +1,4 @@
-"""Measured data of other programs as columns. Every error names file, column and row; what is assumed is a finding."""
+"""Measured data of other programs as columns. Every error names file, column and row; every assumption is a finding."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -17,18 +17,18 @@ from bridge.tables.text.dialect import Dialect
 from bridge.tables.text.text_table import read_text
 
 __all__ = ["Dialect", "Table", "read_table"]
-_LONGEST_REASON = 200  # characters of what a library says
+_LONGEST_REASON = 200  # characters of the message of a library
 
 
 def read_table(path: Path, dialect: Dialect | None = None, kind: Kind | None = None) -> Table:
     """Read a table.
 
     Args:
-        path: of a file of any suffix: its first bytes say what it is.
-        dialect: of a text or a sheet, as far as it is known.
-        kind: where the first bytes are not to decide.
+        path: a file of any suffix: its first bytes decide on the format.
+        dialect: known properties of a text or a sheet.
+        kind: the format, instead of the first bytes.
 
-    Raises Fault BAD_TABLE when the file cannot be read as what it is.
+    Raises Fault BAD_TABLE if the file cannot be read in its format.
 
     """
     check_file(path, "BAD_TABLE", "give the path of a file of measured data")
@@ -55,7 +55,7 @@ def read_table(path: Path, dialect: Dialect | None = None, kind: Kind | None = N
 
 
 def _read_parquet(path: Path) -> Table:
-    """Its columns, those of structs as `NAME.FIELD`."""
+    """The columns of a Parquet file; fields of structs as `NAME.FIELD`."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

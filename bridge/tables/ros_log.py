@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 
 from bridge.faults import Fault
-from bridge.tables.table import Clock, Table
+from bridge.tables.table import ChannelClock, Table
 
-_DEEPEST = 6  # messages one in the other
-_MOST_ITEMS = 64  # of an array: joints are channels, the pixels of a picture are none
+_DEEPEST = 6  # nested messages
+_MOST_ITEMS = 64  # of an array; joints are channels, the pixels of a picture are not
 
 
 def read_ros_log(path: Path) -> Table:
-    """Numbers of all messages as `TOPIC.FIELD.FIELD`; of a joint as `TOPIC.FIELD[0]`, and by its name where names are told.
+    """Numbers of all messages as `TOPIC.FIELD.FIELD`; elements of arrays as `TOPIC.FIELD[0]`, or by the joint's name.
 
-    Time is that of the header of a message where it has one, else when it was logged; it counts from the earliest.
+    Time is the stamp in the header of a message, or else its log time; it counts from the earliest.
     Raises Fault BAD_TABLE for a file without messages of ROS 2.
     """
     times: dict[str, list[int]] = {}
@@ -30,11 +30,11 @@ def read_ros_log(path: Path) -> Table:
     if not values:
         raise Fault("BAD_TABLE", f"{path.name}: has no numbers in messages of ROS 2; give another file")
     began_ns = min(at[0] for at in times.values())
-    columns = {name: np.array(one) for name, one in values.items()}
-    clocks: dict[str, Clock] = {}
+    columns = {name: np.array(numbers) for name, numbers in values.items()}
+    clocks: dict[str, ChannelClock] = {}
     for name, at in times.items():
         since_s = (np.array(at, np.int64) - np.int64(began_ns)).astype(np.float64) * 1e-9
-        clocks[name] = Clock(0.0, 0.0, np.asarray(since_s, np.float64))
+        clocks[name] = ChannelClock(0.0, 0.0, np.asarray(since_s, np.float64))
     return Table(path, columns, clocks=clocks)
 
 

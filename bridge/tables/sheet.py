@@ -9,16 +9,16 @@ import numpy as np
 from bridge.faults import Fault
 from bridge.log.finding import Finding
 from bridge.tables.table import Table
-from bridge.tables.text.dialect import Dialect, Form, form_of
+from bridge.tables.text.dialect import Dialect, TextLayout, form_of
 from bridge.tables.text.head import read_head
 from bridge.tables.unit_words import unknown_units
 
-_BETWEEN = "\x1f"  # no cell has a unit separator in it
-_HEAD_ROWS = 400  # in which the rows of numbers must begin
+_BETWEEN = "\x1f"  # the unit separator, which no cell contains
+_HEAD_ROWS = 400  # rows within which the numbers must begin
 
 
 def read_sheet(path: Path, given: Dialect) -> Table:
-    """The sheet that `given` names, or the one with most rows. Raises Fault BAD_TABLE."""
+    """The sheet that `given` names, or the sheet with most rows. Raises Fault BAD_TABLE."""
     from python_calamine import load_workbook
 
     book: Any = load_workbook(str(path))
@@ -26,14 +26,14 @@ def read_sheet(path: Path, given: Dialect) -> Table:
     if given.sheet is not None and given.sheet not in names:
         raise Fault("BAD_TABLE", f"source.sheet = {given.sheet!r}: not in {path.name}; known here: {', '.join(names)}")
     read = {name: book.get_sheet_by_name(name).to_python() for name in ([given.sheet] if given.sheet else names)}
-    name = max(read, key=lambda one: len(read[one]))
+    name = max(read, key=lambda sheet: len(read[sheet]))
     rows: list[list[Any]] = read[name]
     if not rows:
         raise Fault("BAD_TABLE", f"{path.name}: is empty; give a file with rows")
-    some = rows[len(rows) // 3 :: max(len(rows) // 200, 1)]
-    texts = [_BETWEEN.join(cell if isinstance(cell, str) else "" for cell in row) for row in some]
+    sample = rows[len(rows) // 3 :: max(len(rows) // 200, 1)]
+    texts = [_BETWEEN.join(cell if isinstance(cell, str) else "" for cell in row) for row in sample]
     form = form_of(texts, given._replace(delimiter=_BETWEEN), quoted=False)  # of numbers that are stored as text
-    lines, body = ([_line(row, form) for row in part] for part in (rows[:_HEAD_ROWS], some))
+    lines, body = ([_line(row, form) for row in part] for part in (rows[:_HEAD_ROWS], sample))
     head = read_head(lines, body, form, given, path.name)
     width = len(head.names)
     columns: dict[str, Any] = {}
@@ -43,10 +43,10 @@ def read_sheet(path: Path, given: Dialect) -> Table:
     findings = [Finding("assumed", path.name, f"sheet {name!r} of {', '.join(names)}")] if len(names) > 1 else []
     if head.units:
         findings.append(
-            Finding("assumed", path.name, f"line {head.lines} is of units: {', '.join(filter(None, head.units))}")
+            Finding("assumed", path.name, f"line {head.lines} holds units: {', '.join(filter(None, head.units))}")
         )
         if unknown := unknown_units(head.unit_of):
-            findings.append(Finding("units", path.name, f"no known unit: {unknown}; taken as it is"))
+            findings.append(Finding("units", path.name, f"unknown unit: {unknown}; kept as written"))
     rate_Hz = 1.0 / head.step_s if head.step_s else None
     return Table(
         path,
@@ -61,8 +61,8 @@ def read_sheet(path: Path, given: Dialect) -> Table:
     )
 
 
-def _column(cells: list[Any], form: Form) -> Any:
-    """Numbers as float64, an empty cell NaN; anything else as it is, with the numbers among it as texts of the same form."""
+def _column(cells: list[Any], form: TextLayout) -> Any:
+    """Numbers as float64, an empty cell NaN; a column with texts as texts, its numbers in the same form; others unchanged."""
     kinds = Counter(type(cell) for cell in cells if cell != "")
     if kinds.keys() <= {float, int, bool}:
         return np.array([np.nan if cell == "" else float(cell) for cell in cells])
@@ -71,11 +71,11 @@ def _column(cells: list[Any], form: Form) -> Any:
     return np.array([None if cell == "" else cell for cell in cells], object)
 
 
-def _line(row: list[Any], form: Form) -> str:
+def _line(row: list[Any], form: TextLayout) -> str:
     return _BETWEEN.join(_text(cell, form) for cell in row)
 
 
-def _text(cell: Any, form: Form) -> str:
+def _text(cell: Any, form: TextLayout) -> str:
     if isinstance(cell, float):
         return str(cell).replace(".", form.decimal)
     return cell.isoformat() if hasattr(cell, "isoformat") else str(cell)

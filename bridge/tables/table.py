@@ -1,4 +1,4 @@
-"""A table of measured data in memory: its columns as they were stored, their units, and their own clocks."""
+"""A table of measured data in memory: its columns as stored, their units, and their clocks."""
 
 import re
 from dataclasses import dataclass, field
@@ -6,22 +6,20 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.faults import Fault
 from bridge.log.finding import Finding
 from bridge.tables.cells import numbers, seconds
 from bridge.tables.unit_words import bare_name, unit_in_name
 
-Floats = npt.NDArray[np.float64]
-
-_SECONDS = re.compile(r"(.*?)(?:secs?|seconds)")  # of a stamp, with one of these for what is over
-_AGAIN = re.compile(r"\.\d+$")  # what a reader adds to a name that is in the file already
+_SECONDS = re.compile(r"(.*?)(?:secs?|seconds)")  # column of the whole seconds of a stamp; see _NANOSECONDS
+_AGAIN = re.compile(r"\.\d+$")  # suffix that a reader adds to a repeated name
 _NANOSECONDS = ("nanosec", "nsec", "nsecs", "nanosecs", "nanoseconds")
 
 
-class Clock(NamedTuple):
-    """When a channel with a clock of its own was sampled: `start_s + i * step_s`, or at `times_s` [samples]."""
+class ChannelClock(NamedTuple):
+    """The instants of a channel with a separate clock: `start_s + i * step_s`, or `times_s` [samples]."""
 
     start_s: float  # after the earliest start of the file
     step_s: float
@@ -36,27 +34,27 @@ class Clock(NamedTuple):
 
 @dataclass(frozen=True)
 class Table:
-    """The columns of one file. `findings` grows as columns are read: what was assumed, and what was left out."""
+    """The columns of one file. `findings` lists assumptions and omitted cells; it grows as columns are read."""
 
     path: Path
     columns: dict[str, Any]
     units: dict[str, str] = field(default_factory=dict[str, str])  # by column, as the file writes them
-    clocks: dict[str, Clock] = field(default_factory=dict[str, Clock])  # of the channels that have their own
-    sample_rate_Hz: float | None = None  # where the file states one rate for all
+    clocks: dict[str, ChannelClock] = field(
+        default_factory=dict[str, ChannelClock]
+    )  # of channels with a separate clock
+    sample_rate_Hz: float | None = None  # if the file states one rate for all channels
     decimal: str = "."  # of numbers that are stored as text
     thousands: str = ""
     findings: list[Finding] = field(default_factory=list[Finding])
-    written: dict[str, Any] = field(
-        default_factory=dict[str, Any]
-    )  # how the file is written: keys of [source] of a map
+    written: dict[str, Any] = field(default_factory=dict[str, Any])  # properties of the file: keys of [source] of a map
     own_times: dict[str, str] = field(
         default_factory=dict[str, str]
-    )  # the columns of times that clocks come from, by channel
+    )  # the column of times of each such clock, by channel
 
     def find(self, name: str | int) -> str:
-        """The key of a column that a person names: its name, its number from 1 on, or its name without its unit.
+        """The key of a column given by its name, its number from 1, or its name without its unit.
 
-        Raises Fault BAD_TABLE when no column, or more than one, is meant.
+        Raises Fault BAD_TABLE if no column matches, or more than one.
         """
         wanted = str(name)
         if wanted in self.columns:
@@ -73,39 +71,41 @@ class Table:
         raise Fault("BAD_TABLE", f"{self.path.name}: column {wanted}: not in the file; known here: {known}")
 
     def column(self, name: str | int) -> Floats:
-        """One column, float64 [rows]; what is no number is NaN. Raises Fault BAD_TABLE when it is missing or not of numbers."""
+        """One column, float64 [rows]; cells without a number are NaN. Raises Fault BAD_TABLE if it is missing or not numeric."""
         key = self.find(name)
-        values, found = numbers(self.columns[key], f"{self.path.name}: column {key}", self.decimal, self.thousands)
-        self.findings.extend(one for one in found if one not in self.findings)
+        values, findings = numbers(self.columns[key], f"{self.path.name}: column {key}", self.decimal, self.thousands)
+        self._add(findings)
         return values
 
-    def seconds(self, name: str | int) -> tuple[Floats, bool]:
-        """A column of times in s from its first row, [rows], or of numbers as they are; and whether it holds times.
+    def _add(self, findings: list[Finding]) -> None:
+        self.findings.extend(finding for finding in findings if finding not in self.findings)
 
-        Raises Fault BAD_TABLE when it is missing, or holds neither.
+    def seconds(self, name: str | int) -> tuple[Floats, bool]:
+        """A column of times in s from its first row, [rows], or of numbers unchanged; and whether it holds times.
+
+        Raises Fault BAD_TABLE if it is missing, or holds neither.
         """
         key = self.find(name)
         where = f"{self.path.name}: column {key}"
-        if nanoseconds := self._nanoseconds_beside(key):
+        if nanoseconds := self._nanoseconds_of(key):
             whole_s = self.column(key)
-            found = [Finding("time", where, f"goes on in column {nanoseconds}: both are one time")]
-            self.findings.extend(one for one in found if one not in self.findings)
-            # a calendar in seconds would cost the digits of the nanoseconds
+            self._add([Finding("time", where, f"goes on in column {nanoseconds}: both are one time")])
+            # seconds of the calendar would lose the digits of the nanoseconds
             times_s = whole_s - whole_s[:1] + 1e-9 * self.column(nanoseconds)
             return times_s - times_s[:1], True
-        times_s, found = seconds(self.columns[key], where)
+        times_s, findings = seconds(self.columns[key], where)
         if times_s is None:
             return self.column(key), False
-        self.findings.extend(one for one in found if one not in self.findings)
+        self._add(findings)
         return times_s, True
 
-    def _nanoseconds_beside(self, key: str) -> str:
-        """The column of nanoseconds that belongs to one of whole seconds, as in a stamp of ROS; empty where there is none."""
+    def _nanoseconds_of(self, key: str) -> str:
+        """The column of nanoseconds that belongs to a column of whole seconds, as in a stamp of ROS; empty if missing."""
         stem = _SECONDS.fullmatch(key)
         return next((f"{stem[1]}{end}" for end in _NANOSECONDS if stem and f"{stem[1]}{end}" in self.columns), "")
 
     def unit(self, name: str | int) -> str:
-        """The unit of a column, from the file's own list or the column's name; empty where neither says one."""
+        """The unit of a column, from the file's list of units or the column's name; empty if unknown."""
         key = self.find(name)
         first = _AGAIN.sub("", key)
         return self.units.get(key) or unit_in_name(first if first in self.columns else key)
@@ -116,5 +116,5 @@ def _bare(text: str) -> str:
 
 
 def _squeezed(text: str) -> str:
-    """Without the marks of comments before it, and with single blanks."""
+    """The text without comment marks at its ends, and with single blanks."""
     return re.sub(r"\s+", " ", text).strip("%# ")

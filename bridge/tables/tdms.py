@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from bridge.tables.table import Clock, Table
+from bridge.tables.table import ChannelClock, Table
 
 
 def read_tdms(path: Path) -> Table:
-    """Channels as `GROUP/CHANNEL`, and as `CHANNEL` where only one group has a channel of that name.
+    """Channels as `GROUP/CHANNEL`, and as `CHANNEL` if only one group has a channel of that name.
 
     Clocks come from wf_increment, wf_start_offset and wf_start_time; they count from the earliest wf_start_time.
     """
@@ -20,7 +20,7 @@ def read_tdms(path: Path) -> Table:
     starts = {id(channel): channel.properties.get("wf_start_time") for channel in channels}
     stated = [np.datetime64(start, "ns") for start in starts.values() if start is not None]
     columns: dict[str, Any] = {}
-    clocks: dict[str, Clock] = {}
+    clocks: dict[str, ChannelClock] = {}
     units: dict[str, str] = {}
     names = [channel.name for channel in channels]
     for channel in channels:
@@ -34,5 +34,5 @@ def read_tdms(path: Path) -> Table:
             if unit := str(channel.properties.get("unit_string", "")):
                 units[key] = unit
             if step_s > 0.0:
-                clocks[key] = Clock(late_s + float(channel.properties.get("wf_start_offset", 0.0)), step_s)
+                clocks[key] = ChannelClock(late_s + float(channel.properties.get("wf_start_offset", 0.0)), step_s)
     return Table(path, columns, units=units, clocks=clocks)

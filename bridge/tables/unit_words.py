@@ -1,8 +1,8 @@
-"""Units as people and programs write them: `kN`, `mm/s`, `[N]`, `Nm`, `°`; and units in the names of columns."""
+"""Units in their usual spellings: `kN`, `mm/s`, `[N]`, `Nm`, `°`; and units in the names of columns."""
 
 import re
 
-# what a column holds, its SI unit, and the factors of units without a prefix
+# quantity: its SI unit, and the factors of units without a prefix
 _DEGREE, _TURN = 0.017453292519943295, 6.283185307179586  # rad
 _POUND_kg, _POUND_N = 0.45359237, 4.4482216152605
 _UNITS: dict[str, tuple[str, dict[str, float]]] = {
@@ -37,7 +37,7 @@ _UNITS: dict[str, tuple[str, dict[str, float]]] = {
     "temperature": ("K", {"K": 1.0, "°C": 1.0, "degC": 1.0, "C": 1.0}),
 }
 _PREFIXES = {"n": 1e-9, "µ": 1e-6, "u": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "k": 1e3, "M": 1e6, "G": 1e9}
-# units that take a prefix; `min` is no milli-inch and `cd` no centi-day
+# units that take a prefix; `min` is not a milli-inch
 _PREFIXED = {"s", "N", "m", "m/s", "m/s2", "Hz", "g", "Nm", "rad", "rad/s", "V", "A", "Pa", "bar", "gn"}
 _SAME = str.maketrans(
     {"μ": "µ", "²": "2", "·": "", "*": "", " ": "", "^": "", "−": "-", "⁻": "-", "¹": "1", "\xa0": "", "º": "°"}
@@ -50,16 +50,16 @@ _WORDS = {
     "ms-1": "m/s",
     "newtons": "newton",
     "Umin": "U/min",
-    "KN": "kN",  # of programs that write capitals alone
+    "KN": "kN",  # of programs that write capitals only
     "MM": "mm",
 }
-# a unit behind a name: `Force [N]`, `Force (N)`, `Force / N`, `Force/N`, `Force, N`, `Force in N`, `Force_N`
+# a unit after a name: `Force [N]`, `Force (N)`, `Force / N`, `Force/N`, `Force, N`, `Force in N`, `Force_N`
 _BEHIND = re.compile(
     r"^(?P<name>.*?\S)\s*(?:\[(?P<a>[^\][]*)\]|\((?P<b>[^()]*)\)|\s/\s*(?P<c>\S+)|/(?P<g>[^\s/]+(?:/[^\s/]+)?)|,\s*(?P<d>\S+)|\s+in\s+(?P<e>\S+)|_(?P<f>[^\W_]+))\s*$"
 )
 
-# that a name may end in after a low line: `x_t` and `force_p` have no unit
-_AFTER_LINE = {
+# units accepted after an underscore: `x_t` and `force_p` have no unit
+_AFTER_UNDERSCORE = {
     "s",
     "ms",
     "us",
@@ -84,64 +84,70 @@ _AFTER_LINE = {
     "g",
     "rpm",
 }
-_ALSO_SYMBOLS = {"s", "t", "h", "m", "U"}  # that a quantity has as well: way, time, height, mass, voltage
+_ALSO_SYMBOLS = {
+    "s",
+    "t",
+    "h",
+    "m",
+    "U",
+}  # units that are symbols of quantities too: distance, time, height, mass, voltage
 _OF_TIME = re.compile(r"t|.*(?:time|zeit).*", re.IGNORECASE)
-_INDEX = re.compile(r".*\S\[\d+\]")  # `data[1]` is an element of an array; a unit of 1 stands apart, as in `mu [1]`
-_LONGEST_UNIT = 8  # characters of a unit that is not known here
+_INDEX = re.compile(r".*\S\[\d+\]")  # `data[1]` is an element of an array; a unit of 1 follows a blank, as in `mu [1]`
+_LONGEST_UNIT = 8  # characters of an unknown unit
 
 
 def known_unit(text: str) -> tuple[str, float] | None:
-    """What a unit measures, and its factor to SI: ("force", 1000.0) of `kN`; None where it is none known here."""
+    """The quantity of a unit, and its factor to SI: ("force", 1000.0) for `kN`; None for an unknown unit."""
     word = text.strip().strip("[](){}").translate(_SAME)
     word = _WORDS.get(word, word)
-    for what, (_, units) in _UNITS.items():
+    for quantity, (_, units) in _UNITS.items():
         for same in (word, word.lower()):
             if same in units and (len(same) > 2 or same == word):
-                return what, units[same]
+                return quantity, units[same]
     prefix, rest = word[:1], _WORDS.get(word[1:], word[1:])
     if prefix in _PREFIXES and rest in _PREFIXED:
         if rest == "g" and prefix == "k":
             return "mass", 1.0
-        for what, (_, units) in _UNITS.items():
+        for quantity, (_, units) in _UNITS.items():
             if rest in units:
-                return what, _PREFIXES[prefix] * units[rest]
+                return quantity, _PREFIXES[prefix] * units[rest]
     return None
 
 
 def weight_unit(text: str) -> tuple[str, float] | None:
-    """As `known_unit`, of a column of forces: gram, kilogram and pound are weights there, as load cells show them."""
+    """As `known_unit`, for a column of forces: gram, kilogram and pound are weights, as load cells show them."""
     known = known_unit(text)
     word = text.strip().strip("[](){}").translate(_SAME)
     grams = {"g": 1e-3, "kg": 1.0, "mg": 1e-6, "t": 1e3, "lb": _POUND_kg, "lbs": _POUND_kg}.get(word)
     return ("force", _UNITS["force"][1]["kgf"] * grams) if grams is not None else known
 
 
-def si_unit(what: str) -> str:
-    """The SI unit of what is measured, such as `N` of `force`."""
-    return _UNITS[what][0]
+def si_unit(quantity: str) -> str:
+    """The SI unit of a quantity, such as `N` for `force`."""
+    return _UNITS[quantity][0]
 
 
 def unit_in_name(name: str) -> str:
-    """The unit at the end of a column's name, as it is written there; empty where there is none that is known."""
-    found = None if _INDEX.fullmatch(name) else _BEHIND.match(name)
-    if found is None:
+    """The unit at the end of a column's name, as written there; empty without a known unit."""
+    match = None if _INDEX.fullmatch(name) else _BEHIND.match(name)
+    if match is None:
         return ""
-    unit = next((text for key in "abcdefg" if (text := found[key]) is not None), "").strip()
-    if found["f"] is not None and unit not in _AFTER_LINE:
+    unit = next((text for key in "abcdefg" if (text := match[key]) is not None), "").strip()
+    if match["f"] is not None and unit not in _AFTER_UNDERSCORE:
         return ""
-    if found["g"] is not None and not _is_stroke_before_unit(name, found["name"], unit):
+    if match["g"] is not None and not _is_slash_before_unit(name, match["name"], unit):
         return ""
     return unit if known_unit(unit) else ""
 
 
 def in_brackets(name: str) -> str:
-    """What is in the brackets at the end of a column's name, where a unit stands; empty where there are none."""
-    found = None if _INDEX.fullmatch(name) else _BEHIND.match(name)
-    return (found["a"] or found["b"] or "").strip() if found is not None else ""
+    """The text in brackets at the end of a column's name, the place of a unit; empty without brackets."""
+    match = None if _INDEX.fullmatch(name) else _BEHIND.match(name)
+    return (match["a"] or match["b"] or "").strip() if match is not None else ""
 
 
-def _is_stroke_before_unit(name: str, before: str, unit: str) -> bool:
-    """Whether it is a quantity over its unit, as `Kraft/N`, and no path, unit or rate: `log/t`, `N/mm`, `kN/s`."""
+def _is_slash_before_unit(name: str, before: str, unit: str) -> bool:
+    """Whether the name is a quantity over its unit, as `Kraft/N`, and not a path, unit or rate: `log/t`, `N/mm`, `kN/s`."""
     if "/" in before or known_unit(name) or unit in ("t", "U") or (known_unit(before) and before not in _ALSO_SYMBOLS):
         return False
     return (known_unit(unit) or ("",))[0] != "time" or _OF_TIME.fullmatch(before) is not None
@@ -150,13 +156,13 @@ def _is_stroke_before_unit(name: str, before: str, unit: str) -> bool:
 def bare_name(name: str) -> str:
     """A column's name without the unit at its end, and with single blanks."""
     name = re.sub(r"\s+", " ", name).strip()
-    found = None if _INDEX.fullmatch(name) else _BEHIND.match(name)
-    brackets = found is not None and (found["a"] is not None or found["b"] is not None)
-    return found["name"] if found is not None and (brackets or unit_in_name(name)) else name
+    match = None if _INDEX.fullmatch(name) else _BEHIND.match(name)
+    brackets = match is not None and (match["a"] is not None or match["b"] is not None)
+    return match["name"] if match is not None and (brackets or unit_in_name(name)) else name
 
 
 def is_unit_row(cells: list[str]) -> bool:
-    """Whether the cells are units or empty: all of them, or most and the rest short words that may be units too."""
+    """Whether the non-empty cells are units: most of them known, the rest short words that may be units too."""
     words = [cell.strip() for cell in cells if cell.strip()]
     units = [known_unit(word) is not None or re.fullmatch(r"\[.*\]|\(.*\)", word) is not None for word in words]
     rest = [word for word, unit in zip(words, units, strict=True) if not unit]
@@ -164,5 +170,5 @@ def is_unit_row(cells: list[str]) -> bool:
 
 
 def unknown_units(units: dict[str, str]) -> str:
-    """Which units, by column, are not known here, in words; empty where all are."""
+    """The unknown units and their columns, as text; empty if all are known."""
     return ", ".join(f"{unit!r} of column {name}" for name, unit in units.items() if known_unit(unit) is None)

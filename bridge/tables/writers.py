@@ -1,4 +1,4 @@
-"""Tables written in batches of rows: Parquet, CSV and MATLAB v5. A file appears under its name only when it is whole."""
+"""Tables written in batches of rows: Parquet, CSV and MATLAB v5. A file appears under its name only when complete."""
 
 import contextlib
 from pathlib import Path
@@ -74,7 +74,7 @@ class ArrowTable:
                 options = pa_csv.WriteOptions(quoting_style="none")
                 self._writer = pa_csv.CSVWriter(self._new.file, self._schema, write_options=options)
             else:
-                # no dictionaries, as samples hardly ever repeat
+                # without dictionaries, as samples rarely repeat
                 self._writer = pq.ParquetWriter(
                     self._new.file, self._schema, compression="zstd", compression_level=1, use_dictionary=False
                 )
@@ -137,7 +137,7 @@ class MatFile:
 
 
 class MatTable:
-    """One table of a MATLAB file that holds other tables too; the owner of the file completes it."""
+    """One of several tables of a MATLAB file; the owner of the file completes it."""
 
     def __init__(self, file: MatFile, table: str) -> None:
         self.file = file

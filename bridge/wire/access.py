@@ -1,6 +1,6 @@
-"""What each role may do on the bus: the access control of the rig's session, which relays what all others say.
+"""Permissions of each role on the bus: the access control of the rig's session, which relays all messages.
 
-Everything that is not named here is denied. The rig itself is bound by none of it: it is the session that applies the rules.
+Everything not listed here is denied. The rules do not bind the rig itself, as its session applies them.
 """
 
 from typing import Any
@@ -10,7 +10,7 @@ from bridge.wire.topics import TOPICS
 
 # sender in the table of topics, by role of a session
 _SENDER = {"controller": "controller", "recorder": "recorder", "operator": "cockpit"}
-# of a session to the rig, and of the rig to a session
+# kinds of messages, from a session to the rig and back
 _ALL = [
     "put", "delete", "declare_subscriber", "query", "reply", "declare_queryable",
     "liveliness_token", "liveliness_query", "declare_liveliness_subscriber",
@@ -22,11 +22,11 @@ def access_control(prefix: str, subject: str) -> dict[str, Any]:
 
     Args:
         prefix: of the keys.
-        subject: what tells the roles apart: `usernames`, or `cert_common_names`.
+        subject: attribute that identifies the role: `usernames` or `cert_common_names`.
 
     """
     rules = [
-        # what the rig passes on: all may hear everything
+        # messages that the rig relays: every role may receive all of them
         _rule("hear", ["egress"], _ALL, [f"{prefix}/**"]),
         _rule("listen", ["ingress"], ["declare_subscriber"], [f"{prefix}/**"]),
         _rule("ask", ["ingress"], ["query"], [f"{prefix}/header/*"]),
@@ -41,10 +41,10 @@ def access_control(prefix: str, subject: str) -> dict[str, Any]:
         {"rules": ["hear", "listen", "ask", "who-is-there"], "subjects": list(ROLES)},
     ]
     for role in ROLES:
-        own = _own_rules(prefix, role)
-        rules += own
-        if own:
-            policies.append({"rules": [rule["id"] for rule in own], "subjects": [role]})
+        special = _role_rules(prefix, role)
+        rules += special
+        if special:
+            policies.append({"rules": [rule["id"] for rule in special], "subjects": [role]})
     return {
         "enabled": True,
         "default_permission": "deny",
@@ -54,8 +54,8 @@ def access_control(prefix: str, subject: str) -> dict[str, Any]:
     }
 
 
-def _own_rules(prefix: str, role: str) -> list[dict[str, Any]]:
-    """What only this role may do."""
+def _role_rules(prefix: str, role: str) -> list[dict[str, Any]]:
+    """Permissions of this role alone."""
     sent = [f"{prefix}/{topic.name}" for topic in TOPICS if topic.sender == _SENDER.get(role)]
     rules: list[dict[str, Any]] = []
     if sent:

@@ -1,4 +1,4 @@
-"""Where the processes of one rig meet: endpoint and prefix of the bus, and whether the endpoint is this computer's alone."""
+"""Endpoint and key prefix of the bus of one rig, and whether only this computer can reach the endpoint."""
 
 import ipaddress
 import socket
@@ -10,7 +10,7 @@ from bridge.config import Strict
 
 
 class BusConfig(Strict):
-    """Address and key prefix of the bus of one rig, and where the certificates are."""
+    """Address and key prefix of the bus of one rig, and the folder of the certificates."""
 
     endpoint: Annotated[str, Field(pattern=r"^(tcp|tls)/[^\s,?/]+:[0-9]{1,5}$")] = "tcp/127.0.0.1:7447"
     prefix: Annotated[str, Field(pattern=r"^[^/*$?#]+(/[^/*$?#]+)*$")] = "rig"
@@ -20,7 +20,7 @@ class BusConfig(Strict):
     )
     insecure: bool = Field(
         default=False,
-        description="true: a tcp/ endpoint asks nobody for a password, and others may reach it. Never on a shared network.",
+        description="true: a tcp/ endpoint needs no password, and other computers may reach it. Never on a shared network.",
     )
 
     wait_s: float = Field(
@@ -37,12 +37,12 @@ class BusConfig(Strict):
 
     @property
     def encrypted(self) -> bool:
-        """Whether the endpoint is one of TLS."""
+        """Whether the endpoint uses TLS."""
         return self.endpoint.startswith("tls/")
 
     @property
     def must_be(self) -> str:
-        """What must be right for a rig to answer, in words: one that knows another authority closes the door without a word."""
+        """The condition for an answer of the rig, for a message: a rig with another authority closes the link silently."""
         return "--endpoint and the authority of --certs must be those" if self.encrypted else "--endpoint must be that"
 
     @field_validator("endpoint")
@@ -56,24 +56,24 @@ class BusConfig(Strict):
     def _certificates_are_used(self) -> "BusConfig":
         if self.certificates and not self.encrypted:
             raise ValueError(
-                f"certificates = {self.certificates!r}: nobody would use them at {self.endpoint!r}: the endpoint must be a tls/ "
-                "one; use --endpoint tls/HOST:PORT, or leave --certs out"
+                f"certificates = {self.certificates!r}: unused at {self.endpoint!r}: the endpoint must begin with "
+                "tls/; use --endpoint tls/HOST:PORT, or leave --certs out"
             )
         return self
 
 
 def address(endpoint: str) -> str:
-    """The address of an endpoint as a number, of IPv4 where its name has one; empty where the name is not known."""
+    """The numeric address of an endpoint, IPv4 if the name has one; empty for an unknown name."""
     host = endpoint.partition("/")[2].rpartition(":")[0].strip("[]")
     try:
-        found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
+        rows = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError):
         return ""
-    places = [str(place[4][0]) for place in found if place[0] in {socket.AF_INET, socket.AF_INET6}]
-    return min(places, key=lambda place: ":" in place, default="")
+    addresses = [str(row[4][0]) for row in rows if row[0] in {socket.AF_INET, socket.AF_INET6}]
+    return min(addresses, key=lambda text: ":" in text, default="")
 
 
 def is_loopback(endpoint: str) -> bool:
-    """Whether an endpoint can be reached from this computer alone; False for a name that cannot be resolved."""
-    found = address(endpoint).partition("%")[0]
-    return bool(found) and ipaddress.ip_address(found).is_loopback
+    """Whether only this computer can reach an endpoint; False for a name that cannot be resolved."""
+    number = address(endpoint).partition("%")[0]
+    return bool(number) and ipaddress.ip_address(number).is_loopback

@@ -1,4 +1,4 @@
-"""The clock that the processes of a run read: the machine's, or that of a simulated run, which stands still while it computes."""
+"""The clock of the processes of a run: the computer's, or simulated time, which stops during a computation."""
 
 import time as _machine
 from collections.abc import Callable, Generator
@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 
 class Clock:
-    """The functions of `time` that processes keep time with; `time` below is the one that all modules share."""
+    """The functions of `time` that processes use; all modules share the instance `time` below."""
 
     def __init__(self) -> None:
         self._use_the_machine()
@@ -18,11 +18,11 @@ class Clock:
 
     @contextmanager
     def simulated(self, now_ns: Callable[[], int], sleep: Callable[[float], None]) -> Generator[None]:
-        """Let this process live in simulated time.
+        """Run this process in simulated time.
 
         Args:
             now_ns: the time [ns].
-            sleep: returns when so much time [s] has passed.
+            sleep: returns after this much simulated time [s].
 
         """
         self.monotonic = lambda: now_ns() * 1e-9

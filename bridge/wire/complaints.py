@@ -1,6 +1,6 @@
-"""What is wrong with received messages, told at most once a second for each kind, with how many there were.
+"""Reports of bad messages: at most one event a second for each kind, with a count.
 
-A client that sends rubbish 60 000 times a second must neither end a process nor fill its log, and must not go unsaid.
+A client that sends 60 000 invalid messages a second must neither end a process nor fill its log, but must be reported.
 """
 
 from collections.abc import Callable
@@ -11,9 +11,9 @@ from bridge.wire.clock import time
 _EVERY_S = 1.0  # between two events of one kind; shorter: a flood fills logs and screens
 
 # codes of the events
-BAD_MESSAGE = "BAD_MESSAGE"  # bytes that are no such message, too many of them, or numbers that mean nothing
-FOREIGN = "FOREIGN"  # a good message that none of the known processes can have sent
-FLOOD = "FLOOD"  # more messages than can be read
+BAD_MESSAGE = "BAD_MESSAGE"  # undecodable or too many bytes, or meaningless numbers
+FOREIGN = "FOREIGN"  # a valid message that no known process can have sent
+FLOOD = "FLOOD"  # more messages than the process can read
 CLOCK = "CLOCK"  # t_ns does not follow the numbers of the blocks
 
 
@@ -23,16 +23,16 @@ class _Kind:
 
     text: str = ""
     times: int = 0
-    untold: int = 0
-    told_s: float = -_EVERY_S
+    pending: int = 0  # since the last event
+    reported_s: float = -_EVERY_S
 
 
 class Complaints:
-    """Counts what is wrong and tells it.
+    """Counts bad messages and reports them.
 
     Args:
         tell: publishes an event with a code and a text.
-        clock: the time [s]; that of the process if not given.
+        clock: the time [s]; by default the clock of the process.
 
     """
 
@@ -40,40 +40,42 @@ class Complaints:
         self._tell = tell
         self._clock = clock or time.monotonic
         self._kinds: dict[tuple[str, str], _Kind] = {}
-        self._untold = False
+        self._pending = False
 
     def note(self, code: str, where: str, text: str, times: int = 1) -> None:
-        """Something is wrong, `times` times: told now, or with what follows within the second.
+        """Count a problem: it is reported now, or together with others of its kind when 1 s has passed.
 
         Args:
             code: of the event.
-            where: with the code, the kind; one of a few, never a received text.
-            text: what is wrong and what becomes of it.
-            times: how often.
+            where: forms the kind together with the code; one of a few places, never a received text.
+            text: the problem and its consequence.
+            times: number of occurrences.
 
         """
         kind = self._kinds.setdefault((code, where), _Kind())
         kind.text = text
         kind.times += times
-        kind.untold += times
-        self._untold = True
-        self._tell_one(code, where, kind)
+        kind.pending += times
+        self._pending = True
+        self._report(code, where, kind)
 
-    def tell_when_due(self, all_of_it: bool = False) -> None:
-        """Tell what has been kept back for a second, or all that is untold, at an end."""
-        if not self._untold:
+    def report_when_due(self, all_of_it: bool = False) -> None:
+        """Report problems that have waited for 1 s; with `all_of_it`, at an end, all problems."""
+        if not self._pending:
             return
-        self._untold = False
+        self._pending = False
         for (code, where), kind in self._kinds.items():
-            if kind.untold:
-                self._tell_one(code, where, kind, all_of_it)
-                self._untold = self._untold or kind.untold > 0
+            if kind.pending:
+                self._report(code, where, kind, all_of_it)
+                self._pending = self._pending or kind.pending > 0
 
-    def _tell_one(self, code: str, where: str, kind: _Kind, at_once: bool = False) -> None:
+    def _report(self, code: str, where: str, kind: _Kind, at_once: bool = False) -> None:
         now_s = self._clock()
-        if not at_once and now_s - kind.told_s < _EVERY_S:
+        if not at_once and now_s - kind.reported_s < _EVERY_S:
             return
-        count = f" ({kind.untold} times, {kind.times} in all)" if kind.times > kind.untold else f" ({kind.times} times)"
+        count = (
+            f" ({kind.pending} times, {kind.times} in all)" if kind.times > kind.pending else f" ({kind.times} times)"
+        )
         count = count if kind.times > 1 else ""
-        kind.untold, kind.told_s = 0, now_s
+        kind.pending, kind.reported_s = 0, now_s
         self._tell(code, f"{where}: {kind.text}{count}")

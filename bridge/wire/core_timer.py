@@ -1,7 +1,7 @@
-"""A timer on one core that tells when the core stood still. A process of its own, which `bridge/wire/pauses.py` starts.
+"""A timer on one core that detects stalls of the core. `bridge/wire/pauses.py` runs it as a separate process.
 
-A thread of the recorder would not do: it waits for Python's lock, and a wait for that looks like a pause. The file is run by
-itself with the standard library alone, so that a timer costs 10 MB and no start of numba.
+In a thread of the recorder, a wait for Python's lock (GIL) would look like a stall. The script uses the standard library alone,
+so that a timer takes 10 MB of memory and does not load numba.
 """
 
 import gc
@@ -10,31 +10,32 @@ import signal
 import sys
 import time
 
-# How often a core is asked. Longer: a pause must last longer to be seen for certain. Shorter: the timer takes more of its core,
-# which is 1.6 to 1.9 % now and 1.9 to 2.5 % with 1 ms (docs/method/bridge.md).
+# Period of the timer. Longer: a stall must be longer to be detected for certain. Shorter: the timer loads its core more, which
+# is 1.6 to 1.9 % now and 1.9 to 2.5 % with 1 ms (docs/method/rig.md).
 PERIOD_NS = 1_500_000
-# How late a timer must be. Shorter: ordinary waking up is told, one in 1000 of which takes 0.16 to 0.26 ms. Longer: pauses are
-# missed that make a command late, as it takes 0.25 ms itself and has 1 ms. From PERIOD_NS + LEAST_NS on each pause is seen.
+# Lateness from which a timer reports a stall. Shorter: ordinary wake-ups count, one in 1000 of which takes 0.16 to 0.26 ms.
+# Longer: stalls are missed that make a command late, which needs 0.25 ms of its 1 ms. Each stall from PERIOD_NS + LEAST_NS on is
+# detected.
 LEAST_NS = 300_000
-# Wakings between two looks at the parent and at the time spent waiting, which cost as much as a waking does
+# Wake-ups between two checks of the parent and of the waiting time, which take as long as a wake-up
 _LOOKS = 16
 
 
-def stood_still_until_ns(due_ns: int, woke_ns: int, waited_ns: int) -> int:
-    """Until when a core stood still whose timer was due at `due_ns`; 0 where it did not, or too briefly to tell.
+def stall_end_ns(due_ns: int, woke_ns: int, waited_ns: int) -> int:
+    """The end of the stall of a core whose timer was due at `due_ns`; 0 without a stall, or if it was too short.
 
     Args:
-        due_ns: when the timer was due.
-        woke_ns: when its thread ran.
-        waited_ns: for how long that thread was ready to run, and something else ran: the core did not stand still then.
+        due_ns: due time of the timer.
+        woke_ns: time at which its thread ran.
+        waited_ns: time for which the thread was ready while another one ran: the core did not stall then.
 
     """
     until_ns = woke_ns - waited_ns
     return until_ns if until_ns - due_ns > LEAST_NS else 0
 
 
-def waiting_is_told() -> bool:
-    """Whether this system tells for how long a thread was ready to run and did not."""
+def reports_waiting() -> bool:
+    """Whether this system reports how long a thread was ready to run but waited."""
     try:
         with open("/proc/self/schedstat", "rb") as stat:
             return len(stat.read().split()) == 3
@@ -43,9 +44,9 @@ def waiting_is_told() -> bool:
 
 
 def watch(core: int, priority: int, parent: int, phase_ns: int) -> None:
-    """Write a line `core from until` [ns of time.perf_counter_ns] for each time the core stood still, until the parent ends."""
+    """Write a line `core from until` [ns of time.perf_counter_ns] for each stall of the core, until the parent ends."""
     for number in (signal.SIGINT, signal.SIGHUP):
-        signal.signal(number, signal.SIG_IGN)  # the recorder closes its log after Ctrl-C, and ends this process then
+        signal.signal(number, signal.SIG_IGN)  # after Ctrl-C the recorder closes its log and then ends this process
     os.sched_setaffinity(0, {core})
     os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
     gc.disable()
@@ -66,7 +67,7 @@ def watch(core: int, priority: int, parent: int, phase_ns: int) -> None:
         woke_ns = now_ns()
         if woke_ns - due_ns > LEAST_NS:
             before_ns, waited_ns = waited_ns, waited_so_far_ns()
-            until_ns = stood_still_until_ns(due_ns, woke_ns, waited_ns - before_ns)
+            until_ns = stall_end_ns(due_ns, woke_ns, waited_ns - before_ns)
             if until_ns:
                 os.write(1, b"%d %d %d\n" % (core, due_ns, until_ns))
             due_ns = next_due_ns()

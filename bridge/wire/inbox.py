@@ -1,4 +1,4 @@
-"""Bounded queues between the receiving threads of the bus and a loop; what does not fit is dropped and counted."""
+"""Bounded queues between the receiving threads of the bus and a loop; messages that do not fit are dropped and counted."""
 
 import queue
 import time
@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 from bridge.wire.topics import Topic
 
-# Blocks, or commands, that may wait for a loop that stalls: at least those of a lease, 1500 of 1 ms, as a longer stall ends the
-# link. With 512 the controller loses 755 blocks in four stops of 0.7 to 0.9 s, with 4096 none in 24 such stops.
+# Blocks or commands that may wait during a stall of the loop: at least 1500, the blocks of 1 ms in one lease, as a longer stall
+# ends the link. With 512 the controller loses 755 blocks in four stops of 0.7 to 0.9 s, with 4096 none in 24 such stops.
 # Larger: a controller that floods its rig delays a block by more than 16 ms, at 4 us a command.
 WAITING = 4096
-# Rare messages of one topic that may wait. Too small: a burst of announcements is lost. Larger: who floods a topic is read for
-# longer before the next block, which 256 messages delay by less than 1 ms.
+# Rare messages of one topic that may wait. Too small: a burst of announcements is lost. Larger: a flood of one topic delays the
+# next block for longer; 256 messages delay it by less than 1 ms.
 _KEPT = 256
 
 
@@ -24,7 +24,7 @@ class Received(NamedTuple):
 
 
 class _Room:
-    """How many messages of one kind came and went: each number has one writing thread, so that no lock is needed."""
+    """Counts of messages of one kind, in and out: only one thread writes each count, so it needs no lock."""
 
     def __init__(self, limit: int) -> None:
         self.limit = limit
@@ -37,8 +37,7 @@ class Inbox:
 
     Args:
         limit: messages of `push` that may wait, of all topics together.
-        patient: wait instead of dropping, which blocks the sender. It is for lockstep, where no message may be lost and none is
-            late.
+        patient: wait instead of dropping, which blocks the sender: for lockstep, where no message may be lost or is ever late.
 
     """
 
@@ -55,7 +54,7 @@ class Inbox:
         self._add(self._pushed, received)
 
     def keep(self, received: Received) -> None:
-        """Add a rare message, for which the others leave room: 256 of each topic may wait besides what `push` has added."""
+        """Add a rare message: 256 of each topic may wait in addition to the messages of `push`."""
         name = received.topic.name
         if name not in self._kept:
             self._kept[name] = _Room(_KEPT)

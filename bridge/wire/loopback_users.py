@@ -1,7 +1,7 @@
-"""Who may take part on a plain endpoint of this computer: a password for each role, made by the rig and found by our commands.
+"""Credentials of an unencrypted endpoint of this computer: a password for each role, made by the rig and read by our commands.
 
-The file is the dictionary that Zenoh reads, `ROLE:PASSWORD` a line, in a folder that only this user can enter. Who cannot read
-it cannot open a session.
+The file is the dictionary that Zenoh reads, `ROLE:PASSWORD` a line, in a folder that only this user can enter. A session without
+a password from it is refused.
 """
 
 import contextlib
@@ -19,26 +19,26 @@ _FOLDER = "stickslip"
 
 
 def folders() -> list[Path]:
-    """Where the file may be, the best place first: the runtime folder, the cache, one for short-lived files."""
-    found: list[Path] = []
+    """Folders that may hold the file, the best first: for runtime files, for the cache, for temporary files."""
+    places: list[Path] = []
     if runtime := os.environ.get("XDG_RUNTIME_DIR"):
-        found.append(Path(runtime) / _FOLDER)
+        places.append(Path(runtime) / _FOLDER)
     # not `Path.home`, which fails for a user without a home
     cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     if os.path.isabs(cache):
-        found.append(Path(cache) / _FOLDER / "run")
-    found.append(Path(tempfile.gettempdir()) / f"{_FOLDER}-{os.getuid()}")
-    return found
+        places.append(Path(cache) / _FOLDER / "run")
+    places.append(Path(tempfile.gettempdir()) / f"{_FOLDER}-{os.getuid()}")
+    return places
 
 
 def file_name(endpoint: str) -> str:
-    """The name of the file of an endpoint: rigs on other ports have other passwords."""
+    """The name of the file of an endpoint; rigs on different ports have different passwords."""
     port = endpoint.rpartition(":")[2]
     return f"{address(endpoint).replace(':', '_')}-{port}.users"
 
 
 def password(endpoint: str, role: str) -> str | None:
-    """The password of a role at an endpoint; None where no rig of this user's has made one."""
+    """The password of a role at an endpoint; None if no rig of this user has made one."""
     newest = max((path for path in _files(endpoint) if _is_private(path, stat.S_ISREG)), key=_written_ns, default=None)
     with contextlib.suppress(OSError, UnicodeDecodeError):
         for line in newest.read_text().splitlines() if newest is not None else []:
@@ -49,9 +49,9 @@ def password(endpoint: str, role: str) -> str | None:
 
 
 def make(endpoint: str) -> Path:
-    """Make the file of an endpoint, or take the one that is there, so that who knew a rig before its restart knows it again.
+    """Make the file of an endpoint, or keep an existing one, so that clients stay valid over a restart of the rig.
 
-    Raises Fault NOT_SECURE where no folder can hold it so that others cannot read it.
+    Raises Fault NOT_SECURE if no folder is safe from other users.
     """
     for path in _files(endpoint):
         with contextlib.suppress(OSError):
@@ -63,9 +63,7 @@ def make(endpoint: str) -> Path:
             os.utime(path)
             return path
     places = ", ".join(str(folder) for folder in folders())
-    line = (
-        f"{endpoint}: its password cannot be kept where others cannot read it: {places} must be this user's, mode 0700"
-    )
+    line = f"{endpoint}: no folder for its password is private: one of {places} must belong to this user, mode 0700"
     raise Fault("NOT_SECURE", f"{line}; set XDG_RUNTIME_DIR to such a folder, or use a tls/ endpoint")
 
 
@@ -74,16 +72,19 @@ def _files(endpoint: str) -> list[Path]:
 
 
 def is_private_folder(path: Path) -> bool:
-    """Whether a folder is this user's, no link, and closed to everybody else."""
+    """Whether a folder belongs to this user, is not a link, and is closed to all others."""
     return _is_private(path, stat.S_ISDIR)
 
 
 def _is_private(path: Path, kind: object) -> bool:
-    """Whether a file or folder is of its kind, this user's, and closed to everybody else; a link is neither."""
+    """Whether a path is of this kind, belongs to this user and is closed to all others; a link never is."""
     with contextlib.suppress(OSError):
-        found = path.lstat()
+        status = path.lstat()
         return (
-            callable(kind) and bool(kind(found.st_mode)) and found.st_uid == os.getuid() and not found.st_mode & 0o077
+            callable(kind)
+            and bool(kind(status.st_mode))
+            and status.st_uid == os.getuid()
+            and not status.st_mode & 0o077
         )
     return False
 
@@ -96,7 +97,7 @@ def _is_whole(path: Path) -> bool:
 
 
 def _write(path: Path) -> None:
-    """Write new passwords, whole or not at all; what was there under the name is replaced, a link too."""
+    """Write new passwords completely or not at all; an existing file or link of the name is replaced."""
     handle, part = tempfile.mkstemp(dir=path.parent)  # mode 0600
     try:
         with os.fdopen(handle, "w") as file:

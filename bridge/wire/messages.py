@@ -1,8 +1,8 @@
 """The messages of `stickslip.proto` as records that kernels read and write in place.
 
-A streaming message has only fields of fixed width, so each field has a fixed place in the protobuf bytes. `Layout` lays a numpy
-record over these places: a filled record is an encoded message, and a topic of a log is one array. A client may leave out zeros
-or change the order of the fields; the protobuf library first brings such bytes into this form.
+A streaming message has only fields of fixed width, so each field has a fixed place in the protobuf bytes. `Layout` is a numpy
+record with these places: a filled record is an encoded message, and a topic of a log is one array. If a client omits zeros or
+reorders fields, the protobuf library first converts the bytes to this form.
 """
 
 from typing import Any, cast
@@ -30,10 +30,10 @@ _SCALARS = {
     FieldDescriptor.TYPE_SFIXED64: ("<i8", 1),
     FieldDescriptor.TYPE_FIXED32: ("<u4", 5),
     FieldDescriptor.TYPE_FLOAT: ("<f4", 5),
-    FieldDescriptor.TYPE_ENUM: ("u1", 0),  # a varint, which is one byte up to 127; a zero is written, too
+    FieldDescriptor.TYPE_ENUM: ("u1", 0),  # a varint: one byte up to 127; zeros are written too
 }
 _PACKED_WIRE_TYPE = 2
-_SUM_BYTES = 4  # of a checksum, at the end of a sensor block; its tag is one more
+_SUM_BYTES = 4  # of a checksum, at the end of a sensor block; its tag is one byte more
 _NO_SUM = bytes(_SUM_BYTES)
 
 
@@ -81,7 +81,7 @@ class Layout:
             fixed += bytes(width)
             ends.append(len(template))
         self.size = len(template)
-        self.whole_sizes = frozenset(ends)  # of the message as it is, and as it was when it had fewer fields
+        self.whole_sizes = frozenset(ends)  # of the present message, and of earlier versions with fewer fields
         fields = np.dtype(cast(Any, {"names": names, "formats": formats, "offsets": offsets, "itemsize": self.size}))
         self.dtype: np.dtype[Any] = np.dtype((np.record, fields))
         self._template = bytes(template)
@@ -92,7 +92,7 @@ class Layout:
 
     def blank(self, count: int = 1) -> Records:
         """`count` messages of zeros, [count]; their `tobytes()` is their protobuf encoding."""
-        # filled as bytes, as numpy's copy of a record drops the bytes between the fields, which are the tags
+        # copied as bytes: numpy's copy of a record omits the tags between the fields
         messages = np.empty((count, self.size), np.uint8)
         messages[:] = np.frombuffer(self._template, np.uint8)
         return np.frombuffer(messages, self.dtype)
@@ -102,7 +102,7 @@ class Layout:
         return len(payload) == self.size and int.from_bytes(payload, "little") & self._mask == self._tags
 
     def all_canonical(self, payloads: npt.NDArray[np.uint8]) -> bool:
-        """The same of many payloads of the message's size, [payloads, size]."""
+        """As `is_canonical`, for many payloads of the message's size, [payloads, size]."""
         return bool((payloads[:, self._tag_places] == self._tag_bytes).all())
 
     def canonical(self, payload: bytes, topic: str) -> bytes:
@@ -115,7 +115,9 @@ class Layout:
             message.ParseFromString(payload)
         except DecodeError:
             name = self.message.DESCRIPTOR.name
-            line = f"{topic}: {len(payload)} bytes are no {name}; see bridge/wire/PROTOCOL.md for its fields"
+            line = (
+                f"{topic}: {len(payload)} bytes cannot be decoded as {name}; see bridge/wire/PROTOCOL.md for its fields"
+            )
             raise Fault("BAD_MESSAGE", line) from None
         record = self.blank()
         for field in self.message.DESCRIPTOR.fields:
@@ -134,7 +136,7 @@ class Layout:
         return self.record(self.canonical(payload, topic))
 
     def record(self, canonical: bytes) -> Records:
-        """One record from the bytes of one message that is known to be canonical."""
+        """One record from the bytes of a canonical message."""
         return np.frombuffer(bytearray(canonical), self.dtype)
 
 
@@ -156,21 +158,21 @@ def sensor_block(samples: int) -> Layout:
 
 
 def sealed(block: bytes) -> bytes:
-    """A canonical sensor block with its checksum, from the rig to whoever uses it: what carries it cannot change it unseen."""
+    """A canonical sensor block with its checksum, which reveals any corruption between the rig and a reader."""
     return block[:-_SUM_BYTES] + crc32(block[: -_SUM_BYTES - 1]).to_bytes(_SUM_BYTES, "little")
 
 
 def seal_all(blocks: Records) -> None:
-    """Give each sensor block its checksum, in place."""
+    """Write the checksum of each sensor block, in place."""
     data, size = memoryview(blocks.tobytes()), blocks.dtype.itemsize
     blocks["checksum"] = [crc32(data[at : at + size - _SUM_BYTES - 1]) for at in range(0, len(data), size)]
 
 
 def has_checksum(block: bytes) -> bool:
-    """Whether a canonical sensor block says a checksum of itself."""
+    """Whether a canonical sensor block has a checksum."""
     return block[-_SUM_BYTES:] != _NO_SUM
 
 
 def is_whole(block: bytes) -> bool:
-    """Whether a canonical sensor block is as its checksum says."""
+    """Whether the checksum of a canonical sensor block is right."""
     return crc32(block[: -_SUM_BYTES - 1]) == int.from_bytes(block[-_SUM_BYTES:], "little")

@@ -1,4 +1,4 @@
-"""Stalls of the computer: stretches in which the timers on all cores were late together."""
+"""Stalls of the computer: times at which the timers on all cores were late together."""
 
 import contextlib
 import os
@@ -10,27 +10,27 @@ from typing import NamedTuple
 
 from bridge.wire import core_timer, realtime
 
-_PRIORITY = realtime.LOOP_PRIORITY + 1  # a loop that takes long must not look like a core that stands still
-# Cores that are watched. More: a process of 10 MB each; a stall of eight cores is one of the computer already.
+_PRIORITY = realtime.LOOP_PRIORITY + 1  # a long step of a loop must not look like a stall
+# Watched cores. More: another process of 10 MB for each, while a stall of eight cores already counts as one of the computer.
 _MOST_CORES = 8
-# From when on no timer has more to say of a pause. Shorter: a line of a timer that starts to run later would be missed.
+# Age from which a pause is complete. Shorter: the line of a timer that wakes later would be missed.
 _SETTLED_NS = 50_000_000
 NO_PRIORITY = "no real-time priority"
 
 
 class Pause(NamedTuple):
-    """A stretch in which nothing ran [ns of time.perf_counter_ns]."""
+    """A stall [ns of time.perf_counter_ns]."""
 
     from_ns: int
     until_ns: int
-    core: int | None = None  # that stalled alone; None: every core did, which is a stall of the computer
+    core: int | None = None  # the stalled core; None: all cores, a stall of the computer
 
 
 def shared(still: Sequence[Sequence[Pause]]) -> list[Pause]:
-    """Where all cores stood still at the same time, in order of time.
+    """Stalls of all cores at the same time, in order of time.
 
     Args:
-        still: of every core the stretches in which it stood still, in order of time and without overlap.
+        still: the stalls of every core, in order of time and without overlap.
 
     """
     if not still:
@@ -53,9 +53,9 @@ def shared(still: Sequence[Sequence[Pause]]) -> list[Pause]:
 
 
 class PauseWatch:
-    """Timers on the cores that this process may use. They end with `close`, or when this process does.
+    """Timers on the cores that this process may use. They end with `close` or with this process.
 
-    `refused` says why nothing is watched, or from when on nothing is; empty while the timers run.
+    `refused` gives the reason if no timer runs, or no longer; it is empty while the timers run.
     """
 
     def __init__(self) -> None:
@@ -71,22 +71,22 @@ class PauseWatch:
         self._pipe, other = os.pipe()
         os.set_blocking(self._pipe, False)
         for place, core in enumerate(self.cores):
-            phase_ns = core_timer.PERIOD_NS * place // len(self.cores)  # not all at once: a pause is seen sooner
+            phase_ns = core_timer.PERIOD_NS * place // len(self.cores)  # staggered, so that a stall is detected sooner
             words = (core, _PRIORITY, os.getpid(), phase_ns)
             self._timers.append(
                 subprocess.Popen(
-                    # -I -S: neither folders of the person who calls nor installed packages are looked at
+                    # -I -S: ignore the folders of the user and installed packages
                     [sys.executable, "-I", "-S", core_timer.__file__, *map(str, words)],
                     stdin=subprocess.DEVNULL,
                     stdout=other,
                     stderr=subprocess.DEVNULL,
-                    start_new_session=True,  # Ctrl-C is for the recorder
+                    start_new_session=True,  # keeps Ctrl-C from the timers: the recorder ends them
                 )
             )
         os.close(other)
 
     def poll(self, all_of_them: bool = False) -> list[Pause]:
-        """Pauses since the last call, of the computer and of one core alone; with `all_of_them` also such of the last 50 ms."""
+        """Stalls of the computer and of single cores since the last call; with `all_of_them` also of the last 50 ms."""
         if self.refused:
             return []
         with contextlib.suppress(BlockingIOError):
@@ -101,8 +101,8 @@ class PauseWatch:
         return self._settled(time.perf_counter_ns() - (0 if all_of_them else _SETTLED_NS))
 
     def _settled(self, until_ns: int) -> list[Pause]:
-        found, self._still = settled(self._still, until_ns)
-        return found
+        pauses, self._still = settled(self._still, until_ns)
+        return pauses
 
     def close(self) -> None:
         """End the timers."""
@@ -116,22 +116,22 @@ class PauseWatch:
 
 
 def settled(still: Mapping[int, list[Pause]], until_ns: int) -> tuple[list[Pause], dict[int, list[Pause]]]:
-    """The pauses that ended before `until_ns`, of the computer and of one core alone; and the parts of later ones."""
+    """Stalls of the computer and of single cores that ended before `until_ns`; and the parts of later stalls."""
     together = shared(list(still.values()))
-    found = [pause for pause in together if pause.until_ns <= until_ns]
-    told_ns = max((pause.until_ns for pause in found), default=0)
+    complete = [pause for pause in together if pause.until_ns <= until_ns]
+    reported_ns = max((pause.until_ns for pause in complete), default=0)
     for core, pauses in still.items():
         ended = [pause for pause in pauses if pause.until_ns <= until_ns]
-        found += [piece._replace(core=core) for pause in ended for piece in _without(pause, together)]
+        complete += [piece._replace(core=core) for pause in ended for piece in _without(pause, together)]
     later = {
-        core: [Pause(max(pause.from_ns, told_ns), pause.until_ns) for pause in pauses if pause.until_ns > until_ns]
+        core: [Pause(max(pause.from_ns, reported_ns), pause.until_ns) for pause in pauses if pause.until_ns > until_ns]
         for core, pauses in still.items()
     }
-    return sorted(found, key=lambda pause: pause.from_ns), later
+    return sorted(complete, key=lambda pause: pause.from_ns), later
 
 
 def _without(pause: Pause, others: Sequence[Pause]) -> list[Pause]:
-    """What the others leave of a pause; they are in order of time."""
+    """The parts of a pause outside the others, which are in order of time."""
     pieces: list[Pause] = []
     from_ns = pause.from_ns
     for other in others:
@@ -149,7 +149,7 @@ def _cores() -> list[int]:
 
 
 def _refusal() -> str:
-    """Why nothing can be watched here; empty where it can."""
+    """The reason why stalls cannot be watched; empty if they can."""
     if not realtime.may_claim(_PRIORITY):
         return NO_PRIORITY
-    return "" if core_timer.waiting_is_told() else "this system does not tell how long a thread waits"
+    return "" if core_timer.reports_waiting() else "this system does not report how long a thread waits"

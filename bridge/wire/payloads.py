@@ -1,4 +1,4 @@
-"""Messages of `stickslip.proto` from and to bytes, with the protobuf library alone: what only talks needs no arrays."""
+"""Messages of `stickslip.proto` from and to bytes, with the protobuf library alone, without arrays."""
 
 import functools
 import struct
@@ -12,14 +12,14 @@ from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
 
 SCHEMA_VERSION = 2
-READABLE_VERSIONS = (1, 2)  # fields are only appended, so an older log lacks what came later and no more
+READABLE_VERSIONS = (1, 2)  # fields are only appended, so an older log lacks only the newer fields
 
-# Bytes of a message beyond which nobody parses it. Ten times the longest block, 8 kB with 400 samples; a memory and a
-# configuration may be longer. Larger: who sends rubbish costs more of a process's time.
+# Longest message that is parsed [bytes]: eight times the longest block, 8 kB with 400 samples; snapshots and headers may be
+# longer. Larger: invalid messages cost a process more time.
 _LARGEST_BYTES = 1 << 16
 _LONG: dict[type[Message], int] = {wire.Snapshot: 1 << 18, wire.Header: 1 << 18}
 
-_DESCRIBED = Path(__file__).with_name("stickslip.desc")  # with comments, which the generated module leaves out
+_DESCRIBED = Path(__file__).with_name("stickslip.desc")  # with comments, which the generated module omits
 _SEQUENCE_AND_TIME = struct.Struct("<QBq")  # of a canonical message, with the tag between them
 _MESSAGES, _ENUMS = 4, 5  # numbers of these fields of a FileDescriptorProto
 
@@ -46,13 +46,13 @@ def parsed(message: type[M], payload: bytes, topic: str) -> M:
     try:
         result.ParseFromString(payload)
     except DecodeError:
-        line = f"{topic}: {len(payload)} bytes are no {message.DESCRIPTOR.name}; see bridge/wire/PROTOCOL.md for its fields"
-        raise Fault("BAD_MESSAGE", line) from None
+        line = f"{topic}: {len(payload)} bytes cannot be decoded as {message.DESCRIPTOR.name}"
+        raise Fault("BAD_MESSAGE", f"{line}; see bridge/wire/PROTOCOL.md for its fields") from None
     return result
 
 
 def refuse_other_schema(header: wire.Header) -> None:
-    """Raise Fault BAD_MESSAGE where a process of the run speaks a version of the messages that is not known here."""
+    """Raise Fault BAD_MESSAGE if a process of the run uses an unsupported version of the messages."""
     if header.schema_version not in READABLE_VERSIONS:
         known = " or ".join(map(str, READABLE_VERSIONS))
         line = f"header/{header.role}: schema_version = {header.schema_version}: must be {known}"
@@ -60,7 +60,7 @@ def refuse_other_schema(header: wire.Header) -> None:
 
 
 def sequence_and_time(payload: bytes, message: type[Message]) -> tuple[int, int]:
-    """Sequence and t_ns of a message that has both; read directly where the bytes are canonical. Raises Fault BAD_MESSAGE."""
+    """Sequence and t_ns of a message that has both; read directly if the bytes are canonical. Raises Fault BAD_MESSAGE."""
     if len(payload) >= 18 and payload[0] == 0x09 and payload[9] == 0x11:
         sequence, _, t_ns = _SEQUENCE_AND_TIME.unpack_from(payload, 1)
         return sequence, t_ns
@@ -72,23 +72,23 @@ def sequence_and_time(payload: bytes, message: type[Message]) -> tuple[int, int]
 def file_descriptor_set(message: type[Message]) -> bytes:
     """The schema of a message for MCAP: a serialised FileDescriptorSet, with the comments on this message and its enums.
 
-    But for the comments the file is the same for all messages; with all of them a log would begin with 250 kB, twice.
+    Only the comments differ between messages; with the comments of all, a log would begin with 250 kB, twice.
     """
     files = descriptor_pb2.FileDescriptorSet()
     files.ParseFromString(_DESCRIBED.read_bytes())
     file = files.file[0]
-    own = [(_MESSAGES, [one.name for one in file.message_type].index(message.DESCRIPTOR.name))]
-    enums = [one.name for one in file.enum_type]
-    own += [(_ENUMS, enums.index(name)) for name in _enums_of(message) if name in enums]
-    told = [
+    paths = [(_MESSAGES, [kind.name for kind in file.message_type].index(message.DESCRIPTOR.name))]
+    enums = [kind.name for kind in file.enum_type]
+    paths += [(_ENUMS, enums.index(name)) for name in _enums_of(message) if name in enums]
+    comments = [
         place
         for place in file.source_code_info.location
-        if tuple(place.path[:2]) in own and (place.leading_comments or place.trailing_comments)
+        if tuple(place.path[:2]) in paths and (place.leading_comments or place.trailing_comments)
     ]
-    for field in (field for one in file.message_type for field in one.field):
+    for field in (field for kind in file.message_type for field in kind.field):
         field.ClearField("json_name")  # follows from the name
     del file.source_code_info.location[:]
-    file.source_code_info.location.extend(told)
+    file.source_code_info.location.extend(comments)
     return files.SerializeToString()
 
 

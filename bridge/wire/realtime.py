@@ -1,4 +1,4 @@
-"""Settings of the operating system with which a process keeps a period of 1 ms: core, priority, timer slack."""
+"""Settings of the operating system for a period of 1 ms: core, priority, timer slack, locked memory."""
 
 import contextlib
 import ctypes
@@ -17,24 +17,25 @@ _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = (
     1,
     2,
     4,
-)  # on fault: the stacks of all threads, 8 MB each, are not filled at once
+)  # on fault: locks pages at their first use, so that thread stacks of 8 MB each are not filled
 LOOP_PRIORITY = 50
-# Lockstep waits for nobody's clock: it goes on where the loops in real time and their recorders leave a core to it. Without a
-# priority of its own it took half as long again (docs/method/bridge.md).
+# Lockstep has no deadlines, so it runs below real-time loops and their recorders. With normal scheduling it took 1.5 times as
+# long (docs/method/rig.md).
 LOCKSTEP_PRIORITY = 1
 RECORDER_PRIORITY = 10  # below the loop, above every process without SCHED_FIFO: a starved recorder loses blocks
-VIEWER_PRIORITY = 1  # of who only looks on: below the loop and the recorder, above every process without SCHED_FIFO
+VIEWER_PRIORITY = 1  # of a viewer: below the loop and the recorder, above every process without SCHED_FIFO
 
-# A wait that ends so much later was a pause of this process. Shorter: a busy core looks like one. Longer: a peer is given up.
+# A wait that ends this much later counts as a stall of this process. Shorter: a busy core looks like a stall. Longer: after a
+# stall, this process gives up a peer that is well.
 _PAUSE_S = 0.25
-NORMAL = "normal scheduling"  # how the text of a START event begins where SCHED_FIFO was refused
+NORMAL = "normal scheduling"  # start of the text of a START event without SCHED_FIFO
 NOT_GUARANTEED = "real time is not guaranteed; grant CAP_SYS_NICE or an rtprio limit"
 
 
 def core(place: int) -> int | None:
-    """The core for a thread number `place` among those that this process may use; None where the system does not tell.
+    """The core for thread number `place`, among the cores that this process may use; None if the system does not list them.
 
-    `taskset` decides which cores these are: with two cores for each rig, no rig holds up another.
+    Choose the cores with `taskset`: with two cores for each rig, no rig delays another.
     """
     if not hasattr(os, "sched_getaffinity"):
         return None
@@ -48,26 +49,25 @@ def _threads() -> list[int]:
 
 
 def pin(to_core: int | None) -> bool:
-    """Keep every thread of this process on a core, which needs no privilege; whether that was done.
+    """Pin every thread of this process to a core, which needs no privilege. Returns whether it was possible.
 
-    Call it after the bus is open, so that the threads of the bus are included. It reduced the median round trip from 143 to
-    88 us.
+    Call it after the bus is open, to include the threads of the bus. It reduced the median round trip from 143 to 88 us.
     """
     if to_core is None:
         return False
     threads = _threads()
     for thread in threads:
-        with contextlib.suppress(OSError):  # a thread may have ended meanwhile
+        with contextlib.suppress(OSError):  # a thread may have ended since
             os.sched_setaffinity(thread, {to_core})
     return bool(threads)
 
 
 def claim(to_core: int | None, priority: int = LOOP_PRIORITY) -> str:
-    """Pin this process, ask for SCHED_FIFO and keep its memory from being paged out; return what was granted, in words.
+    """Pin this process, request SCHED_FIFO and lock its memory; returns a text of the granted settings.
 
-    Call it after the bus is open, so that the threads of the bus are included. Also stops the garbage collector.
+    Call it after the bus is open, to include the threads of the bus. It also stops the garbage collector.
 
-    Without SCHED_FIFO, 0.6 to 1.4 % of the answers miss 1 ms on a computer whose cores are all busy.
+    Without SCHED_FIFO, 0.6 to 1.4 % of the answers take more than 1 ms on a computer whose cores are all busy.
     """
     gc.collect()
     gc.freeze()
@@ -91,31 +91,31 @@ def claim(to_core: int | None, priority: int = LOOP_PRIORITY) -> str:
     return f"{NORMAL}, {where}, {memory}: {NOT_GUARANTEED}"
 
 
-@functools.cache  # before this process is moved to them
-def _beside_the_loop() -> frozenset[int]:
-    """The cores of this process but for those of the loop's two processes; none on a computer with two."""
+@functools.cache  # computed before this process is pinned
+def _cores_outside_the_loop() -> frozenset[int]:
+    """The cores of this process without the cores of the loop's two processes; empty on a computer with two cores."""
     if not hasattr(os, "sched_getaffinity"):
         return frozenset()
     return frozenset(os.sched_getaffinity(0)) - {core(0), core(1)}
 
 
-def hasten() -> None:
-    """Let this process go before all without SCHED_FIFO, where it may: for one who only looks on, and keeps no time.
+def raise_priority() -> None:
+    """Give this process priority over all processes without SCHED_FIFO, if permitted: for viewers and operator commands.
 
-    Where all cores are busy it otherwise waits for some 100 ms, and so does an operator's STOP. Later threads inherit it.
+    If all cores are busy it would otherwise wait for about 100 ms, and so would an operator's STOP. New threads inherit it.
     """
-    beside = _beside_the_loop()
+    cores = _cores_outside_the_loop()
     for thread in _threads():
         with contextlib.suppress(OSError):
-            if beside:
-                os.sched_setaffinity(thread, beside)
+            if cores:
+                os.sched_setaffinity(thread, cores)
             os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(VIEWER_PRIORITY))
 
 
 def _lock_memory() -> bool:
-    """Keep what this process has touched, and what it will touch, in memory; whether the system grants it.
+    """Lock the present and future memory of this process; returns whether the system granted it.
 
-    Under a limit of locked memory nothing is asked for: a later allocation would fail then.
+    With a limit on locked memory it does nothing, as a later allocation would fail.
     """
     if not sys.platform.startswith("linux"):
         return False
@@ -125,15 +125,15 @@ def _lock_memory() -> bool:
 
 
 def let_the_bus_send() -> None:
-    """Let the thread that sends run now: it has this thread's core and priority, and waits until the loop sleeps otherwise.
+    """Let the sending thread run now: on the same core and priority, it would otherwise wait until the loop sleeps.
 
-    Without it a command takes 410 to 440 us in the median in place of 320 to 350 (docs/method/bridge.md).
+    Without it the median time of a command is 410 to 440 us instead of 320 to 350 (docs/method/rig.md).
     """
     os.sched_yield()
 
 
 def may_claim(priority: int = LOOP_PRIORITY) -> bool:
-    """Whether this process could get SCHED_FIFO. Tried in a thread that ends at once, so that nothing keeps the priority."""
+    """Whether this process could get SCHED_FIFO. The attempt runs in a thread that ends, so no thread keeps the priority."""
     granted: list[bool] = []
 
     def attempt() -> None:
@@ -148,22 +148,22 @@ def may_claim(priority: int = LOOP_PRIORITY) -> bool:
 
 
 def was_paused(since_s: float, due_s: float) -> bool:
-    """Whether this process itself stood still: a wait from `since_s` until `due_s` ended much later (`time.monotonic`).
+    """Whether this process itself stalled: a wait from `since_s` until `due_s` ended much later (`time.monotonic`).
 
-    The silence of a peer in that time says nothing of the peer.
+    The silence of a peer during a stall is not evidence against the peer.
     """
     return time.monotonic() > max(since_s, due_s) + _PAUSE_S
 
 
 class Pacer:
-    """Wakes once a period at absolute times, so that the duration of the work between does not add up."""
+    """Wakes once a period at absolute times, so that the duration of the work does not accumulate."""
 
     def __init__(self, period_ns: int) -> None:
         self._period_ns = period_ns
         self._start_ns = time.perf_counter_ns()
 
     def wait(self, tick: int) -> int:
-        """Sleep until the end of period `tick` (from 0) and return how late that was [ns]."""
+        """Sleep until the end of period `tick` (from 0) and return the lateness [ns]."""
         due_ns = self._start_ns + (tick + 1) * self._period_ns
         left_ns = due_ns - time.perf_counter_ns()
         if left_ns > 0:

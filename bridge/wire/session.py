@@ -1,4 +1,4 @@
-"""The settings of a Zenoh session: one listens, all others dial it; who may open a session, and what each may do."""
+"""The settings of a Zenoh session: the rig listens, all others dial it; credentials and permissions of each role."""
 
 import json
 import os
@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-# Zenoh reads this when it is imported. One thread in place of five: a message hops from thread to thread on its way otherwise.
+# Zenoh reads this at its import. One thread instead of five, so that a message need not pass from thread to thread.
 os.environ.setdefault(
     "ZENOH_RUNTIME",
     "(rx: (worker_threads: 1), net: (handover: rx), acc: (handover: rx), tx: (handover: rx), app: (handover: rx))",
@@ -18,19 +18,19 @@ from bridge.wire import certificates, loopback_users
 from bridge.wire.access import access_control
 from bridge.wire.bus_config import BusConfig, is_loopback
 
-# Time after which a silent session is dropped. A process that ends closes its socket, so this concerns frozen processes.
-# Shorter: a longer stop of a process breaks its link. With four stops of 0.7 to 0.9 s in 16 s, 0.75 s loses 1540 blocks of the
-# log and 1850 of the controller; with 24 such stops, 1.5 s loses none. Longer: a frozen controller is replaced later, as its
-# place is free after the lease, and 2 s are the most (docs/method/bridge.md).
+# Time after which a silent session is dropped. A process that ends closes its socket, so this concerns frozen processes only.
+# Shorter: a stall of a process breaks its link: with four stalls of 0.7 to 0.9 s in 16 s, 0.75 s loses 1540 blocks of the log and
+# 1850 of the controller; with 24 such stalls, 1.5 s loses none. Longer: a frozen controller is replaced later, only after the
+# lease; the limit is 2 s (docs/method/rig.md).
 LEASE_S = 1.5
 # In lockstep no process has a deadline and no message may be lost, so the lease is Zenoh's default.
 _LOCKSTEP_LEASE_S = 10.0
 DIAL_S = 2.0  # largest duration of one attempt; longer delays a stop, as Zenoh cannot be stopped while it dials
-# Bytes of a message that a session puts together from its parts; Zenoh drops a longer one. It is that of the longest message that
-# is read (bridge/wire/payloads.py). Larger: the rig relays it, and one that fills a queue of 16 parts of 64 kB, with the
-# congestion control BLOCK, holds up the only thread of the rig's session until its links break: 10 s with one of 3 MB.
+# Longest message that a session assembles from its parts [bytes]; Zenoh drops a longer one. It equals the longest message that is
+# read (bridge/wire/payloads.py). Larger: the rig relays messages that fill a queue of 16 parts of 64 kB; with congestion control
+# BLOCK they stop the only thread of the rig's session until its links break: 10 s for a message of 3 MB.
 _LARGEST_BYTES = 1 << 18
-# In real time the rig relays nothing that would have to wait for a receiver.
+# In real time the rig drops messages instead of waiting for a receiver.
 _NEVER_WAIT = [
     {
         "id": "never-wait",
@@ -43,7 +43,7 @@ _NEVER_WAIT = [
 
 
 def session_settings(config: BusConfig, hub: bool, lockstep: bool, dial_s: float = DIAL_S) -> dict[str, Any]:
-    """The settings of a session, by Zenoh's key; `hub` is the session that listens, any other dials for `dial_s`."""
+    """The settings of a session by Zenoh's key; the `hub` listens, other sessions dial for `dial_s`."""
     return {
         "mode": "peer" if hub else "client",
         "listen/endpoints": [config.endpoint] if hub else [],
@@ -55,15 +55,16 @@ def session_settings(config: BusConfig, hub: bool, lockstep: bool, dial_s: float
         "scouting/gossip/enabled": False,
         "transport/link/tx/lease": round(1e3 * (_LOCKSTEP_LEASE_S if lockstep else LEASE_S)),
         "transport/link/tx/keep_alive": 4,
-        # Packets of 64 kB, some hundred messages each, that may wait for a receiver: 2 by default, 16 at most. Smaller: a
-        # receiver that stalls loses blocks.
+        # Packets of 64 kB, about a hundred messages each, that may wait for a receiver: 2 by default, 16 at most. Smaller: a
+        # stalled receiver loses blocks.
         "transport/link/tx/queue/size/data": 16,
         "transport/link/rx/max_message_size": _LARGEST_BYTES,
-        # Connections that say nothing, 100 by default for 10 s [ms] each: with 110 of them a person's stop finds no place.
+        # Pending connections without a handshake and their timeout [ms]; by default 100 for 10 s. With 110 of them an operator's
+        # stop could not connect.
         "transport/unicast/accept_pending": 800,
         "transport/unicast/accept_timeout": 1000,
-        # Waiting [us] for room in a queue before the parts of a long message are dropped, 50 000 by default: nothing else is
-        # relayed meanwhile.
+        # Time [us] to wait for room in a queue before the parts of a long message are dropped, 50 000 by default. It blocks
+        # all other messages.
         "transport/link/tx/queue/congestion_control/drop/max_wait_before_drop_fragments": 1000,
         "qos/network": _NEVER_WAIT if hub and not lockstep else [],
         "transport/shared_memory/enabled": False,
@@ -73,7 +74,7 @@ def session_settings(config: BusConfig, hub: bool, lockstep: bool, dial_s: float
 def session_config(
     config: BusConfig, hub: bool, lockstep: bool, dial_s: float = DIAL_S, security: dict[str, Any] | None = None
 ) -> zenoh.Config:
-    """The same as Zenoh wants it, with what `rig_security` or `role_security` says besides."""
+    """`session_settings` as Zenoh's configuration, with the settings of `rig_security` or `role_security`."""
     result = zenoh.Config()
     for key, value in (session_settings(config, hub, lockstep, dial_s) | (security or {})).items():
         result.insert_json5(key, json.dumps(value))
@@ -81,33 +82,33 @@ def session_config(
 
 
 def rig_security(config: BusConfig) -> dict[str, Any]:
-    """Settings of the session that listens: who may open a session to it, and what each role may do there.
+    """Security settings of the listening session: credentials and permissions of each role.
 
-    Raises Fault NOT_SECURE for an endpoint that others can reach without TLS, and where a certificate or password is missing.
+    Raises Fault NOT_SECURE for an endpoint that others can reach without TLS, and if a certificate or password is missing.
     """
     if config.encrypted:
         return tls_rig_security(
             config, certificates.checked(certificates.RIG, certificates.folder(config.certificates))
         )
     if config.insecure:
-        line = f"{config.endpoint}: --insecure: whoever reaches this port can stop and command the exciter"
+        line = f"{config.endpoint}: --insecure: any program that reaches this port can command the exciter"
         print(f"stickslip: warning: {line}", file=sys.stderr, flush=True)
         return {}
     if not is_loopback(config.endpoint):
-        line = f"{config.endpoint}: others can reach it: must be an address of this computer alone, or tls/"
+        line = f"{config.endpoint}: other computers can reach it: must be an address of this computer alone, or tls/"
         remedy = "make certificates with `stickslip certs FOLDER` and use --endpoint tls/HOST:PORT --certs FOLDER"
         raise Fault("NOT_SECURE", f"{line}; {remedy}; --insecure allows it on a network of trusted computers alone")
     return loopback_rig_security(config, loopback_users.make(config.endpoint))
 
 
-def tls_rig_security(config: BusConfig, own: certificates.RoleFiles) -> dict[str, Any]:
-    """Of a rig at a tls/ endpoint: roles are the common names of certificates."""
-    settings = certificates.tls_settings(certificates.RIG, own)
+def tls_rig_security(config: BusConfig, files: certificates.RoleFiles) -> dict[str, Any]:
+    """Security settings of a rig at a tls/ endpoint: roles are the common names of certificates."""
+    settings = certificates.tls_settings(certificates.RIG, files)
     return settings | {"access_control": access_control(config.prefix, "cert_common_names")}
 
 
 def loopback_rig_security(config: BusConfig, users: Path) -> dict[str, Any]:
-    """Of a rig at an endpoint of this computer alone: roles are the names in the file of passwords."""
+    """Security settings of a rig at an endpoint of this computer alone: roles are the names in the password file."""
     return {
         "transport/auth/usrpwd": {"dictionary_file": str(users)},
         "access_control": access_control(config.prefix, "usernames"),
@@ -115,9 +116,9 @@ def loopback_rig_security(config: BusConfig, users: Path) -> dict[str, Any]:
 
 
 def role_security(config: BusConfig, role: str) -> dict[str, Any]:
-    """Settings of a session that dials, with what lets its role in; nothing where this user's rig has left no password.
+    """Credentials of a dialling session; empty if no rig of this user has left a password.
 
-    Raises Fault NOT_SECURE for a tls/ endpoint whose certificates are not there.
+    Raises Fault NOT_SECURE if a certificate for a tls/ endpoint is missing.
     """
     if config.encrypted:
         return certificates.tls_settings(role, certificates.checked(role, certificates.folder(config.certificates)))

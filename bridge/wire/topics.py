@@ -14,7 +14,7 @@ class Topic(NamedTuple):
     message: type[Message]
     sender: str
     rate_Hz: float  # expected; 0: irregular
-    stale_after_s: float  # age from which a message is a fault and no longer a value; 0: never
+    stale_after_s: float  # age from which the value of a message is no longer used; 0: never
     logged: bool
 
 
@@ -46,7 +46,7 @@ TOPICS = (
     FAULT,
 )
 BY_NAME = {topic.name: topic for topic in TOPICS}
-SCOPE = Topic("scope", wire.Scope, "recorder", 200.0, 0.0, logged=True)  # for viewers: in the log, and not on the bus
+SCOPE = Topic("scope", wire.Scope, "recorder", 200.0, 0.0, logged=True)  # for viewers: in the log only, not on the bus
 
 
 class Outgoing(NamedTuple):

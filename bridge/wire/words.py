@@ -1,4 +1,4 @@
-"""What the numbers of a log mean: modes, states of the contact, reasons and limits, in the words of `stickslip.proto`."""
+"""The meaning of codes in a log: modes, contact states, reasons, limits, guard states and causes, from `stickslip.proto`."""
 
 import re
 from pathlib import Path
@@ -14,8 +14,8 @@ _COLUMNS = {
 }  # by enum
 
 
-class Word(NamedTuple):
-    """A number of a column of /trace, /command and /state."""
+class ColumnWord(NamedTuple):
+    """A code in a column of a log, such as `reason` of /trace."""
 
     column: str
     number: int
@@ -23,12 +23,12 @@ class Word(NamedTuple):
     help: str
 
 
-def words() -> list[Word]:
-    """Every word, by column and number; `help` is the comment beside the word in `stickslip.proto`."""
+def words() -> list[ColumnWord]:
+    """All codes, by column and number; `help` is the comment of the code in `stickslip.proto`."""
     proto = Path(__file__).with_name("stickslip.proto").read_text(encoding="utf-8")
-    found: list[Word] = []
+    result: list[ColumnWord] = []
     for enum, column in _COLUMNS.items():
         body = re.findall(rf"^enum {enum} {{\n(.*?)^}}", proto, re.MULTILINE | re.DOTALL)[0]
         rows = re.findall(r"(\w+) = (\d+); +// (.+)", body)
-        found += [Word(column, int(number), word, told) for word, number, told in rows]
-    return found
+        result += [ColumnWord(column, int(number), word, comment) for word, number, comment in rows]
+    return result

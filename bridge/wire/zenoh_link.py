@@ -1,7 +1,7 @@
 """The bus: one Zenoh session of one process, on an explicit endpoint, without scouting.
 
-The plant listens. All other processes connect to the plant as clients, and the plant relays their messages, so only one side of a
-connection dials. Receiving threads copy bytes into bounded queues and do nothing else: publishing from a callback can deadlock.
+The plant listens. All other processes connect to it as clients, and it relays their messages. Receiving threads only copy bytes
+into bounded queues: publishing from a callback can deadlock.
 """
 
 import contextlib
@@ -29,24 +29,24 @@ from bridge.wire.topics import Topic
 
 __all__ = ["Bus", "BusConfig", "Inbox", "Received"]
 
-# One attempt to dial without a password: a rig that begins makes one, and only the next attempt has it.
+# Duration of one attempt to dial without a password. A starting rig makes a password, which only the next attempt can use.
 _WITHOUT_PASSWORD_S = 0.2
-_READS_S = 0.5  # in which a rig that runs has read the first bytes of a connection, on a busy computer too
-_NO_PROTOCOL = b"\x08\x00" + b"\xff" * 8  # a length and as many bytes, as Zenoh frames them; in TLS no handshake
+_READS_S = 0.5  # in this time a running rig reads the first bytes of a connection, even on a busy computer
+_NO_PROTOCOL = b"\x08\x00" + b"\xff" * 8  # a length and its bytes, as Zenoh frames them; not a TLS handshake
 _AT_ONCE = struct.pack("ii", 0, 0)  # SO_LINGER off
-_OWN_SOURCE = re.compile(r" at /\S+\.rs:\d+\.?")  # of Zenoh: a place in it, behind each of its errors
+_SOURCE_LINE = re.compile(r" at /\S+\.rs:\d+\.?")  # a line of Zenoh's source, at the end of each of its errors
 _LIBC = ctypes.CDLL(None)
-_ROLES = frozenset({"plant", "controller", "recorder"})  # which have a token each
-_MOST_CLAIMS = 64  # of controllers that start at once; more are a flood, and one rival is enough to yield
+_ROLES = frozenset({"plant", "controller", "recorder"})  # the roles with a token
+_MOST_CLAIMS = 64  # of controllers that start at once; more are a flood, and one rival suffices to yield
 
 
 _of_thread = threading.local()
 
 
 def _keep_thread_state() -> None:
-    """Keep what Python knows of the present thread of Zenoh until the thread ends.
+    """Keep Python's state of the present thread of Zenoh until the thread ends.
 
-    Otherwise Python makes it anew for every callback, which costs a page fault a message.
+    Otherwise Python creates the state for every callback, which costs a page fault for each message.
     """
     if not hasattr(_of_thread, "kept"):
         ctypes.pythonapi.PyGILState_Ensure()
@@ -54,12 +54,12 @@ def _keep_thread_state() -> None:
 
 
 def _close_at_once(_event: zenoh.TransportEvent) -> None:
-    """Let a link of this process be closed without a wait for what lies in it, after one was made.
+    """After a link was made: let this process close links without a wait for unsent data.
 
-    Zenoh's links linger: where the other process is frozen, closing one waits for its kernel, 30 to 40 ms, on the only thread
-    that sends and relays (zenoh issues 1101, 2350). What lies in a link is sent all the same, after it was closed.
+    Zenoh sets SO_LINGER: if the other process is frozen, closing a link takes 30 to 40 ms, on the only thread that sends and
+    relays (zenoh issues 1101, 2350). Unsent data of a closed link are still sent.
     """
-    for name in os.listdir("/proc/self/fd"):  # of a file that is no socket, nothing comes
+    for name in os.listdir("/proc/self/fd"):  # on a file that is not a socket this does nothing
         _LIBC.setsockopt(int(name), socket.SOL_SOCKET, socket.SO_LINGER, _AT_ONCE, len(_AT_ONCE))
 
 
@@ -68,36 +68,36 @@ def _listening(config: BusConfig, lockstep: bool) -> zenoh.Session:
     try:
         session = zenoh.open(session_config(config, hub=True, lockstep=lockstep, security=security))
     except zenoh.ZError as error:
-        line = (
-            f"{config.endpoint}: cannot listen there: must be free, and an address of this computer ({_brief(error)})"
-        )
-        raise Fault("ENDPOINT_BUSY", f"{line}; end what holds it or choose another --endpoint") from None
+        line = f"{config.endpoint}: cannot listen on it: must be a free port and an address of this computer ({_brief(error)})"
+        raise Fault("ENDPOINT_BUSY", f"{line}; end the process that holds it, or choose another --endpoint") from None
     return session
 
 
-def _dialled(config: BusConfig, role: str, lockstep: bool, stop: threading.Event, own_s: float | None) -> zenoh.Session:
-    """Dial for `own_s`, the patience of a command that has no --wait, else for `config.wait_s`."""
-    patience_s = config.wait_s if own_s is None else own_s
+def _dialled(
+    config: BusConfig, role: str, lockstep: bool, stop: threading.Event, fixed_s: float | None
+) -> zenoh.Session:
+    """Dial for `fixed_s`, the patience of a command without --wait, else for `config.wait_s`."""
+    patience_s = config.wait_s if fixed_s is None else fixed_s
     until_s = time.monotonic() + patience_s
     while not stop.is_set():
-        security = role_security(config, role)  # anew each time: the rig may make it meanwhile
+        security = role_security(config, role)  # read at each attempt: the rig may have made it since
         dial_s = min(DIAL_S if security else _WITHOUT_PASSWORD_S, patience_s)
         try:
             return zenoh.open(session_config(config, False, lockstep, dial_s, security))
         except zenoh.ZError:
             if time.monotonic() > until_s:
-                line = f"{config.endpoint}: no plant answers there after {patience_s:g} s"
+                line = f"{config.endpoint}: no plant answered within {patience_s:g} s"
                 more = "; a first start compiles before it answers" + (
-                    ": --wait S waits longer" if own_s is None else ""
+                    ": --wait S waits longer" if fixed_s is None else ""
                 )
                 raise Fault("NO_PEER", f"{line}; {_remedy(config, bool(security))}{more}") from None
-    raise Fault("NO_PEER", f"{config.endpoint}: no plant answered there before the stop")
+    raise Fault("NO_PEER", f"{config.endpoint}: no plant answered before the stop")
 
 
-def stands_still(config: BusConfig) -> bool:
-    """Whether something listens at an endpoint and does not read: its process is frozen, or has no time.
+def is_frozen(config: BusConfig) -> bool:
+    """Whether the process that listens at an endpoint does not read: it is frozen, or gets no processor time.
 
-    Asked after nobody answered. A rig that runs ends a connection whose first bytes are none of its protocol.
+    Call it after a missing answer. A running rig ends a connection whose first bytes do not follow its protocol.
     """
     host, _, port = config.endpoint.partition("/")[2].rpartition(":")
     try:
@@ -114,14 +114,18 @@ def stands_still(config: BusConfig) -> bool:
 def _remedy(config: BusConfig, known: bool) -> str:
     start = "start `stickslip plant` with this --endpoint"
     if config.encrypted:
-        return f"{start}, and compare the certificates of both sides: one authority, and the host's name in that of the rig"
+        return (
+            f"{start}, and check the certificates: both sides need the same authority, and the rig's must name its host"
+        )
     return (
-        start if known else f"{start}; a rig of another user of this computer refuses all who cannot read its password"
+        start
+        if known
+        else f"{start}; a rig of another user of this computer refuses clients that cannot read its password"
     )
 
 
 class Bus:
-    """The session of one role. Use as a context manager: an unclosed session hangs the process at its end."""
+    """The session of one role. Use it as a context manager: an unclosed session hangs the process at its end."""
 
     def __init__(
         self,
@@ -133,7 +137,7 @@ class Bus:
     ) -> None:
         """Listen as the plant; any other role dials the plant for `patience_s`, else `config.wait_s`, or until `stop` is set.
 
-        What is neither controller, recorder nor operator is a viewer, who may only listen.
+        Roles other than controller, recorder and operator are viewers, which may only listen.
 
         Raises Fault ENDPOINT_BUSY, NO_PEER, NOT_SECURE.
         """
@@ -158,7 +162,7 @@ class Bus:
                 patience_s,
             )
         )
-        # in a thread of Python's own, as it looks at every file of this process
+        # in a Python thread, as it visits every open file of this process
         self._keep.append(self._session.info.declare_transport_events_listener(_close_at_once, history=True))
         self._keep.append(
             self._session.liveliness().declare_subscriber(
@@ -180,7 +184,7 @@ class Bus:
 
     def _on_alive(self, sample: Any) -> None:
         role = str(sample.key_expr).rsplit("/", 1)[-1]
-        if role in _ROLES:  # whoever else announces itself is nobody that anyone waits for
+        if role in _ROLES:  # no process waits for other roles
             self._keep_up(self._alive, role, sample)
 
     def _on_claim(self, sample: Any) -> None:
@@ -201,9 +205,9 @@ class Bus:
     def publisher(self, topic: Topic) -> Callable[[bytes], None]:
         """A function that sends bytes on `topic`.
 
-        Zenoh sends a message at once where its queue is empty, and packs messages together where it is not: 16 packets then hold
-        some 1600 blocks. Sent `express`, each message fills a packet, and a receiver that stalls for 17 ms loses the rest. In
-        real time a message that cannot be sent is dropped; in lockstep the call waits.
+        Zenoh sends a message at once if its queue is empty, and otherwise packs messages together: 16 packets hold about 1600
+        blocks. With `express` each message fills a packet, and a receiver that stalls for 17 ms loses blocks. In real time a
+        message that cannot be sent is dropped; in lockstep the call waits.
         """
         block = zenoh.CongestionControl.BLOCK
         declared = self._session.declare_publisher(
@@ -221,7 +225,7 @@ class Bus:
         def on_sample(sample: Any) -> None:
             _keep_thread_state()
             payload = sample.payload.to_bytes()
-            if len(payload) > most:  # enough of it that whoever parses it refuses it for its length
+            if len(payload) > most:  # still long enough to be refused for its length
                 payload = payload[: most + 1]
             receive(Received(topic, payload, time.perf_counter_ns()))
 
@@ -229,12 +233,12 @@ class Bus:
         self._keep.append(self._session.declare_subscriber(self._key(topic.name), handler))
 
     def serve_header(self, header: wire.Header) -> None:
-        """Answer queries for the configuration of the header's role with `header`, and with which process this is."""
+        """Answer queries for the configuration of the header's role with `header` and the identity of this process."""
         key = self._key(f"header/{header.role}")
-        told = wire.Header()
-        told.CopyFrom(header)
-        told.process = this_process()
-        payload = told.SerializeToString()
+        answer = wire.Header()
+        answer.CopyFrom(header)
+        answer.process = this_process()
+        payload = answer.SerializeToString()
 
         def reply(query: Any) -> None:
             with query:
@@ -244,31 +248,31 @@ class Bus:
 
     def headers(self, roles: Iterable[str], timeout_s: float, stop: threading.Event) -> dict[str, wire.Header]:
         """The configurations of those `roles` that answer within `timeout_s` and before `stop` is set, by role."""
-        found: dict[str, wire.Header] = {}
+        answers: dict[str, wire.Header] = {}
         until_s = time.monotonic() + timeout_s
         missing = set(roles)
         while missing and time.monotonic() < until_s and not stop.is_set():
             for reply in self._session.get(self._key("header/*"), timeout=0.5):
                 header = _header(reply)
                 if header is not None and header.role in missing:
-                    found[header.role] = header
+                    answers[header.role] = header
                     missing.discard(header.role)
             if missing:
                 time.sleep(0.02)
-        return found
+        return answers
 
     def announce(self) -> None:
         """Announce that this role is ready: its subscriptions are in place and its kernels are compiled."""
         self._token = self._session.liveliness().declare_token(self._key(f"alive/{self._role}"))
 
     def withdraw(self) -> None:
-        """Take the announcement back: this role ends, though its session still relays what the others say."""
+        """Withdraw the announcement: this role ends, but its session still relays messages of the others."""
         if self._token is not None:
             self._token.undeclare()
             self._token = None
 
     def claim(self) -> tuple[str, Callable[[], set[str]]]:
-        """Announce that this process wants its role. Returns its claim, and a function that returns the claims of others."""
+        """Claim the role for this process. Returns the claim, and a function that returns the claims of others."""
         mine = uuid.uuid4().hex
         liveliness = self._session.liveliness()
         self._keep.append(liveliness.declare_token(self._key(f"claim/{self._role}/{mine}")))
@@ -287,12 +291,12 @@ class Bus:
             return role in self._alive
 
     def came(self, role: str) -> int:
-        """How many times `role` has announced itself; more than once: it was away, or the link to it was."""
+        """Number of announcements of `role`; above 1, the role or the link to it was lost in between."""
         with self._alive_changed:
             return self._came.get(role, 0)
 
     def linked(self) -> bool:
-        """Whether the link to the rig stands; only of a session that dialled."""
+        """Whether this session, which dialled, has a link to the rig."""
         return bool(self._session.info.peers_zid() or self._session.info.routers_zid())
 
     def wait_for(self, roles: Iterable[str], timeout_s: float) -> set[str]:
@@ -309,7 +313,7 @@ class Bus:
 
 
 def _header(reply: Any) -> wire.Header | None:
-    """The header in a reply; None for rubbish, and for one of another role than the key it answers for."""
+    """The header in a reply; None if it is invalid, or if its role is not the role of the key."""
     if reply.ok is None:
         return None
     with contextlib.suppress(Fault):
@@ -320,5 +324,5 @@ def _header(reply: Any) -> wire.Header | None:
 
 
 def _brief(error: Exception) -> str:
-    """What Zenoh says, without the places in its own source."""
-    return _OWN_SOURCE.sub("", str(error).splitlines()[0])
+    """The message of a Zenoh error without the lines of its source."""
+    return _SOURCE_LINE.sub("", str(error).splitlines()[0])

@@ -1,18 +1,21 @@
-"""What each command of `stickslip` takes and prints; `cockpit.cli` puts them together.
+"""Options and output of each `stickslip` command; `cockpit.cli` lists them.
 
-run                         plant, controller and recorder in one go
-processes                   one of them alone: plant, controller, record
-person                      arm, disarm, stop, reset, status
-stress                      a room: bench, fault, soak
-replay                      a log through today's controller, simulated again, or back on the bus
+run                         plant, controller and recorder together
+processes                   each of them alone: plant, controller, record
+operator_commands                      arm, disarm, stop, reset, status
+live                        serve, watch
+stress/                     fault, soak
+replay                      a log through this version's controller, simulated again, or published on the bus
 pictures                    plot, review, map, reproduce
-look                        what is in a measured file
-log, blind                  groups of commands
-example                     evidence of a made-up rig
-diagnose, diagnose_output   evidence to a diagnosis; its progress and its words on a terminal
-explain, scenarios          what there is to know without a run
+look                        estimates from a measured file
+log                         info, check, recover, export, import
+example                     evidence of a simulated rig
+diagnose, diagnose_output   a diagnosis from evidence; its progress and its text on a terminal
+explain, scenarios          meanings of codes; shipped scenarios and rigs
 certs                       certificates for a bus beyond one computer
-schema                      prints the JSON Schema of a format
+schema                      the JSON Schema of a format
+moved                       names of commands that left the package
 as_json/                    `--json` of every command, and the JSON Schema of every format, from the types of the results
-options                     what several commands have
+options                     options that several commands share
+log_info                    `stickslip log info`
 """

@@ -10,15 +10,15 @@ from cockpit.run.writable import check_output_folder
 
 
 def certs(
-    folder: Annotated[Path, typer.Argument(help="Where they go; made where it is not there.")],
+    folder: Annotated[Path, typer.Argument(help="Folder for the certificates; created if missing.")],
     hosts: Annotated[
-        list[str], typer.Option("--host", help="A further name or address of the rig's computer. Repeatable.")
+        list[str], typer.Option("--host", help="Additional name or address of the rig's computer. Repeatable.")
     ] = [],  # noqa: B006
     as_json: Json = None,
 ) -> None:
     """Make certificates for the roles rig, controller, recorder, operator and viewer, for a bus over TLS; keys have mode 0600.
 
-    Where the folder has an authority already, that one signs; a certificate that is there is never replaced.
+    An authority that is already in the folder signs them; an existing certificate is never replaced.
     """
 
     def work() -> None:
@@ -30,7 +30,7 @@ def certs(
             f"made     {', '.join(name for name in made.files if name.endswith('.pem'))} and their keys in {made.folder}",
             f"rig at   {', '.join(made.hosts)}",
             f"until    {made.until}",
-            "next     give each computer authority.pem and the two files of its role; keep authority.key where nobody reads it",
+            "next     give each computer authority.pem and the two files of its role; keep authority.key secret",
         ]
         tell(as_json, made, lines)
 

@@ -1,4 +1,4 @@
-"""What `stickslip diagnose` shows and writes: progress, the answer in words, one line a folder, strict JSON."""
+"""Output of `stickslip diagnose`: progress, the answer in words, one line per folder, strict JSON."""
 
 import sys
 from collections.abc import Callable, Generator
@@ -20,12 +20,12 @@ _SHOWN_CANDIDATES = 3
 
 
 def in_words(diagnosis: "Diagnosis") -> list[str]:
-    """The verdict first, then the leading candidates, the gap, what to measure next, and what is wrong with the data."""
+    """Lines for the terminal: verdict, leading candidates, gap, next experiment, findings about the data."""
     gap, after = diagnosis.gap, diagnosis.next_experiment
     lines = [words.headline(diagnosis), *diagnosis.summary]
-    for label, one in zip(("candidates", "", ""), diagnosis.candidates[:_SHOWN_CANDIDATES], strict=False):
-        sizes = "; ".join(words.estimate_in_words(one.effect, *item) for item in one.parameters.items())
-        lines.append(f"{label:<10} {one.effect:<28} {units.percent(one.probability):>8}   {sizes}".rstrip())
+    for label, row in zip(("candidates", "", ""), diagnosis.candidates[:_SHOWN_CANDIDATES], strict=False):
+        sizes = "; ".join(words.estimate_in_words(row.effect, *item) for item in row.parameters.items())
+        lines.append(f"{label:<10} {row.effect:<28} {units.percent(row.probability):>8}   {sizes}".rstrip())
     if gap.runs:
         numbers = [f"{units.times(gap.nominal)} as described", f"{units.times(gap.retuned)} baseline"]
         if diagnosis.effects:
@@ -46,12 +46,12 @@ def in_words(diagnosis: "Diagnosis") -> list[str]:
 
 
 def in_a_line(outcome: "FolderResult") -> str:
-    """What became of one folder among many."""
+    """Result of one folder among many, in one line."""
     if outcome.diagnosis is not None:
-        # the run that was held out unasked is no fault of the data
+        # "holdout" reports a run held out by default, which is not a defect of the data
         doubts = sum(finding.kind != "holdout" for finding in outcome.diagnosis.findings)
-        told = f"; {units.counted(doubts, 'finding')} about its data, see --json" if doubts else ""
-        return f"{outcome.source.name}: {words.headline(outcome.diagnosis)}{told}"
+        data = f"; {units.counted(doubts, 'finding')} about its data, see --json" if doubts else ""
+        return f"{outcome.source.name}: {words.headline(outcome.diagnosis)}{data}"
     code, line = outcome.fault or ("", "")
     return f"{outcome.source.name}: {code}: {line}"
 
@@ -70,7 +70,7 @@ def _as_json(outcome: "FolderResult") -> dict[str, Any]:
 
 @contextmanager
 def watched() -> Generator[Callable[[str, float], None]]:
-    """What is known so far, line by line on stderr, with a bar below for a person who watches."""
+    """Intermediate results line by line on stderr, with a progress bar below on a terminal."""
     last = ""
     if not sys.stderr.isatty():
 

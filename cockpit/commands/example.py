@@ -1,4 +1,4 @@
-"""`stickslip example`: evidence of a made-up rig with a hidden fault, for a first diagnosis."""
+"""`stickslip example`: evidence of a simulated rig with a hidden fault, for a first diagnosis."""
 
 from enum import StrEnum
 from pathlib import Path
@@ -15,7 +15,7 @@ from cockpit.run.writable import check_output_folder, writing
 
 
 class EffectName(StrEnum):
-    """Faults to choose from."""
+    """Values of `--effect`."""
 
     none = "none"
     drive_damping = "drive-damping"
@@ -23,7 +23,7 @@ class EffectName(StrEnum):
     force_sensor_gain = "force-sensor-gain"
 
 
-# sizes that a diagnosis of these runs names
+# sizes large enough that a diagnosis of these runs identifies the effect
 _EFFECTS: dict[EffectName, dict[str, dict[str, float | str]]] = {
     EffectName.none: {},
     EffectName.drive_damping: {"drive-damping": {"damping_Ns_per_m": 12.0}},
@@ -34,24 +34,24 @@ _HIDDEN = EffectName.drive_damping
 
 
 class Example(NamedTuple):
-    """What was made."""
+    """Result of the command."""
 
     folder: str
     runs: list[str]  # data files
-    held_out: list[str]  # those of them that no number is fitted to
+    held_out: list[str]  # data files to which no number is fitted
     seed: int
 
 
 def example(
-    folder: Annotated[Path, typer.Argument(help="The evidence folder to make; it must not be there yet.")],
-    seed: Annotated[int, typer.Option(min=0, help="Of the rig's own numbers, noise and surface.")] = 1,
+    folder: Annotated[Path, typer.Argument(help="Evidence folder to make; it must not exist yet.")],
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the rig's numbers, noise and surface.")] = 1,
     effect: Annotated[
         EffectName | None,
-        typer.Option(help="A fault that you choose, in place of a hidden one; none: the rig is as described."),
+        typer.Option(help="Effect to simulate in place of the hidden one; none: the rig is as described."),
     ] = None,
     as_json: Json = None,
 ) -> None:
-    """Make evidence of a rig with a hidden fault: four runs as they would be measured, for a first diagnosis."""
+    """Simulate evidence of a rig with a hidden fault: four runs with noise, for a first diagnosis."""
 
     def work() -> None:
         from diagnosis.evidence.manifest import read_manifest
@@ -59,12 +59,12 @@ def example(
 
         end_like_ctrl_c()
         if folder.exists() or folder.is_symlink():
-            raise Fault("CONFIG", f"{folder}: is there already; nothing was written; choose another folder")
+            raise Fault("CONFIG", f"{folder}: exists already; nothing was written; choose another folder")
         check_output_folder("FOLDER", folder)
-        beside = next(parent for parent in folder.absolute().parents if parent.exists())
+        parent_folder = next(parent for parent in folder.absolute().parents if parent.exists())
         with (
             writing(folder),
-            TemporaryDirectory(prefix=".stickslip-", dir=beside) as part,
+            TemporaryDirectory(prefix=".stickslip-", dir=parent_folder) as part,
             watched_share(f"making {folder}", quiet=as_json == STDOUT) as progress,
         ):
             make_evidence(Path(part, "made"), Case("ladder", _EFFECTS[effect or _HIDDEN]), seed, progress)

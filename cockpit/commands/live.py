@@ -1,4 +1,4 @@
-"""`stickslip serve` and `watch`: a rig looked at while it runs, in a browser and in a terminal."""
+"""`stickslip serve` and `watch`: show a running rig in a browser or a terminal."""
 
 import contextlib
 import json
@@ -12,28 +12,24 @@ from bridge.faults import Fault
 from cockpit.commands.as_json.option import STDOUT, Json, carry_out
 from cockpit.commands.options import DEFAULT_SCENARIO, Certs, Endpoint, Prefix, ScenarioName, as_settings
 
-_Port = Annotated[
-    int, typer.Option(min=0, max=65535, help="Port of 127.0.0.1 that the page is at; 0: any that is free.")
-]
+_Port = Annotated[int, typer.Option(min=0, max=65535, help="Port of the page on 127.0.0.1; 0: any free port.")]
 _Log = Annotated[Path | None, typer.Option("--log", hidden=True)]
 
 
 def _refuse_a_log(command: str, log: Path | None) -> None:
     if log is not None:
-        raise Fault(
-            "CONFIG", f"--log {log}: {command} shows a rig that runs; a log is shown by `stickslip review {log}`"
-        )
+        raise Fault("CONFIG", f"--log {log}: {command} shows a running rig; for a log use `stickslip review {log}`")
 
 
 def _refuse_a_file(command: str, as_json: Json) -> None:
     if as_json not in (None, STDOUT):
         raise Fault(
-            "CONFIG", f"--json {as_json}: {command} writes to stdout as it goes; redirect it: --json > {as_json}"
+            "CONFIG", f"--json {as_json}: {command} writes to stdout while it runs; redirect it: --json > {as_json}"
         )
 
 
 def _never_suspended() -> None:
-    """Let Ctrl-Z do nothing: a rig drops a viewer that stands still, and with it some 20 to 40 blocks to the others."""
+    """Ignore Ctrl-Z. The rig drops the link of a suspended viewer, and with it 20 to 40 blocks for the other clients."""
     signal.signal(signal.SIGTSTP, signal.SIG_IGN)
 
 
@@ -44,18 +40,18 @@ def serve(
     prefix: Prefix = None,
     certs: Certs = None,
     foxglove: Annotated[
-        bool, typer.Option("--foxglove", help="Serve the signals to Foxglove and Lichtblick as well (extra foxglove).")
+        bool, typer.Option("--foxglove", help="Also serve the signals to Foxglove and Lichtblick (extra foxglove).")
     ] = False,
     foxglove_port: Annotated[
-        int, typer.Option(min=0, max=65535, help="Port of 127.0.0.1 for them; 0: any that is free.")
+        int, typer.Option(min=0, max=65535, help="Port for --foxglove on 127.0.0.1; 0: any free port.")
     ] = 8765,
     log: _Log = None,
     as_json: Json = None,
 ) -> None:
-    """Show a rig while it runs, as a page for a browser on this computer; a log is shown by `stickslip review`.
+    """Show a rig while it runs, as a page for a browser on this computer; `stickslip review` shows a log.
 
-    Listens like the recorder, and is never in the loop. The page has STOP, and arm, disarm and reset for who has the token that
-    is printed.
+    Listens like the recorder and is never part of the control loop. The page has STOP; arm, disarm and reset need the token
+    that is printed.
     """
 
     def work() -> None:
@@ -70,7 +66,7 @@ def serve(
         _refuse_a_file("serve", as_json)
         _never_suspended()
         bus = load_bus(scenario, as_settings([], None, endpoint, prefix, certs))
-        role_security(bus, "viewer")  # a certificate that is not there is told here
+        role_security(bus, "viewer")  # reports a missing certificate before anything is served
         with contextlib.ExitStack() as ending:
             sock = ending.enter_context(listening(port))
             at = int(sock.getsockname()[1])
@@ -90,7 +86,7 @@ def serve(
                 say(f"page     http://{HOST}:{at}/ shows the rig at {bus.endpoint}; Ctrl-C ends it")
                 if viewers:
                     say(
-                        f"foxglove {viewers} is the address for Foxglove and Lichtblick, which can read and not command"
+                        f"foxglove {viewers} is the address for Foxglove and Lichtblick, which can read but not command"
                     )
                 say(f"token    {word} arms, disarms and resets from the page; it is in {path}")
 
@@ -110,7 +106,7 @@ def watch(
     log: _Log = None,
     as_json: Json = None,
 ) -> None:
-    """Show a rig while it runs, on one screen of a terminal until Ctrl-C; with --json a line a second on stdout, for scripts."""
+    """Show a rig while it runs, on one screen of a terminal until Ctrl-C; with --json one line per second on stdout."""
 
     def work() -> None:
         from bridge.wire.session import role_security

@@ -1,4 +1,4 @@
-"""`stickslip log ...`: look into a log, check it, make a cut one whole, turn it into tables and tables into evidence."""
+"""`stickslip log ...`: judge, check, recover and export a log; import measured tables as evidence."""
 
 import math
 from pathlib import Path
@@ -9,45 +9,34 @@ import typer
 from bridge.faults import Fault
 from bridge.units import counted
 from cockpit.commands.as_json.option import STDOUT, Json, JsonGroup, carry_out, tell
-from cockpit.commands.options import Strict, Verbose, watched_share
+from cockpit.commands.log_info import log_info
+from cockpit.commands.options import watched_share
 from cockpit.run.writable import LOG, TABLE, check_output, check_output_folder
 
 if TYPE_CHECKING:
     from diagnosis.evidence.import_table import Imported
 
 log_app = typer.Typer(
-    cls=JsonGroup, help="Look into a log, check it, make a cut one whole; tables out and in.", no_args_is_help=True
+    cls=JsonGroup,
+    help="Judge, check and recover a log; export it as tables; import measured tables.",
+    no_args_is_help=True,
 )
 LogArgument = Annotated[Path, typer.Argument(help="A run log, .mcap.")]
 
 
-@log_app.command("info")
-def log_info(path: LogArgument, verbose: Verbose = False, strict: Strict = False, as_json: Json = None) -> None:
-    """Judge the run in a log, and check the log; exit status 0 ok, 1 not ok, 14 not judged."""
-
-    def work() -> int:
-        from cockpit.judge.judged import judge_log
-        from cockpit.judge.verdict_words import in_words, shortened, strictly
-
-        with watched_share(f"judging {path.name}", quiet=as_json == STDOUT) as progress:
-            verdict, check, _ = judge_log(path, progress)
-        known = {line.partition(":")[0].lower().replace("_", "-") for line in (*verdict.faults, *verdict.told)}
-        findings = [f"finding  {finding.in_words()}" for finding in check.findings if finding.kind not in known]
-        words = [*in_words(verdict, verbose), *shortened(findings, verbose), *strictly(verdict, strict)]
-        tell(as_json, verdict.as_dict() | {"findings": check.as_dict()["findings"]}, words)
-        return verdict.exit_status(strict)
-
-    carry_out(work, as_json)
+log_app.command("info")(log_info)
 
 
 @log_app.command("recover")
 def log_recover(
     path: LogArgument,
-    out: Annotated[Path | None, typer.Option(help="Write here; LOG.recovered.mcap if not given.")] = None,
-    in_place: Annotated[bool, typer.Option("--in-place", help="Replace the log, each of its files.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Log to write; LOG.recovered.mcap if not given.")] = None,
+    in_place: Annotated[
+        bool, typer.Option("--in-place", help="Replace the log itself, with all of its files.")
+    ] = False,
     as_json: Json = None,
 ) -> None:
-    """Save every message that can be read from a cut or damaged log in a new file with an index; topics stay what they are."""
+    """Copy every readable message of a cut or damaged log to a new file with an index; the topics are unchanged."""
 
     def work() -> None:
         from bridge.files import check_file, same_file
@@ -62,7 +51,7 @@ def log_recover(
             check_output("--out", out, LOG)
         check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
         if not in_place and any(same_file(new, part) for part in parts_of(path)):
-            line = f"--out {new}: is a file of the log, and would be replaced; ask for it with --in-place, or choose another"
+            line = f"--out {new}: is a file of the log and would be replaced; use --in-place to replace it, or choose another"
             raise Fault("CONFIG", line)
         check_output("--in-place" if in_place else "--out", new, LOG)
         saved = recover(path, new)
@@ -88,19 +77,20 @@ def log_recover(
 @log_app.command("export")
 def log_export(
     path: LogArgument,
-    to: Annotated[Path, typer.Option("--to", help="FILE.parquet, FILE.csv or FILE.mat.")],
+    to: Annotated[Path, typer.Option("--to", help="Table to write: FILE.parquet, FILE.csv or FILE.mat.")],
     topic: Annotated[
         str,
         typer.Option(
-            "--topic", help="Comma-separated: sensors, applied, command, trace, state, announce; all if not given."
+            "--topic",
+            help="Topics, comma-separated: sensors, applied, command, trace, state, announce; all if not given.",
         ),
     ] = "",
-    start: Annotated[str, typer.Option("--from", help="From this time of the run on, e.g. 12.5s.")] = "",
-    end: Annotated[str, typer.Option("--until", help="Up to this time of the run, e.g. 20s.")] = "",
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace tables that are there.")] = False,
+    start: Annotated[str, typer.Option("--from", help="Start time in the run, e.g. 12.5s.")] = "",
+    end: Annotated[str, typer.Option("--until", help="End time in the run, e.g. 20s.")] = "",
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing tables.")] = False,
     as_json: Json = None,
 ) -> None:
-    """Write a log as tables, sensors one row a sample, others one row a message; exit status 1: no row, or a damaged log."""
+    """Write a log as tables: sensors one row per sample, others one row per message; exit status 1: no row, or a damaged log."""
 
     def work() -> int:
         from bridge.log.damage import lost_in_words
@@ -115,12 +105,12 @@ def log_export(
         with watched_share(f"exporting {path.name}", quiet=as_json == STDOUT) as progress:
             written = export(path, to, list(dict.fromkeys(names)), from_s, until_s, progress, overwrite)
         words = [f"{name:<8} {counted(rows, 'row')}" for name, rows in written.rows.items()]
-        nothing = "nothing to write: no message of these topics in this time; a table that is there stays as it is"
+        nothing = "nothing written: no message of these topics in this time; an existing table is unchanged"
         words += [str(file) for file in written.files] or [nothing]
         lost = lost_in_words(written.damage)
         words += [f"warning  the log is damaged; lost: {lost}"] if lost else []
         before = written.damage.before
-        words += [f"warning  the log was saved from one that was not whole: {before}"] if before else []
+        words += [f"warning  the log was recovered from a damaged log: {before}"] if before else []
         tell(as_json, written, words)
         return 0 if written.files and not lost else 1
 
@@ -131,23 +121,25 @@ def log_export(
 def log_import(
     path: Annotated[
         Path,
-        typer.Argument(help="Measured data: text of any delimiter, .xlsx, .parquet, .mat, .h5, .tdms, ROS 2 .mcap."),
+        typer.Argument(help="Measured data: text with any delimiter, .xlsx, .parquet, .mat, .h5, .tdms, ROS 2 .mcap."),
     ],
     out: Annotated[
         Path,
         typer.Option(
-            "--out", help="Evidence folder (a run is added), or FILE.mcap for log check, export and diagnose."
+            "--out", help="Evidence folder, to which a run is added, or FILE.mcap for log check, export and diagnose."
         ),
     ],
     channel_map: Annotated[
         Path | None,
-        typer.Option("--map", help="Channel map, .toml: columns, scales, rig; without it one is made, and written."),
+        typer.Option(
+            "--map", help="Channel map, .toml: columns, scales, rig; if not given, a map is made and written."
+        ),
     ] = None,
-    speed: Annotated[str, typer.Option(help="Without a map: speed of the drive, e.g. 0.5mm/s.")] = "",
-    mass: Annotated[str, typer.Option(help="Without a map: mass of the slide, e.g. 1.5kg.")] = "",
+    speed: Annotated[str, typer.Option(help="Without --map: drive speed, e.g. 0.5mm/s.")] = "",
+    mass: Annotated[str, typer.Option(help="Without --map: mass of the slide, e.g. 1.5kg.")] = "",
     as_json: Json = None,
 ) -> None:
-    """Turn measured data of another program into evidence for `stickslip diagnose`, or into a run log."""
+    """Convert measured data of another program to evidence for `stickslip diagnose`, or to a run log."""
 
     def work() -> None:
         from diagnosis.evidence.import_table import import_file
@@ -167,27 +159,29 @@ def log_import(
         words = [f"{place}: {counted(done.rows, 'sample')} of {', '.join(done.columns)}"]
         words += [finding.in_words() for finding in done.findings]
         if kept is not None:
-            words.append(f"map        {kept}: what was assumed; correct it, and import again with --map")
+            words.append(f"map        {kept} holds the assumptions; correct it and import again with --map")
         tell(as_json, done, words)
 
     carry_out(work, as_json)
 
 
 def _import_as_seen(path: Path, out: Path, kept: Path, speed: str, mass: str) -> "Imported":
-    """Import without a map: columns by their names, numbers of the rig from the record; the map that says so goes to `kept`."""
+    """Import without a map: columns by their names, numbers of the rig from the record; write the resulting map to `kept`."""
     from tempfile import TemporaryDirectory
 
     from bridge.faults import Fault
     from bridge.files import refuse_to_replace_corrected, write_whole
     from cockpit.look.evidence import full_map
     from cockpit.look.quantity import quantity
-    from cockpit.look.source import Asked, read_record
+    from cockpit.look.source import LookOptions, read_record
     from diagnosis.evidence.import_table import import_file
     from diagnosis.look.look import look
 
-    record = read_record(path, Asked(quantity("--speed", speed, "velocity"), None, quantity("--mass", mass, "mass")))
+    record = read_record(
+        path, LookOptions(quantity("--speed", speed, "velocity"), None, quantity("--mass", mass, "mass"))
+    )
     if not record.map_text:
-        raise Fault("CONFIG", f"{path.name}: is a run log of this project, which needs no import")
+        raise Fault("CONFIG", f"{path.name}: is a run log of this project; use it without import")
     made = record.map_text
     if out.suffix != ".mcap":
         seen = look(record.t_s, record.force_N, record.position_m, record.known)
@@ -205,7 +199,7 @@ def _import_as_seen(path: Path, out: Path, kept: Path, speed: str, mass: str) ->
 
 @log_app.command("check")
 def log_check(path: LogArgument, as_json: Json = None) -> None:
-    """The findings of a log alone, for scripts; exit status 0 without any, 1 with findings, 7 when it is no run log."""
+    """Print the findings of a log, for scripts; exit status 0: none, 1: findings, 7: not a run log."""
 
     def work() -> int:
         from bridge.log.check.log_check import check_log
@@ -220,9 +214,9 @@ def log_check(path: LogArgument, as_json: Json = None) -> None:
         )
         late = ", ".join(f"{name} {100 * share:.2f} %" for name, share in check.late_share.items())
         words = f"{path}: {counted(len(check.findings), 'finding')}; {check.seconds:.2f} s; {counts}; later than 1 ms: {late}"
-        found = [finding.in_words() for finding in check.findings]
+        findings = [finding.in_words() for finding in check.findings]
         others = [f"others   {line}" for line in foreign_in_words(check.foreign)]
-        tell(as_json, check, [*found, chain_in_words(check.chain), *others, words])
+        tell(as_json, check, [*findings, chain_in_words(check.chain), *others, words])
         return 1 if check.findings else 0
 
     carry_out(work, as_json)

@@ -1,4 +1,4 @@
-"""`stickslip look`: what is in a measured file, at a glance."""
+"""`stickslip look`: estimates from a measured file."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -16,40 +16,38 @@ _OUTPUTS = (*PAGE, *SHEETS, *PICTURE, *RIG)
 
 def look(
     path: Annotated[
-        Path, typer.Argument(metavar="FILE", help="Measured data of any kind that log import reads, or a run log.")
+        Path, typer.Argument(metavar="FILE", help="Measured data in any format of `log import`, or a run log.")
     ],
-    speed: Annotated[str, typer.Option(help="Of the drive, e.g. 0.5mm/s; for stiffness and mass.")] = "",
+    speed: Annotated[str, typer.Option(help="Drive speed, e.g. 0.5mm/s; for stiffness and mass.")] = "",
     load: Annotated[str, typer.Option(help="Normal load, e.g. 94.5N; for friction coefficients.")] = "",
-    mass: Annotated[str, typer.Option(help="Of the slide, e.g. 1.5kg; compared with the one that is seen.")] = "",
-    rate: Annotated[str, typer.Option(help="Of the samples, e.g. 1kHz, where the file has no time.")] = "",
-    time: Annotated[str, typer.Option(help="Column of the time, where it is not found.")] = "",
-    force: Annotated[str, typer.Option(help="Column of the force, where it is not found.")] = "",
-    channel_map: Annotated[
-        Path | None, typer.Option("--map", help="Channel map, .toml, as log import takes it.")
-    ] = None,
+    mass: Annotated[str, typer.Option(help="Known mass of the slide, e.g. 1.5kg; compared with the estimate.")] = "",
+    rate: Annotated[str, typer.Option(help="Sampling rate, e.g. 1kHz, for a file without a time column.")] = "",
+    time: Annotated[str, typer.Option(help="Name of the time column, if it is not recognised.")] = "",
+    force: Annotated[str, typer.Option(help="Name of the force column, if it is not recognised.")] = "",
+    channel_map: Annotated[Path | None, typer.Option("--map", help="Channel map, .toml, as for `log import`.")] = None,
     out: Annotated[
         list[Path],
         typer.Option(
-            help="Repeatable: .html a page, .csv or .xlsx the slips, .svg, .pdf or .png the force with its slips, .toml the map."
+            help="File to write, repeatable: .html page; .csv, .xlsx slips; .svg, .pdf, .png force with its slips; .toml map."
         ),
     ] = [],  # noqa: B006
     as_json: Json = None,
 ) -> None:
-    """Say what is in a measured file: slips, period, F_s, F_k, mu, stiffness, mass, each with its 90 % interval."""
+    """Estimate slips, period, F_s, F_k, mu, stiffness and mass from a measured file, each with its 90 % interval."""
 
     def work() -> None:
         from cockpit.look.cycles import refuse_to_replace_sheet
-        from cockpit.look.source import Asked, read_record
+        from cockpit.look.source import LookOptions, read_record
         from diagnosis.look.look import look as look_at
         from diagnosis.look.words import headline, sentences
 
         check_file(path, "BAD_TABLE", "give the path of a file of measured data")
-        for one in out:
-            check_output("--out", one, _OUTPUTS)
-            refuse_to_lose([path], "the measured file", "--out", one)
-            if one.suffix.lower() in SHEETS:
-                refuse_to_replace_sheet(one, f"--out {one}")
-        asked = Asked(
+        for target in out:
+            check_output("--out", target, _OUTPUTS)
+            refuse_to_lose([path], "the measured file", "--out", target)
+            if target.suffix.lower() in SHEETS:
+                refuse_to_replace_sheet(target, f"--out {target}")
+        asked = LookOptions(
             quantity("--speed", speed, "velocity"),
             quantity("--load", load, "force"),
             quantity("--mass", mass, "mass"),
@@ -60,27 +58,30 @@ def look(
             turns(speed) if speed else None,
         )
         record = read_record(path, asked)
-        for one in (one for one in out if one.suffix.lower() in RIG):
+        for target in (target for target in out if target.suffix.lower() in RIG):
             if not record.map_text:
-                raise Fault("CONFIG", f"--out {one}: there is no map to write: one was given, or the file is a run log")
-            refuse_to_replace_corrected(one, record.map_text, f"--out {one}")
+                raise Fault(
+                    "CONFIG",
+                    f"--out {target}: no map to write: --map was given, or the file is a run log; leave it out",
+                )
+            refuse_to_replace_corrected(target, record.map_text, f"--out {target}")
         seen = look_at(record.t_s, record.force_N, record.position_m, record.known)
         if seen is None:
             raise Fault("BAD_TABLE", f"{path.name}: fewer than 16 samples of a force with a time; give a longer record")
         findings = [*record.findings, *_hints(seen, asked.mass_kg)]
-        written = [str(one) for one in out if _write(one, seen, record, findings)]
+        written = [str(target) for target in out if _write(target, seen, record, findings)]
         lines = [
             headline(seen),
             *sentences(seen),
-            *(one.in_words() for one in findings),
-            *(f"written    {one}" for one in written),
+            *(finding.in_words() for finding in findings),
+            *(f"written    {name}" for name in written),
         ]
-        if record.map_text and not any(one.suffix == ".toml" for one in out):
+        if record.map_text and not any(target.suffix == ".toml" for target in out):
             lines.append(
-                "map        add --out map.toml to keep how the file was read, correct it, and give it to --map"
+                "map        --out map.toml saves how the columns were read; correct that file and pass it with --map"
             )
         table: dict[str, Any] = {"headline": headline(seen)} | seen.as_dict()
-        tell(as_json, table | {"findings": [one.as_dict() for one in findings], "written": written}, lines)
+        tell(as_json, table | {"findings": [finding.as_dict() for finding in findings], "written": written}, lines)
 
     carry_out(work, as_json)
 
@@ -91,27 +92,27 @@ def _hints(seen: Any, mass_kg: float | None) -> list[Any]:
     return hints(seen, {} if mass_kg is None else {"mass_kg": mass_kg})
 
 
-def _write(one: Path, seen: Any, record: Any, findings: list[Any]) -> bool:
-    suffix = one.suffix.lower()
-    with writing(one):
-        one.parent.mkdir(parents=True, exist_ok=True)
+def _write(target: Path, seen: Any, record: Any, findings: list[Any]) -> bool:
+    suffix = target.suffix.lower()
+    with writing(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
         if suffix in PAGE:
             from cockpit.look.page import write_page
 
-            write_page(seen, record.path, findings, one)
+            write_page(seen, record.path, findings, target)
         elif suffix in PICTURE:
             from bridge.files import replacing
             from bridge.provenance import provenance
             from cockpit.look.plots import save, whole
 
-            with replacing(one) as file:
+            with replacing(target) as file:
                 save(whole(seen), file, suffix[1:], note=provenance([record.path]).in_words())
         elif suffix in RIG:
             from bridge.files import write_whole
 
-            write_whole(one, record.map_text)
+            write_whole(target, record.map_text)
         else:
             from cockpit.look.cycles import write_cycles
 
-            write_cycles(seen, one, record.path)
+            write_cycles(seen, target, record.path)
     return True

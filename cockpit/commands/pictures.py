@@ -17,7 +17,7 @@ from cockpit.run.writable import CSV, PAGE, PICTURE, check_output, writing
 
 @contextlib.contextmanager
 def _written(out: Path, suffixes: tuple[str, ...]) -> Generator[None]:
-    """The work that ends with writing `out`. Raises Fault where it cannot, at its start if that is known then."""
+    """Context of work that ends with writing `out`. Raises Fault if it cannot be written, at the start where possible."""
     check_output("--out", out, suffixes)
     with writing(out):
         out.parent.mkdir(parents=True, exist_ok=True)
@@ -25,36 +25,37 @@ def _written(out: Path, suffixes: tuple[str, ...]) -> Generator[None]:
 
 
 def plot(
-    log: Annotated[Path, typer.Argument(help="A run log, .mcap, or one that `log import` made.")],
+    log: Annotated[Path, typer.Argument(help="A log, .mcap, of a run or made by `log import`.")],
     out: Annotated[
         Path | None,
         typer.Option(
-            help="The picture: .png, .svg or .pdf; if not given, a PNG beside LOG under its name.", show_default=False
+            help="Picture to write: .png, .svg or .pdf; if not given, a .png next to LOG with its name.",
+            show_default=False,
         ),
     ] = None,
-    start: Annotated[str, typer.Option("--from", help="From this time of the run on, e.g. 12.5s.")] = "",
-    end: Annotated[str, typer.Option("--to", help="Up to this time of the run, e.g. 20s.")] = "",
+    start: Annotated[str, typer.Option("--from", help="Start time in the run, e.g. 12.5s.")] = "",
+    end: Annotated[str, typer.Option("--to", help="End time in the run, e.g. 20s.")] = "",
     signals: Annotated[
         str,
         typer.Option(
-            help="Comma-separated columns, e.g. drive_force_N,amplitude_m; neighbours of one unit share an axis."
+            help="Columns, comma-separated, e.g. drive_force_N,amplitude_m; neighbours with the same unit share an axis."
         ),
     ] = "",
     style: Annotated[
         str,
-        typer.Option(metavar="screen|paper", help="screen: the answer above; paper: without, small text, one column."),
+        typer.Option(
+            metavar="screen|paper", help="screen: with the verdict as title; paper: no title, small text, one column."
+        ),
     ] = "screen",
-    width: Annotated[
-        float | None, typer.Option(help="Width in mm; 280 for a screen and 85 for a paper if not given.")
-    ] = None,
+    width: Annotated[float | None, typer.Option(help="Width in mm; if not given 280 for screen, 85 for paper.")] = None,
     dpi: Annotated[
-        float | None, typer.Option(help="Dots an inch of a .png; 110 for a screen and 600 for a paper if not given.")
+        float | None, typer.Option(help="Dots per inch of a .png; if not given 110 for screen, 600 for paper.")
     ] = None,
-    versus: Annotated[Path | None, typer.Option("--vs", help="A second log, drawn over the first.")] = None,
-    data: Annotated[Path | None, typer.Option(help="Write the numbers of the curves there, FILE.csv.")] = None,
+    versus: Annotated[Path | None, typer.Option("--vs", help="Second log, drawn over the first.")] = None,
+    data: Annotated[Path | None, typer.Option(help="Write the numbers of the curves to this FILE.csv.")] = None,
     as_json: Json = None,
 ) -> None:
-    """Draw the run in a log: drive force, v_a against v_d, and what the controller did; or any of its signals."""
+    """Draw the run in a log: drive force, v_a against v_d, and the controller's actions; or any of its signals."""
 
     def work() -> None:
         from cockpit.figures.curves import FIRST_LINE
@@ -84,21 +85,21 @@ def plot(
 
 def review(
     logs: Annotated[
-        list[Path], typer.Argument(metavar="LOG...", help="A log, .mcap, or two, the second laid over the first.")
+        list[Path], typer.Argument(metavar="LOG...", help="One log, .mcap, or two; the second is drawn over the first.")
     ],
     out: Annotated[
-        Path | None, typer.Option(help="The page, .html; if not given, beside the first LOG.", show_default=False)
+        Path | None, typer.Option(help="Page to write, .html; if not given, next to the first LOG.", show_default=False)
     ] = None,
     as_json: Json = None,
 ) -> None:
-    """Make one page of a log: the verdict, curves to zoom into, what was decided and why, events; two logs are compared."""
+    """Make a page of a log: verdict, curves to zoom into, decisions with reasons, events; two logs are compared."""
 
     def work() -> None:
         from cockpit.judge.verdict_words import headline
         from cockpit.review.page import write_review
 
         if len(logs) > 2:
-            raise Fault("CONFIG", f"{logs[2]}: is a third log: a page has one or two; leave it out")
+            raise Fault("CONFIG", f"{logs[2]}: is the third log: a page shows one or two; leave it out")
         for path in logs:
             check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
         page = out or logs[0].parent / f"{logs[0].stem}.html"
@@ -119,7 +120,7 @@ def stability(
             "--set", help="Change one value of the rig: key=value, e.g. contact.static_force_N=18. Repeatable."
         ),
     ] = [],  # noqa: B006
-    out: Annotated[Path, typer.Option(help="The picture: .png, .svg or .pdf.")] = Path("runs/map.png"),
+    out: Annotated[Path, typer.Option(help="Picture to write: .png, .svg or .pdf.")] = Path("runs/map.png"),
     as_json: Json = None,
 ) -> None:
     """Draw where a rig sticks and slips, over drive velocity, stiffness and vibration."""
@@ -137,10 +138,10 @@ def stability(
 
 
 def reproduce(
-    out: Annotated[Path, typer.Option(help="The report, one .html file.")] = Path("runs/reproduce.html"),
+    out: Annotated[Path, typer.Option(help="Report to write, one .html file.")] = Path("runs/reproduce.html"),
     as_json: Json = None,
 ) -> None:
-    """Redo the paper: its figures, tables and claims, each with its number and whether it holds."""
+    """Recompute the paper: its figures, tables and claims, each with its number and whether it holds."""
 
     def work() -> int:
         from cockpit.paper.page import reproduce as redo

@@ -22,25 +22,25 @@ from cockpit.commands.options import (
     as_settings,
 )
 from cockpit.run.child_process import stop_event, warn_without_priority
-from cockpit.run.telling import telling
+from cockpit.run.lifecycle_lines import telling
 from cockpit.run.writable import LOG, check_output
 
 
 class Served(NamedTuple):
-    """What a process did on the bus until its end."""
+    """Result of a process: the work it did on the bus until its end."""
 
     role: str
     endpoint: str
     lockstep: bool
-    blocks: int  # of the plant; steps of the controller, one a block
+    blocks: int  # blocks of the plant, or steps of the controller, one per block
 
     def in_words(self) -> str:
-        """One line for a person."""
+        """One line for the operator."""
         return f"{self.role:<8} {self.blocks} blocks on {self.endpoint}"
 
 
 class Recorded(NamedTuple):
-    """What `record` wrote."""
+    """Result of `record`."""
 
     log: str
 
@@ -54,12 +54,14 @@ def plant(
     certs: Certs = None,
     insecure: Insecure = False,
     lockstep: Lockstep = False,
-    wait_for: Annotated[str, typer.Option(help="Roles that must be on the bus before the first block.")] = "controller",
+    wait_for: Annotated[
+        str, typer.Option(help="Roles that must be on the bus before the first block: controller, recorder, or both.")
+    ] = "controller",
     wait: Wait = None,
     child: ChildOf = 0,
     as_json: Json = None,
 ) -> None:
-    """Serve the stand-in rig of a scenario on the bus."""
+    """Simulate the rig of a scenario and serve it on the bus."""
 
     def work() -> None:
         from bridge.guard.latch import StopLatch
@@ -68,7 +70,7 @@ def plant(
             load_scenario,
             refuse_faults_of_processes,
             refuse_faults_that_take_time,
-            refuse_what_takes_no_clock,
+            refuse_short_blocks,
         )
         from plant.app import run as serve
 
@@ -76,17 +78,18 @@ def plant(
         roles = [role for role in wait_for.split(",") if role]
         if unknown := set(roles) - {"controller", "recorder"}:
             raise Fault(
-                "CONFIG", f"--wait-for {wait_for}: {min(unknown)}: must be controller, recorder or both, by comma"
+                "CONFIG",
+                f"--wait-for {wait_for}: {min(unknown)}: must be controller, recorder, or both with a comma between",
             )
         if lockstep:
             refuse_faults_that_take_time(made)
         else:
-            refuse_what_takes_no_clock(made)
+            refuse_short_blocks(made)
             refuse_faults_of_processes(made)
         if not (lockstep or child):
             warn_without_priority()
         described = header(made, "plant", lockstep)
-        # a run of `stickslip run` is over with its processes, and so is a stop in it
+        # a stop inside `stickslip run` ends with that run; only a plant started alone keeps it over a restart
         latch = None if child or lockstep else StopLatch(made.rig.name)
         with telling(quiet=bool(child)) as say:
             blocks = serve(
@@ -121,15 +124,15 @@ def controller(
     child: ChildOf = 0,
     as_json: Json = None,
 ) -> None:
-    """Control the rig that is on the bus, with the controller of a scenario."""
+    """Run the controller of a scenario for the rig on the bus."""
 
     def work() -> None:
-        from cockpit.run.scenario import header, load_scenario, refuse_what_takes_no_clock
+        from cockpit.run.scenario import header, load_scenario, refuse_short_blocks
         from controller.app import run as control
 
         made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix, certs, wait_s=wait))
         if not lockstep:
-            refuse_what_takes_no_clock(made)
+            refuse_short_blocks(made)
         if not (lockstep or child):
             warn_without_priority()
         described = header(made, "controller", lockstep)
@@ -154,7 +157,7 @@ def record(
     child: ChildOf = 0,
     as_json: Json = None,
 ) -> None:
-    """Record everything on the bus until the plant ends its run. A log that is there already is renamed, not overwritten."""
+    """Record all messages on the bus until the plant ends its run. An existing log is renamed, not overwritten."""
 
     def work() -> None:
         from bridge.log.recorder import run as record_all
@@ -166,7 +169,7 @@ def record(
         check_output("--log", path, LOG)
 
         def ready() -> None:
-            # `stickslip run` writes its log anew; started by hand after an incident, the one there holds what happened
+            # Started by hand after an incident, the existing log may be its only record. `stickslip run` replaces its log.
             if not child:
                 keep_aside(path)
 

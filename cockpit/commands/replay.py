@@ -1,4 +1,4 @@
-"""`stickslip replay`: a log through today's controller, simulated again, or back on the bus."""
+"""`stickslip replay`: a log through this version's controller, simulated again, or published on the bus."""
 
 from pathlib import Path
 from typing import Annotated
@@ -16,7 +16,7 @@ from cockpit.run.writable import LOG, check_output
 
 
 def _only_with(mode: str, given: dict[str, bool]) -> None:
-    """Refuse options that only another kind of replay follows. Raises Fault CONFIG."""
+    """Refuse options that belong to another mode of replay. Raises Fault CONFIG."""
     for option, is_given in given.items():
         if is_given:
             raise Fault("CONFIG", f"{option}: only with {mode}; add that, or leave it out")
@@ -25,26 +25,30 @@ def _only_with(mode: str, given: dict[str, bool]) -> None:
 def replay_command(
     logs: Annotated[list[Path], typer.Argument(help="Run logs, .mcap.")],
     settings: Annotated[
-        list[str], typer.Option("--set", help="What if: key=value, or key=value@20s from a time on. Repeatable.")
+        list[str],
+        typer.Option(
+            "--set", help="Change one value of the controller: key=value, or key=value@20s from 20 s on. Repeatable."
+        ),
     ] = [],  # noqa: B006
     start: Annotated[
-        str, typer.Option("--from", help="Start here, e.g. 12.5s, at the nearest snapshot before.")
+        str, typer.Option("--from", help="Start time, e.g. 12.5s; the replay begins at the last snapshot before it.")
     ] = "0s",
     closed_loop: Annotated[
         bool, typer.Option("--closed-loop", help="Simulate the run again from the log's own plant and seed.")
     ] = False,
-    to_bus: Annotated[bool, typer.Option("--to-bus", help="Publish the log on the bus again, paced.")] = False,
+    to_bus: Annotated[bool, typer.Option("--to-bus", help="Publish the log on the bus again, in real time.")] = False,
     speed: Annotated[
-        float | None, typer.Option(min=0.01, max=1000.0, help="With --to-bus: times real time; 1 if not given.")
+        float | None,
+        typer.Option(min=0.01, max=1000.0, help="With --to-bus: speed as a multiple of real time; 1 if not given."),
     ] = None,
     everything: Annotated[
-        bool, typer.Option("--all", help="With --to-bus: the controller's topics too, for viewers.")
+        bool, typer.Option("--all", help="With --to-bus: publish the controller's topics too, for viewers.")
     ] = False,
     wait: Annotated[
         bool, typer.Option("--wait", help="With --to-bus: begin when a controller and a recorder are on the bus.")
     ] = False,
     log: Annotated[
-        Path | None, typer.Option("--log", help="With --closed-loop: the new log; runs/closed-loop.mcap if not given.")
+        Path | None, typer.Option("--log", help="With --closed-loop: log to write; runs/closed-loop.mcap if not given.")
     ] = None,
     endpoint: Endpoint = None,
     prefix: Prefix = None,
@@ -52,7 +56,7 @@ def replay_command(
     insecure: Insecure = False,
     as_json: Json = None,
 ) -> None:
-    """Feed a log to today's controller: the same bits (exit 0), or the first difference or a damaged log (exit 1)."""
+    """Feed a log to this version's controller; exit status 0: the same bits, 1: the first difference, or a damaged log."""
 
     def work() -> int:
         from bridge.log.logfile import check_log_file
@@ -62,9 +66,9 @@ def replay_command(
         if not to_bus:
             paced = {"--speed": speed is not None, "--all": everything, "--wait": wait}
             meeting = {"--endpoint": endpoint is not None, "--prefix": prefix is not None, "--certs": certs is not None}
-            _only_with("--to-bus, which plays the log on the bus", paced | meeting)
+            _only_with("--to-bus, which publishes the log on the bus", paced | meeting)
         if not closed_loop:
-            _only_with("--closed-loop, whose new run goes there", {"--log": log is not None})
+            _only_with("--closed-loop, which writes a new log", {"--log": log is not None})
         out = log or Path("runs/closed-loop.mcap")
         if closed_loop:
             check_output("--log", out, LOG)
@@ -77,7 +81,7 @@ def replay_command(
                 ("--set", bool(settings)),
             ):
                 if given:
-                    line = f"{option}: not with --to-bus, which plays the log as it is; leave one of them out"
+                    line = f"{option}: not with --to-bus, which publishes the log unchanged; leave one of them out"
                     raise Fault("CONFIG", line)
             from cockpit.run.log_to_bus import publish_log
             from cockpit.run.scenario_file import load_bus
@@ -93,7 +97,7 @@ def replay_command(
             if len(logs) != 1:
                 raise Fault(
                     "CONFIG",
-                    f"--closed-loop: {counted(len(logs), 'log')}: must be one; its new run goes to --log {out}",
+                    f"--closed-loop: {counted(len(logs), 'log')}: must be one log; the new run goes to --log {out}",
                 )
             if from_s > 0.0:
                 line = f"--from {start}: not with --closed-loop, which simulates the run from its start; leave it out"
@@ -108,6 +112,6 @@ def replay_command(
             if as_json != STDOUT:
                 print(plain("\n".join(replayed[-1].in_words())), flush=True)  # the next log may be a bad one
         tell(as_json, replayed, [])
-        return 0 if all(one.identical and not one.damage for one in replayed) else 1
+        return 0 if all(result.identical and not result.damage for result in replayed) else 1
 
     carry_out(work, as_json)

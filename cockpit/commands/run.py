@@ -28,7 +28,9 @@ def run(
     scenario: ScenarioName = DEFAULT_SCENARIO,
     rig: Annotated[
         str | None,
-        typer.Option("--rig", help="In place of the scenario's rig: a name in deploy/rigs, or a .toml file."),
+        typer.Option(
+            "--rig", metavar="NAME", help="Rig in place of the scenario's: a name in deploy/rigs, or a .toml file."
+        ),
     ] = None,
     settings: Settings = [],  # noqa: B006 (typer reads the default and never changes it)
     seed: Seed = None,
@@ -40,19 +42,20 @@ def run(
     in_process: Annotated[
         bool,
         typer.Option(
-            "--in-process", help="Lockstep in one process, without a bus: fastest. With faults 0.4 s a second."
+            "--in-process",
+            help="Lockstep in one process, without a bus: fastest. With faults 0.4 s of CPU per simulated second.",
         ),
     ] = False,
     log: LogFile = None,
     wait: Wait = None,
     without: Annotated[
-        bool, typer.Option("--without", help="Simulate the same run without the controller, too, to compare with.")
+        bool, typer.Option("--without", help="Also simulate the same run without the controller, for comparison.")
     ] = False,
     verbose: Verbose = False,
     strict: Strict = False,
     as_json: Json = None,
 ) -> None:
-    """Run plant, controller and recorder to the end of a scenario and judge it; exit status 0 ok, 1 not ok, 14 not judged."""
+    """Run plant, controller and recorder through a scenario and judge it; exit status 0: ok, 1: not ok, 14: not judged."""
 
     def work() -> int:
         from cockpit.judge.verdict_words import strictly
@@ -62,8 +65,8 @@ def run(
         other = [rig_setting(rig)] if rig is not None else []
         changed = [*other, *as_settings(settings, seed, endpoint, prefix, certs, insecure)]
         with stopped_once():
-            came = run_scenario(scenario, changed, lockstep, in_process, log, wait, without)
-            tell(as_json, came.as_dict(), [*came.in_words(verbose), *strictly(came.verdict, strict)])
-        return came.verdict.exit_status(strict)
+            outcome = run_scenario(scenario, changed, lockstep, in_process, log, wait, without)
+            tell(as_json, outcome.as_dict(), [*outcome.in_words(verbose), *strictly(outcome.verdict, strict)])
+        return outcome.verdict.exit_status(strict)
 
     carry_out(work, as_json)

@@ -12,23 +12,22 @@ from cockpit.commands.as_json.option import Json, carry_out, tell
 from cockpit.run.writable import check_output_folder, writing
 
 
-class Named(NamedTuple):
-    """A schema that there is."""
+class SchemaName(NamedTuple):
+    """A row of the list of schemas."""
 
     name: str
     about: str
 
 
 def schema(
-    name: Annotated[
-        str, typer.Argument(help="For example rig or diagnosis-2; a list of all of them if left out.")
-    ] = "",
+    name: Annotated[str, typer.Argument(help="For example rig or diagnosis-2; lists all schemas if left out.")] = "",
     out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Write NAME.json there, or all of them if no NAME is given.")
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Write NAME.json to this folder, or all schemas if NAME is left out."),
     ] = None,
     as_json: Json = None,
 ) -> None:
-    """Print the JSON Schema of a file or of a result of --json. A TOML file names its own by `#:schema PATH` in line 1."""
+    """Print the JSON Schema of a TOML file or a --json result. A TOML file names its schema in line 1: `#:schema PATH`."""
 
     def work() -> None:
         from cockpit.commands.as_json.schemas import FORMATS
@@ -40,13 +39,13 @@ def schema(
         if out is not None:
             check_output_folder("--out", out)
             with writing(out):
-                for one in wanted:
-                    write_json(out / f"{one.name}.json", one.schema())
-        names = [Named(one.name, one.about) for one in wanted]
+                for kind in wanted:
+                    write_json(out / f"{kind.name}.json", kind.schema())
+        names = [SchemaName(kind.name, kind.about) for kind in wanted]
         if out is not None:
-            tell(as_json, names, [f"written  {out / one.name}.json" for one in names])
+            tell(as_json, names, [f"written  {out / row.name}.json" for row in names])
         elif not key:
-            tell(as_json, names, [f"{one.name:<20} {one.about}" for one in names])
+            tell(as_json, names, [f"{row.name:<20} {row.about}" for row in names])
         else:
             made = FORMATS[key].schema()
             tell(as_json, made, [json.dumps(made, indent=1)], indent=1)

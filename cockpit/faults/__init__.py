@@ -1,8 +1,7 @@
-"""The catalogue of faults: what may go wrong at a rig, what must come of it, and what truly does.
+"""Catalogue of faults: possible failures of a rig, and the required reactions.
 
-catalogue  the entries of deploy/faults, checked
-judge      one entry, from the truth of its run: safe, SILENT or UNSAFE
-bench      many entries, in processes
-page       the table for a person
-injection  a fault for a loop that runs
+catalogue  the checked entries of deploy/faults
+injection  injects a fault into a running loop
+
+`python -m bench faults` judges each entry by the simulated truth of its run.
 """

@@ -1,4 +1,4 @@
-"""A fault for a loop that runs: a message to its simulated rig, or a signal to one of its processes."""
+"""Injects a fault into a running loop: by a message to its simulated rig, or a signal to one of its processes."""
 
 import json
 import os
@@ -23,33 +23,33 @@ from plant.faults.table import FaultTable
 
 _DIAL_S = 2.0
 _HEADERS_S = 2.0
-_AGAIN_S = 0.5  # a first message may be lost while the session is made
-_TWICE_S = 0.6  # in which it is said twice, where nothing tells that it was taken
-_TAKEN_S = 5.0  # in which a rig says that it has taken a fault that begins now
+_AGAIN_S = 0.5  # repetition: the first message may be lost during connection
+_TWICE_S = 0.6  # time for two messages, if no confirmation is expected
+_TAKEN_S = 5.0  # timeout of the confirmation of a fault that begins at once
 
 
 class Injected(NamedTuple):
-    """What was done."""
+    """Result of an injection."""
 
     endpoint: str
     name: str
     done: list[str]
 
     def in_words(self) -> list[str]:
-        """Lines for a person."""
+        """Lines of text."""
         return [f"{self.name:<8} {line.removeprefix(f'{self.name}: ')}" for line in self.done]
 
 
 def inject(bus_config: BusConfig, name: str, tables: Sequence[FaultTable], clear: bool = False) -> Injected:
-    """Inject faults into the loop at an endpoint; a process that is frozen goes on before this returns.
+    """Inject faults into the loop at an endpoint; returns after a frozen process was continued.
 
     Args:
-        bus_config: of the loop.
-        name: of the faults.
+        bus_config: connection to the loop.
+        name: name of the faults.
         tables: their times count from now.
-        clear: first end those that act.
+        clear: first end the active faults.
 
-    Raises Fault NO_PEER where no rig answers, none takes the fault, or a process is not to be had.
+    Raises Fault NO_PEER if no rig answers or confirms the fault, or a process cannot be reached.
 
     """
     where = bus_config.endpoint
@@ -58,33 +58,33 @@ def inject(bus_config: BusConfig, name: str, tables: Sequence[FaultTable], clear
     done: list[str] = []
     with Bus(bus_config, "operator", lockstep=True, patience_s=_DIAL_S) as bus:
         if (of_rig or clear) and bus.wait_for(["plant"], _HEADERS_S):
-            line = f"{where}: a bus answers, but no rig is on it: --prefix must be that of the run"
+            line = f"{where}: a bus answers, but no rig is on it: --prefix must match the run"
             raise Fault("NO_PEER", f"{line}; give the --prefix of the run")
         roles = {table.target for table in of_processes}
         headers = bus.headers(roles, _HEADERS_S, threading.Event()) if roles else {}
         if missing := roles - headers.keys():
-            line = f"{where}: no {' and no '.join(sorted(missing))} answers there: must be of the same run"
+            line = f"{where}: no {' and no '.join(sorted(missing))} answers: must belong to the same run"
             raise Fault("NO_PEER", f"{line}; compare --endpoint and --prefix")
         pids = {role: pid_here(role, header.process) for role, header in headers.items()}
         if of_rig or clear:
-            done += _tell_rig(bus, where, of_rig, clear)
-        for table in sorted(of_processes, key=lambda one: one.from_s):
+            done += _order_rig(bus, where, of_rig, clear)
+        for table in sorted(of_processes, key=lambda table: table.from_s):
             done.append(_disturb(table, pids[table.target]))
     return Injected(where, name, done)
 
 
-def _tell_rig(bus: Bus, where: str, tables: Sequence[FaultTable], clear: bool) -> list[str]:
-    """Say it until the rig tells that it has taken it."""
+def _order_rig(bus: Bus, where: str, tables: Sequence[FaultTable], clear: bool) -> list[str]:
+    """Repeat the orders until the rig confirms them."""
     events = Inbox(256)
     bus.listen(PLANT_EVENT, events.push)
     send = bus.publisher(FAULT)
-    who = f"{os.environ.get('USER') or 'somebody'} (process {os.getpid()})"
+    who = f"{os.environ.get('USER') or 'unknown user'} (process {os.getpid()})"
     orders = [wire.Inject(clear=True, who=who, id=uuid.uuid4().hex)] if clear else []
     for table in tables:
         text = json.dumps(table.model_dump(mode="json"))
         orders.append(wire.Inject(fault=text, who=who, id=uuid.uuid4().hex))
     waiting = {table.in_words() for table in tables if table.from_s == 0.0}
-    told: list[str] = []
+    begun_texts: list[str] = []
     began_s = time.monotonic()
     again_s = began_s
     while (now_s := time.monotonic()) < began_s + (_TAKEN_S if waiting else _TWICE_S):
@@ -97,12 +97,12 @@ def _tell_rig(bus: Bus, where: str, tables: Sequence[FaultTable], clear: bool) -
             event = parsed(wire.Event, received.payload, PLANT_EVENT.name)
             begun = {words for words in waiting if event.code == BEGAN and event.text.startswith(words)}
             waiting -= begun
-            told += [event.text] if begun else []
+            begun_texts += [event.text] if begun else []
     if waiting:
-        line = f"{where}: no rig there says that it took the fault: must be a simulated one, in real time"
-        raise Fault("NO_PEER", f"{line}; a real rig takes none")
+        line = f"{where}: no rig confirmed the fault: must be a simulated rig in real time"
+        raise Fault("NO_PEER", f"{line}; a real rig accepts no faults")
     later = [f"{table.in_words()}, in {table.from_s:g} s" for table in tables if table.from_s > 0.0]
-    return [*(["all faults are over"] if clear else []), *told, *later]
+    return [*(["all faults are over"] if clear else []), *begun_texts, *later]
 
 
 def _disturb(table: FaultTable, pid: int) -> str:
@@ -115,19 +115,19 @@ def _disturb(table: FaultTable, pid: int) -> str:
             time.sleep(table.for_s)
         finally:
             os.kill(pid, signal.SIGCONT)
-        return f"the {role}, process {pid}, stood still for {table.for_s:g} s"
+        return f"the {role}, process {pid}, was frozen for {table.for_s:g} s"
     if table.kind == "killed":
         os.kill(pid, signal.SIGKILL)
         return f"the {role}, process {pid}, was killed"
     words = Path(f"/proc/{pid}/cmdline").read_bytes().decode(errors="surrogateescape").split("\0")[:-1]
     folder = Path(f"/proc/{pid}/cwd").readlink()
     if "--child" in words:
-        line = f"the {role}, process {pid}: is of `stickslip run`, which ends with it: must be one that was started by hand"
-        raise Fault("CONFIG", f"{line}; start plant, controller and record as commands of their own")
+        line = f"the {role}, process {pid}: belongs to `stickslip run`, which ends with it: must be started by hand"
+        raise Fault("CONFIG", f"{line}; start plant, controller and record as separate commands")
     os.kill(pid, signal.SIGKILL)
     time.sleep(table.for_s)
     again = subprocess.Popen(
         words, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         start_new_session=True,
     )  # fmt: skip
-    return f"the {role}, process {pid}, was killed and began again as process {again.pid}"
+    return f"the {role}, process {pid}, was killed and restarted as process {again.pid}"

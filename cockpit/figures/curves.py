@@ -1,4 +1,4 @@
-"""The numbers that a figure shows, and the same numbers as a table."""
+"""The numbers in a figure, also as a table."""
 
 import csv
 import io
@@ -11,30 +11,30 @@ import numpy as np
 from bridge.faults import Fault
 from bridge.log.logfile import RunData
 from cockpit.figures.grid import Envelope, Grid, on_grid
-from cockpit.figures.request import Request
-from cockpit.figures.signals import Floats, Signal, samples_of
+from cockpit.figures.request import FigureRequest
+from cockpit.figures.signals import Floats, PlottedSignal, samples_of
 
 _HEAD = ("log", "signal", "t_s", "least", "mean", "largest")
-FIRST_LINE = ",".join(_HEAD) + "\n"  # of the table; a file that begins with another is somebody's own
-_BINS = 2000  # across a figure: 300 dots an inch over 170 mm; fewer samples are drawn as they are
+FIRST_LINE = ",".join(_HEAD) + "\n"  # of the table; a file with another first line is not ours and is not replaced
+_BINS = 2000  # across a figure: 300 dpi over 170 mm. Fewer samples are drawn unbinned
 
 
-class Curve(NamedTuple):
-    """One signal of one log in a figure, in SI units; where `is_raw`, least, mean and largest are the samples themselves."""
+class LogCurve(NamedTuple):
+    """One signal of one log in a figure, in SI units; with `is_raw`, least, mean and largest are the samples."""
 
     log: str
-    signal: Signal
+    signal: PlottedSignal
     t_s: Floats  # [points]
     values: Envelope
     is_raw: bool
 
 
-def window_of(runs: Sequence[RunData], request: Request) -> tuple[float, float]:
-    """From and until when a figure shows the logs [s]. Raises Fault CONFIG for what is outside of them, BAD_LOG for no block."""
+def window_of(runs: Sequence[RunData], request: FigureRequest) -> tuple[float, float]:
+    """Start and end of the shown time [s]. Raises Fault CONFIG for times outside the logs, BAD_LOG without blocks."""
     for run in runs:
         if not len(run.sensors):
-            line = f"{run.path}: holds no block of sensors that can be read, so there is nothing to draw"
-            raise Fault("BAD_LOG", f"{line}; `stickslip log check` says what is in it")
+            line = f"{run.path}: has no readable sensor block, so nothing can be drawn"
+            raise Fault("BAD_LOG", f"{line}; `stickslip log check` lists its contents")
     end_s = max(float(run.sensors["t_ns"].max()) * 1e-9 for run in runs)
     start_s = min(max(float(run.sensors["t_ns"].min()) * 1e-9, 0.0) for run in runs)
     from_s, to_s = max(request.from_s, start_s), min(request.to_s, end_s)
@@ -46,19 +46,19 @@ def window_of(runs: Sequence[RunData], request: Request) -> tuple[float, float]:
     return from_s, to_s
 
 
-def curve_of(run: RunData, log: str, signal: Signal, from_s: float, to_s: float) -> Curve:
-    """A signal between two times, as samples where these are few, else in bins."""
+def curve_of(run: RunData, log: str, signal: PlottedSignal, from_s: float, to_s: float) -> LogCurve:
+    """A signal between two times: its samples if few, else bins."""
     t_s, values = samples_of(run, signal)
     inside = (t_s >= from_s) & (t_s <= to_s)
     t_s, values = t_s[inside], values[inside]
     if len(t_s) <= _BINS or to_s <= from_s:
-        return Curve(log, signal, t_s, Envelope(values, values, values), is_raw=True)
+        return LogCurve(log, signal, t_s, Envelope(values, values, values), is_raw=True)
     grid = Grid(from_s, (to_s - from_s) / (_BINS - 1), _BINS)
-    return Curve(log, signal, grid.t_s, on_grid(t_s, values, grid), is_raw=False)
+    return LogCurve(log, signal, grid.t_s, on_grid(t_s, values, grid), is_raw=False)
 
 
-def as_table(curves: Sequence[Curve]) -> str:
-    """The curves as CSV: a row for each point, values in SI units as the signal's name says; nothing where there is no value."""
+def as_table(curves: Sequence[LogCurve]) -> str:
+    """The curves as CSV, a row per point, in SI units; points without a value are omitted."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(_HEAD)

@@ -1,15 +1,14 @@
-"""Least, mean and largest value of each bin of an even time axis: a slip of some milliseconds shows at every zoom."""
+"""Least, mean and largest value per bin of an even time axis, so that a slip of a few ms is visible at every zoom."""
 
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from bridge.arrays import Floats
 
 
 class Grid(NamedTuple):
-    """Bins whose middles are at `start_s`, `start_s + step_s`, ..."""
+    """Bins centred at `start_s`, `start_s + step_s`, ..."""
 
     start_s: float
     step_s: float
@@ -17,12 +16,12 @@ class Grid(NamedTuple):
 
     @property
     def t_s(self) -> Floats:
-        """The middles, [bins]."""
+        """Centres of the bins, [bins]."""
         return np.arange(self.bins, dtype=np.float64) * self.step_s + self.start_s
 
 
 class Envelope(NamedTuple):
-    """Values in bins, each [bins]; nan in a bin without a value."""
+    """Values per bin, each [bins]; nan in empty bins."""
 
     least: Floats
     mean: Floats
@@ -30,7 +29,7 @@ class Envelope(NamedTuple):
 
 
 def on_grid(t_s: Floats, values: Floats, grid: Grid) -> Envelope:
-    """The values at their times, both [samples] in any order, put into bins; what is no number or beyond them is left out."""
+    """Sort values, [samples] in any order, into bins; omits values that are not finite or outside the grid."""
     bins = np.rint((t_s - grid.start_s) / grid.step_s)
     kept = np.isfinite(values) & (bins >= 0) & (bins < grid.bins)
     at, values = bins[kept].astype(np.int64), values[kept]

@@ -1,4 +1,4 @@
-"""What a figure shall show and look like, checked before the work."""
+"""Content and style of a figure, checked before the work."""
 
 import math
 from typing import NamedTuple
@@ -12,26 +12,26 @@ _NARROWEST_MM, _WIDEST_MM = 40.0, 500.0
 _COARSEST_DPI, _FINEST_DPI = 50.0, 1200.0
 
 
-class Request(NamedTuple):
-    """What is asked for; times in seconds of the run, -inf and inf for its ends."""
+class FigureRequest(NamedTuple):
+    """A requested figure; times in seconds of the run, -inf and inf for its ends."""
 
     from_s: float = -math.inf
     to_s: float = math.inf
-    signals: str = ""  # comma-separated; empty: those that are usual
+    signals: str = ""  # comma-separated; empty: the default signals
     style: str = SCREEN
     width_mm: float = _WIDTH_MM[SCREEN]
     dpi: float = _DPI[SCREEN]
 
     @property
     def is_window(self) -> bool:
-        """Whether a part of the run is asked for."""
+        """True if only part of the run is requested."""
         return math.isfinite(self.from_s) or math.isfinite(self.to_s)
 
 
 def request_of(
     from_s: float, to_s: float, signals: str, style: str, width_mm: float | None, dpi: float | None
-) -> Request:
-    """A request, with the width and the resolution of its style where they are None. Raises Fault CONFIG."""
+) -> FigureRequest:
+    """A checked request; width and resolution default to the style. Raises Fault CONFIG."""
     if from_s >= to_s:
         raise Fault("CONFIG", f"--from {from_s:g} --to {to_s:g}: from must be before to; exchange them")
     if style not in _WIDTH_MM:
@@ -43,4 +43,4 @@ def request_of(
     if not _COARSEST_DPI <= dpi <= _FINEST_DPI:
         line = f"--dpi {dpi:g}: must be from {_COARSEST_DPI:g} to {_FINEST_DPI:g}"
         raise Fault("CONFIG", f"{line}; journals ask for 300 to 600, and .svg and .pdf need none")
-    return Request(from_s, to_s, signals, style, width_mm, dpi)
+    return FigureRequest(from_s, to_s, signals, style, width_mm, dpi)

@@ -1,4 +1,4 @@
-"""A log as a figure, or two laid over each other: for a screen with the answer above it, or for a paper without."""
+"""One log, or two overlaid, as a figure: for a screen with the answer above it, or for a paper without."""
 
 import re
 import textwrap
@@ -14,9 +14,9 @@ from bridge.log.logfile import RunData, read_run
 from bridge.provenance import Provenance, provenance, shown_name
 from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
-from cockpit.figures.curves import Curve, as_table, curve_of, window_of
-from cockpit.figures.request import PAPER, SCREEN, Request
-from cockpit.figures.signals import Signal, limits_of, named
+from cockpit.figures.curves import LogCurve, as_table, curve_of, window_of
+from cockpit.figures.request import PAPER, SCREEN, FigureRequest
+from cockpit.figures.signals import PlottedSignal, limits_of, named
 from cockpit.judge.judged import judge_tables
 from cockpit.judge.verdict import RunVerdict
 from cockpit.judge.verdict_words import headline
@@ -33,10 +33,10 @@ _INK, _SLIP = "#1f2d3a", "#b5402a"
 _MM = 1.0 / 25.4  # inch
 _FIRST_MM = {SCREEN: 90.0, PAPER: 42.0}  # height of the first panel, and of each that follows
 _NEXT_MM = {SCREEN: 60.0, PAPER: 30.0}
-_FOOT_MM = 1.35  # of a letter of the line at the foot
-_LETTER_MM, _KEY_MM = 0.18, 1.4  # of a letter in a legend and what stands before it, a point of its size
-_ON_TOP = 3.0  # of what is drawn over each other; the first signal is in front
-_OTHER_ALPHA = 0.55  # of the second log, which is dashed besides
+_FOOT_MM = 1.35  # width of a letter in the foot line
+_LETTER_MM, _KEY_MM = 0.18, 1.4  # width of a letter and of a key in the legend, per point of font size
+_ON_TOP = 3.0  # z-order of the first signal; later signals lie behind it
+_OTHER_ALPHA = 0.55  # of the second log, which is also dashed
 
 
 class _Shown(NamedTuple):
@@ -49,24 +49,24 @@ class _Shown(NamedTuple):
 
 
 def draw_logs(
-    logs: Sequence[Path], out: Path, request: Request | None = None, data: Path | None = None
+    logs: Sequence[Path], out: Path, request: FigureRequest | None = None, data: Path | None = None
 ) -> list[RunVerdict]:
-    """Draw one log, or two over each other, to `out`, a .png, .svg or .pdf file; what came of each.
+    """Draw one log, or two over each other, to `out`, a .png, .svg or .pdf file; returns their verdicts.
 
-    Where `data` is given, the numbers of the curves go there as CSV. Raises Fault BAD_LOG, CONFIG, LOG_WRITE, and OSError where
-    a file cannot be written.
+    `data`: path for the numbers of the curves as CSV. Raises Fault BAD_LOG, CONFIG, LOG_WRITE, and OSError if a file cannot
+    be written.
     """
-    wanted = request or Request()
+    wanted = request or FigureRequest()
     made = provenance(logs)
     shown = [_shown(path, name) for path, name in zip(logs, _names(logs), strict=True)]
-    from_s, to_s = window_of([one.run for one in shown], wanted)
-    signals = [named(wanted.signals, one.run) for one in shown]
-    panels = [list(group) for _, group in groupby(signals[0], lambda one: (one.axis, one.unit))]
+    from_s, to_s = window_of([log.run for log in shown], wanted)
+    signals = [named(wanted.signals, log.run) for log in shown]
+    panels = [list(group) for _, group in groupby(signals[0], lambda signal: (signal.axis, signal.unit))]
     curves = [[_curves(shown, signal, signals, from_s, to_s) for signal in panel] for panel in panels]
     _save(_figure(shown, panels, curves, wanted, (from_s, to_s), made), shown, out, wanted, made)
     if data is not None:
-        write_whole(data, as_table([one for panel in curves for same in panel for one in same]))
-    return [one.verdict for one in shown]
+        write_whole(data, as_table([curve for panel in curves for of_signal in panel for curve in of_signal]))
+    return [log.verdict for log in shown]
 
 
 def _shown(path: Path, name: str) -> _Shown:
@@ -75,7 +75,7 @@ def _shown(path: Path, name: str) -> _Shown:
 
 
 def _names(logs: Sequence[Path]) -> list[str]:
-    """What the logs are called; two of one name by their folders too, and a log beside itself by a number."""
+    """Distinct names of the logs: with their folders if the file names are equal, numbered if the paths are equal."""
     alone = [shown_name(path.name) for path in logs]
     if len({*alone}) == len(alone):
         return alone
@@ -84,26 +84,30 @@ def _names(logs: Sequence[Path]) -> list[str]:
 
 
 def _literal(name: str) -> str:
-    """A name for matplotlib, to which a dollar begins a formula."""
+    """A name with escaped dollars, which would start a formula in matplotlib."""
     return name.replace("$", r"\$")
 
 
 def _curves(
-    shown: Sequence[_Shown], signal: Signal, signals: Sequence[Sequence[Signal]], from_s: float, to_s: float
-) -> list[Curve]:
+    shown: Sequence[_Shown],
+    signal: PlottedSignal,
+    signals: Sequence[Sequence[PlottedSignal]],
+    from_s: float,
+    to_s: float,
+) -> list[LogCurve]:
     """One signal of every log that holds it."""
     return [
-        curve_of(one.run, one.name, signal, from_s, to_s)
-        for one, there in zip(shown, signals, strict=True)
-        if signal in there
+        curve_of(log.run, log.name, signal, from_s, to_s)
+        for log, of_log in zip(shown, signals, strict=True)
+        if signal in of_log
     ]
 
 
 def _figure(
     shown: Sequence[_Shown],
-    panels: Sequence[Sequence[Signal]],
-    curves: Sequence[Sequence[Sequence[Curve]]],
-    request: Request,
+    panels: Sequence[Sequence[PlottedSignal]],
+    curves: Sequence[Sequence[Sequence[LogCurve]]],
+    request: FigureRequest,
     window_s: tuple[float, float],
     made: Provenance,
 ) -> Any:
@@ -132,10 +136,10 @@ def _figure(
 
 
 def _rules(paper: bool) -> Any:
-    """Settings of matplotlib: a paper's text is small and can be searched, and an SVG is the same each time."""
+    """Settings of matplotlib: small, searchable text for a paper, and reproducible SVG."""
     size = 7.0 if paper else 10.0
     return {
-        "font.family": "DejaVu Sans",  # comes with matplotlib: the same everywhere
+        "font.family": "DejaVu Sans",  # shipped with matplotlib, so equal on every computer
         "font.size": size,
         "axes.linewidth": 0.5 if paper else 0.8,
         "lines.linewidth": 0.8 if paper else 1.2,
@@ -146,29 +150,29 @@ def _rules(paper: bool) -> Any:
     }
 
 
-def _title(shown: Sequence[_Shown], request: Request, window_s: tuple[float, float]) -> str:
-    """The answer for each log; of a part of a run also how many of its slips are in it."""
+def _title(shown: Sequence[_Shown], request: FigureRequest, window_s: tuple[float, float]) -> str:
+    """The answer for each log; for part of a run also its number of slips."""
     lines: list[str] = []
-    for one in shown:
-        name = f"{one.name}: " if len(shown) > 1 else ""
+    for log in shown:
+        name = f"{log.name}: " if len(shown) > 1 else ""
         part = ""
         if request.is_window:
-            part = f"\nshown: {window_s[0]:g} to {window_s[1]:g} s of {one.verdict.seconds:.4g} s"
-            if one.cycles is not None:
-                inside = one.cycles.between(*window_s).slips
-                part += f", {inside} of {counted(one.cycles.slips, 'slip')}"
-        lines.append(name + headline(one.verdict) + part)
+            part = f"\nshown: {window_s[0]:g} to {window_s[1]:g} s of {log.verdict.seconds:.4g} s"
+            if log.cycles is not None:
+                inside = log.cycles.between(*window_s).slips
+                part += f", {inside} of {counted(log.cycles.slips, 'slip')}"
+        lines.append(name + headline(log.verdict) + part)
     return "\n".join(lines)
 
 
 def _panel(
     axes: Any,
     shown: Sequence[_Shown],
-    panel: Sequence[Signal],
-    curves: Sequence[Sequence[Curve]],
+    panel: Sequence[PlottedSignal],
+    curves: Sequence[Sequence[LogCurve]],
     window_s: tuple[float, float],
 ) -> None:
-    names = {one.name: number for number, one in enumerate(shown)}
+    names = {log.name: number for number, log in enumerate(shown)}
     axes.margins(x=0)
     axes.spines[["top", "right"]].set_visible(False)
     for number, same in enumerate(curves):
@@ -178,21 +182,21 @@ def _panel(
     for words, value in limits_of(shown[0].run, panel[0].axis):
         axes.axhline(value * panel[0].factor, color=_SLIP, linewidth=0.6, linestyle="--", label=words)
     if panel[0].name == "drive_force_N":
-        for one in shown:
-            _mark_slips(axes, one, window_s, second=names[one.name] > 0, several=len(shown) > 1)
+        for log in shown:
+            _mark_slips(axes, log, window_s, second=names[log.name] > 0, several=len(shown) > 1)
     axes.set_ylabel(panel[0].axis_title)
     if panel[0].axis in {"velocity", "amplitude"} and axes.get_ylim()[1] > 0.0:
         axes.set_ylim(bottom=min(_least(curves), 0.0) * panel[0].factor * 1.05)
 
 
-def _least(curves: Sequence[Sequence[Curve]]) -> float:
-    """The least value of all curves, in SI units; 0 without any."""
+def _least(curves: Sequence[Sequence[LogCurve]]) -> float:
+    """Least value of all curves, in SI units; 0 without any."""
     every = [curve.values.least[np.isfinite(curve.values.least)] for same in curves for curve in same]
     return float(np.concatenate([*every, np.zeros(1)]).min())
 
 
-def _legend(axes: Any, request: Request) -> None:
-    """Above the axes, where it hides no slip, in as many columns as there is room for."""
+def _legend(axes: Any, request: FigureRequest) -> None:
+    """Legend above the axes, where it hides no slip, in as many columns as fit."""
     handles, labels = axes.get_legend_handles_labels()
     if len(handles) < 2:
         return
@@ -203,12 +207,12 @@ def _legend(axes: Any, request: Request) -> None:
 
 
 def _letters(label: str) -> int:
-    """How many letters of a label are seen: a symbol in mathematics, as of v_a, is two."""
+    """Visible letters of a label; a formula symbol such as v_a counts as two."""
     return len(re.sub(r"\$.*?\$", "vd", label))
 
 
-def _draw(axes: Any, curve: Curve, label: str, second: bool, zorder: float) -> None:
-    """The mean as a line and the range from least to largest behind it."""
+def _draw(axes: Any, curve: LogCurve, label: str, second: bool, zorder: float) -> None:
+    """Draw the mean as a line over the range from least to largest."""
     factor, colour = curve.signal.factor, curve.signal.colour
     alpha = _OTHER_ALPHA if second else 1.0
     if not curve.is_raw:
@@ -220,7 +224,7 @@ def _draw(axes: Any, curve: Curve, label: str, second: bool, zorder: float) -> N
 
 
 def _mark_slips(axes: Any, shown: _Shown, window_s: tuple[float, float], second: bool, several: bool) -> None:
-    """A triangle at each breakaway; the legend says how many there are in the picture."""
+    """Draw a triangle at each breakaway; the legend contains their number."""
     if shown.cycles is None:
         return
     inside = (shown.cycles.breakaway_t_s >= window_s[0]) & (shown.cycles.breakaway_t_s <= window_s[1])
@@ -240,9 +244,9 @@ def _mark_slips(axes: Any, shown: _Shown, window_s: tuple[float, float], second:
 
 
 def _shade(axes: Any, shown: _Shown, window_s: tuple[float, float], named: bool) -> None:
-    """Colour the background by mode and mark where the controller's time begins, as far as it is in the picture.
+    """Colour the background by mode and mark the start of control if it is in the picture.
 
-    With labels for the legend where `named`.
+    `named`: with labels for the legend.
     """
     t_s, mode = shown.run.trace["t_ns"] * 1e-9, shown.run.trace["mode"]
     from_s, to_s = window_s
@@ -253,7 +257,7 @@ def _shade(axes: Any, shown: _Shown, window_s: tuple[float, float], named: bool)
         and shown.verdict.enabled_from_s > 0.0
         and not shown.verdict.imported
     ):
-        label = "in charge from here" if named else None
+        label = "controller takes over" if named else None
         axes.axvline(shown.verdict.enabled_from_s, color=_INK, linewidth=0.6, linestyle=":", label=label)
     if not len(mode):
         return
@@ -267,10 +271,10 @@ def _shade(axes: Any, shown: _Shown, window_s: tuple[float, float], named: bool)
             axes.axvspan(t_s[start], t_s[end], color=_SHADES[now], label=label, linewidth=0, zorder=0)
 
 
-def _save(figure: Any, shown: Sequence[_Shown], out: Path, request: Request, made: Provenance) -> None:
+def _save(figure: Any, shown: Sequence[_Shown], out: Path, request: FigureRequest, made: Provenance) -> None:
     import matplotlib as mpl
 
     suffix = out.suffix.lower()
-    metadata = made.metadata(suffix, "; ".join(one.name for one in shown))
+    metadata = made.metadata(suffix, "; ".join(log.name for log in shown))
     with mpl.rc_context(_rules(request.style == PAPER)), replacing(out) as file:
         figure.savefig(file, dpi=request.dpi, format=suffix.removeprefix("."), metadata=metadata)

@@ -1,35 +1,33 @@
-"""What can be drawn of a log: each signal's name, symbol, unit, and where in the log it is."""
+"""Drawable signals of a log: name, symbol, unit, topic."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.faults import Fault
 from bridge.log.logfile import RunData, block_period_ns, sample_times_s
 from bridge.log.metadata import is_number
 from cockpit.judge.setup import absent_channels
 
-Floats = npt.NDArray[np.float64]
 
-
-class Signal(NamedTuple):
-    """One signal; its values in a log are SI units, and `factor` makes of them what is shown."""
+class PlottedSignal(NamedTuple):
+    """One signal; logs contain SI units, and `factor` converts them to `unit`."""
 
     name: str  # as in the tables of `log export`
-    symbol: str  # as in the paper; empty where there is none
+    symbol: str  # as in the paper; may be empty
     words: str
-    axis: str  # what the axis is called; neighbours with one axis and one unit share it
+    axis: str  # title of the axis; neighbours with equal axis and unit share a panel
     topic: str
     factor: float
     unit: str
     colour: str
-    unknown: float | None = None  # the value that stands for "not known"
+    unknown: float | None = None  # value that means "not known"
 
     @property
     def title(self) -> str:
-        """`F_d, drive force`, with the symbol as matplotlib sets it."""
+        """`F_d, drive force`, with the symbol as a matplotlib formula."""
         if not self.symbol:
             return self.words
         base, _, index = self.symbol.partition("_")
@@ -44,36 +42,46 @@ class Signal(NamedTuple):
 _INK, _RED, _BLUE, _GREEN, _GREY, _BROWN = "#1f2d3a", "#b5402a", "#2a6fb5", "#1e8449", "#808b96", "#9a6a1c"
 
 SIGNALS = {
-    one.name: one
-    for one in (
-        Signal("drive_force_N", "F_d", "drive force", "drive force", "sensors", 1.0, "N", _INK),
-        Signal("vibration_velocity_mps", "v_a", "vibration, measured", "velocity", "trace", 1e3, "mm/s", _BLUE),
-        Signal("drive_velocity_mps", "v_d", "drive, measured", "velocity", "trace", 1e3, "mm/s", _RED),
-        Signal("wanted_velocity_mps", "", "vibration, set point", "velocity", "trace", 1e3, "mm/s", _GREY),
-        Signal("sliding_velocity_mps", "v_s", "slide, mean over a window", "velocity", "trace", 1e3, "mm/s", _GREEN),
-        Signal("velocity_ratio", "", "v_a over v_d, measured", "v_a / v_d", "state", 1.0, "", _BLUE, unknown=0.0),
-        Signal("amplitude_m", "u_0", "amplitude of the base, applied", "amplitude", "applied", 1e9, "nm", _BLUE),
-        Signal("wanted_amplitude_m", "", "amplitude asked for", "amplitude", "trace", 1e9, "nm", _GREY),
-        Signal("frequency_Hz", "f", "frequency, applied", "frequency", "applied", 1.0, "Hz", _BROWN, unknown=0.0),
-        Signal("time_to_slip_s", "", "predicted time to slip", "time to slip", "trace", 1.0, "s", _BROWN, unknown=-1.0),
-        Signal("score", "", "score of stick-slip, 0 to 1", "score", "trace", 1.0, "", _RED),
-        Signal("force_rate", "s", "rate of the force, 1 when stuck", "force rate", "trace", 1.0, "", _INK),
-        Signal("mass_accel_mps2", "", "slide's acceleration", "acceleration", "sensors", 1.0, "m/s²", _GREEN),
-        Signal("base_accel_mps2", "", "base's acceleration", "acceleration", "sensors", 1.0, "m/s²", _BLUE),
-        Signal("mass_position_m", "x", "slide's position", "position", "sensors", 1e3, "mm", _GREEN),
-        Signal("drive_position_m", "s_d", "drive's position", "position", "sensors", 1e3, "mm", _RED),
-        Signal("round_trip_ns", "", "block out to command in", "round trip", "applied", 1e-3, "µs", _BROWN, unknown=0),
-        Signal("heat_share", "", "exciter's warmth, over the allowed", "warmth", "applied", 1e2, "%", _RED),
+    signal.name: signal
+    for signal in (
+        PlottedSignal("drive_force_N", "F_d", "drive force", "drive force", "sensors", 1.0, "N", _INK),
+        PlottedSignal("vibration_velocity_mps", "v_a", "vibration, measured", "velocity", "trace", 1e3, "mm/s", _BLUE),
+        PlottedSignal("drive_velocity_mps", "v_d", "drive, measured", "velocity", "trace", 1e3, "mm/s", _RED),
+        PlottedSignal("wanted_velocity_mps", "", "vibration, set point", "velocity", "trace", 1e3, "mm/s", _GREY),
+        PlottedSignal(
+            "sliding_velocity_mps", "v_s", "slide, mean over a window", "velocity", "trace", 1e3, "mm/s", _GREEN
+        ),
+        PlottedSignal(
+            "velocity_ratio", "", "v_a over v_d, measured", "v_a / v_d", "state", 1.0, "", _BLUE, unknown=0.0
+        ),
+        PlottedSignal("amplitude_m", "u_0", "amplitude of the base, applied", "amplitude", "applied", 1e9, "nm", _BLUE),
+        PlottedSignal("wanted_amplitude_m", "", "amplitude asked for", "amplitude", "trace", 1e9, "nm", _GREY),
+        PlottedSignal(
+            "frequency_Hz", "f", "frequency, applied", "frequency", "applied", 1.0, "Hz", _BROWN, unknown=0.0
+        ),
+        PlottedSignal(
+            "time_to_slip_s", "", "predicted time to slip", "time to slip", "trace", 1.0, "s", _BROWN, unknown=-1.0
+        ),
+        PlottedSignal("score", "", "score of stick-slip, 0 to 1", "score", "trace", 1.0, "", _RED),
+        PlottedSignal("force_rate", "s", "rate of the force, 1 when stuck", "force rate", "trace", 1.0, "", _INK),
+        PlottedSignal("mass_accel_mps2", "", "slide's acceleration", "acceleration", "sensors", 1.0, "m/s²", _GREEN),
+        PlottedSignal("base_accel_mps2", "", "base's acceleration", "acceleration", "sensors", 1.0, "m/s²", _BLUE),
+        PlottedSignal("mass_position_m", "x", "slide's position", "position", "sensors", 1e3, "mm", _GREEN),
+        PlottedSignal("drive_position_m", "s_d", "drive's position", "position", "sensors", 1e3, "mm", _RED),
+        PlottedSignal(
+            "round_trip_ns", "", "block out to command in", "round trip", "applied", 1e-3, "µs", _BROWN, unknown=0
+        ),
+        PlottedSignal("heat_share", "", "exciter's warmth, over the allowed", "warmth", "applied", 1e2, "%", _RED),
     )
 }
-USUAL = ("drive_force_N", "vibration_velocity_mps", "drive_velocity_mps")  # of the picture of a run
+USUAL = ("drive_force_N", "vibration_velocity_mps", "drive_velocity_mps")  # default figure of a run
 _USUAL_OF_IMPORT = ("drive_force_N", "mass_position_m", "drive_position_m", "mass_accel_mps2", "base_accel_mps2")
 
 
-def named(text: str, run: RunData) -> list[Signal]:
-    """The signals of a comma-separated list; of an empty one what is usually shown of such a log.
+def named(text: str, run: RunData) -> list[PlottedSignal]:
+    """The signals of a comma-separated list; for an empty list the defaults of the log.
 
-    Raises Fault CONFIG for an unknown name, or one that the log does not hold.
+    Raises Fault CONFIG for an unknown name, or a signal missing from the log.
     """
     names = list(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
     imported = "import" in run.headers
@@ -81,23 +89,23 @@ def named(text: str, run: RunData) -> list[Signal]:
         return [SIGNALS[name] for name in (_USUAL_OF_IMPORT if imported else USUAL) if not imported or holds(run, name)]
     for name in names:
         if name not in SIGNALS:
-            raise Fault("CONFIG", f"--signals {name}: no signal of a log; known: {', '.join(SIGNALS)}")
+            raise Fault("CONFIG", f"--signals {name}: unknown signal; known: {', '.join(SIGNALS)}")
         if imported and not holds(run, name):
-            there = ", ".join(one for one in SIGNALS if holds(run, one))
-            raise Fault("CONFIG", f"--signals {name}: not in {run.path.name}; choose from {there}")
+            present = ", ".join(signal for signal in SIGNALS if holds(run, signal))
+            raise Fault("CONFIG", f"--signals {name}: not in {run.path.name}; choose from {present}")
     return [SIGNALS[name] for name in names]
 
 
 def holds(run: RunData, name: str) -> bool:
-    """Whether a log holds a signal at all."""
+    """True if a log contains the signal."""
     signal = SIGNALS[name]
     if signal.topic == "sensors" and name in absent_channels(run.headers, run.path):
         return False
     return len(getattr(run, signal.topic)) > 0
 
 
-def samples_of(run: RunData, signal: Signal) -> tuple[Floats, Floats]:
-    """Time [s] and values in SI units, [samples]; nan where the value is not known."""
+def samples_of(run: RunData, signal: PlottedSignal) -> tuple[Floats, Floats]:
+    """Time [s] and values in SI units, [samples]; nan for unknown values."""
     table = getattr(run, signal.topic)
     if not len(table):
         return np.empty(0), np.empty(0)
@@ -110,15 +118,15 @@ def samples_of(run: RunData, signal: Signal) -> tuple[Floats, Floats]:
 
 
 def limits_of(run: RunData, axis: str) -> list[tuple[str, float]]:
-    """Limits of an axis in the configuration of a log, in words and in SI units; none where the log does not tell."""
+    """Limits of an axis from the configuration in a log: label and SI value; empty without a configuration."""
     if axis != "amplitude":
         return []
     return stroke_limits({role: run.configuration(role) for role in ("controller", "plant") if role in run.headers})
 
 
 def stroke_limits(configurations: Mapping[str, Any]) -> list[tuple[str, float]]:
-    """Limits of the amplitude [m] in the configurations of rig and controller, by role, in words."""
-    found: list[tuple[str, float]] = []
+    """Limits of the amplitude from the configurations by role: label and value [m]."""
+    limits: list[tuple[str, float]] = []
     for role, keys, words in (
         ("controller", ("limits", "amplitude_max_m"), "controller's limit"),
         ("plant", ("rig", "guard", "stroke_m"), "guard's limit"),
@@ -128,9 +136,9 @@ def stroke_limits(configurations: Mapping[str, Any]) -> list[tuple[str, float]]:
         for key in keys:
             value = value.get(key) if isinstance(value, dict) else None
         if is_number(value):
-            same = next((number for number, one in enumerate(found) if one[1] == value), None)
+            same = next((number for number, (_, limit_m) in enumerate(limits) if limit_m == value), None)
             if same is None:
-                found.append((words, float(value)))
+                limits.append((words, float(value)))
             else:
-                found[same] = (f"{found[same][0]} and {words}", float(value))
-    return found
+                limits[same] = (f"{limits[same][0]} and {words}", float(value))
+    return limits

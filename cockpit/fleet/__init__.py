@@ -1,5 +1,5 @@
-"""A fleet: many evidence folders, each diagnosed once and kept, and one page that says which rigs share a gap.
+"""A fleet: many evidence folders, each diagnosed once, and one page with the gaps that rigs share.
 
-kept.py     results of folders that need not be diagnosed again     work.py     the work on all folders, resumable
-groups.py   rigs that share a gap, those first where mending helps most          page.py     the index of a fleet
+kept.py     stored results of unchanged folders                 work.py     resumable work on all folders
+groups.py   rigs that share a gap, largest benefit first        page.py     index page of a fleet
 """

@@ -1,4 +1,4 @@
-"""Which rigs share a gap, and where mending would help most."""
+"""Groups of rigs that share a gap, by the benefit of closing it."""
 
 from collections import defaultdict
 from typing import Literal, NamedTuple
@@ -12,27 +12,27 @@ FORMAT = "fleet/1"
 Kind = Literal["named", "unexplained", "no-gap"]
 
 
-class Rig(NamedTuple):
+class GroupedRig(NamedTuple):
     """One rig in a group."""
 
     evidence: str
-    report: str  # file beside the index; empty where none was written
+    report: str  # file next to the index; empty if not written
     verdict: str
     answer: str
-    explains: float | None  # share of the gap that what the group shares explains, 0 to 1; None: not known
+    explains: float | None  # share of the gap explained by the cause of the group, 0 to 1; None: unknown
     interval_90: tuple[float, float] | None
-    size: str  # of what the group shares, in words
-    after: str  # what to measure next
+    size: str  # size of this cause, in words
+    after: str  # next measurement
 
 
-class Group(NamedTuple):
+class RigGroup(NamedTuple):
     """Rigs that share a gap."""
 
     kind: Kind
-    what: str  # effects, or what most of a signal goes with; empty where nothing is known
+    what: str  # effects, or the quantity that explains most of a signal; empty if unknown
     meaning: str
-    helps: float  # sum of the shares that are explained: the gaps that mending this would close
-    rigs: tuple[Rig, ...]  # the largest share first
+    helps: float  # sum of the explained shares: number of gaps that a mended cause would close
+    rigs: tuple[GroupedRig, ...]  # the largest share first
 
 
 class Failed(NamedTuple):
@@ -44,13 +44,13 @@ class Failed(NamedTuple):
 
 
 class Fleet(NamedTuple):
-    """All rigs; `groups` where mending helps most first, rigs without a gap last."""
+    """All rigs; `groups` by benefit, largest first, rigs without a gap last."""
 
     format: str
     folders: int
-    groups: tuple[Group, ...]
+    groups: tuple[RigGroup, ...]
     failed: tuple[Failed, ...]
-    left: tuple[str, ...]  # folders that are not done yet
+    left: tuple[str, ...]  # pending folders
 
 
 class Diagnosed(NamedTuple):
@@ -62,13 +62,13 @@ class Diagnosed(NamedTuple):
 
 
 def fleet_of(done: list[Diagnosed], failed: list[Failed], left: list[str]) -> Fleet:
-    """The fleet of what is known so far."""
-    members: dict[tuple[Kind, str], list[Rig]] = defaultdict(list)
-    for one in done:
-        key, rig = _placed(one)
+    """The fleet from the results so far."""
+    members: dict[tuple[Kind, str], list[GroupedRig]] = defaultdict(list)
+    for diagnosed in done:
+        key, rig = _placed(diagnosed)
         members[key].append(rig)
     groups = [
-        Group(
+        RigGroup(
             kind,
             what,
             "; ".join(words.EFFECT_WORDS.get(name, "") for name in what.split(" + ")) if kind == "named" else "",
@@ -81,33 +81,35 @@ def fleet_of(done: list[Diagnosed], failed: list[Failed], left: list[str]) -> Fl
     return Fleet(FORMAT, len(done) + len(failed) + len(left), tuple(groups), tuple(failed), tuple(left))
 
 
-def _placed(one: Diagnosed) -> tuple[tuple[Kind, str], Rig]:
-    """The group of a rig, and its row there."""
-    told, gap = one.diagnosis, one.diagnosis.gap
+def _placed(diagnosed: Diagnosed) -> tuple[tuple[Kind, str], GroupedRig]:
+    """Group of a rig, and its row in the group."""
+    diagnosis, gap = diagnosed.diagnosis, diagnosed.diagnosis.gap
     kind: Kind = "named"
     what, size, explains, between = "", "", gap.shrinkage, gap.interval_90
-    if told.verdict in ("effect", "partly"):
-        what = " + ".join(sorted(told.effects))
+    if diagnosis.verdict in ("effect", "partly"):
+        what = " + ".join(sorted(diagnosis.effects))
         size = "; ".join(
             words.estimate_in_words(candidate.effect, *item)
-            for candidate in told.candidates
-            if candidate.effect in told.effects
+            for candidate in diagnosis.candidates
+            if candidate.effect in diagnosis.effects
             for item in candidate.parameters.items()
         )
-        own = [share for share in told.shares if share.what in told.effects]
-        if explains is None and own:  # no fit was made: what the relations say, of one signal
-            most = max(own, key=lambda share: share.share)
+        shares = [share for share in diagnosis.shares if share.what in diagnosis.effects]
+        if explains is None and shares:  # without a fit: the share in one signal, from the relations
+            most = max(shares, key=lambda share: share.share)
             explains, between, size = most.share, most.interval_90, f"{most.signal}: {share_in_words(most)}"
-    elif told.verdict == "no-gap":
+    elif diagnosis.verdict == "no-gap":
         kind, explains, between = "no-gap", None, None
-    elif (most := mostly(told)) is not None:
+    elif (most := mostly(diagnosis)) is not None:
         kind, what, size = "unexplained", f"{most.what} in the {most.signal}", share_in_words(most)
         explains, between = most.share, most.interval_90
     else:
         kind, explains, between = "unexplained", None, None
-        if told.remainder is not None:
-            what, size = f"something in the {told.remainder.where}", remainder_in_words(told.remainder)
-    # a fit below the noise floor closes the whole gap, not more; one that makes it worse helps nobody
+        if diagnosis.remainder is not None:
+            what, size = f"something in the {diagnosis.remainder.where}", remainder_in_words(diagnosis.remainder)
+    # a fit below the noise floor closes the whole gap and not more; a fit that widens the gap counts as 0
     explains = None if explains is None else min(max(explains, 0.0), 1.0)
-    answer, after = words.answer(told), told.next_experiment.what
-    return (kind, what), Rig(one.evidence, one.report, told.verdict, answer, explains, between, size, after)
+    answer, after = words.answer(diagnosis), diagnosis.next_experiment.what
+    return (kind, what), GroupedRig(
+        diagnosed.evidence, diagnosed.report, diagnosis.verdict, answer, explains, between, size, after
+    )

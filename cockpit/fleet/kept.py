@@ -1,4 +1,4 @@
-"""Results that are kept in the folder of a fleet: one for each content of an evidence folder and version of the diagnosis."""
+"""Stored results in the folder of a fleet: one per content of an evidence folder and version of the diagnosis."""
 
 import hashlib
 import json
@@ -17,37 +17,37 @@ RESULTS = "results"  # in the folder of a fleet
 
 
 def evidence_files(folder: Path) -> list[Path]:
-    """The manifest and the files of the runs, each once. Raises Fault BAD_EVIDENCE."""
-    runs = dict.fromkeys(run.file for run in read_manifest(folder).run)  # several may be parts of one file
+    """The manifest and the distinct files of the runs. Raises Fault BAD_EVIDENCE."""
+    runs = dict.fromkeys(run.file for run in read_manifest(folder).run)  # several runs may be parts of a file
     return [folder / MANIFEST, *(folder / file for file in runs)]
 
 
 def digest_of(folder: Path, tool: str, budget_s: float | None) -> str:
-    """SHA-256 over the files of an evidence, the version of the diagnosis and the time it may take.
+    """SHA-256 over the files of an evidence folder, the version of the diagnosis and its time budget.
 
-    Not over the folder's name, nor the times of its files. Raises Fault BAD_EVIDENCE, OSError.
+    The name of the folder and the times of its files are excluded. Raises Fault BAD_EVIDENCE, OSError.
     """
     parts = [
         tool,
         str(budget_s),
         *(_sha256(path) for path in evidence_files(folder)),
-    ]  # the manifest has the files' names
+    ]  # the manifest contains the names of the files
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
 def keep(fleet: Path, digest: str, diagnosis: Diagnosis, report: str) -> None:
-    """Keep a result, whose report is written: it counts only together with this report. Raises Fault LOG_WRITE, OSError."""
+    """Store a result; it is valid only with its report, already written. Raises Fault LOG_WRITE, OSError."""
     table = {
         "format": FORMAT,
         "report": report,
         "report_sha256": _sha256(fleet / report),
         "diagnosis": _adapter().dump_python(diagnosis._replace(pictures=()), mode="json"),
     }
-    write_whole(_place(fleet, digest), json.dumps(table) + "\n")  # with NaN and infinity, which strict JSON loses
+    write_whole(_place(fleet, digest), json.dumps(table) + "\n")  # keeps NaN and infinity, unlike strict JSON
 
 
 def kept(fleet: Path, digest: str) -> tuple[Diagnosis, str] | None:
-    """A result, without its pictures, and the file of its report; None where there is none that is whole."""
+    """A result without its pictures, and the file of its report; None without an intact result."""
     try:
         table: dict[str, Any] = read_json(_place(fleet, digest))
         if table["format"] != FORMAT or _sha256(fleet / table["report"]) != table["report_sha256"]:

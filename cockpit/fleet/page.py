@@ -1,4 +1,4 @@
-"""The index of a fleet: one HTML page that needs no network; each rig leads to its report beside it."""
+"""Index of a fleet: one offline HTML page that links to the reports of its rigs."""
 
 from pathlib import Path
 from urllib.parse import quote
@@ -8,7 +8,7 @@ from jinja2 import Environment, StrictUndefined
 from bridge.files import write_whole
 from bridge.provenance import provenance
 from bridge.units import counted, interval, percent
-from cockpit.fleet.groups import Fleet, Group
+from cockpit.fleet.groups import Fleet, RigGroup
 
 
 def write_page(fleet: Fleet, path: Path) -> None:
@@ -32,8 +32,8 @@ def write_page(fleet: Fleet, path: Path) -> None:
     write_whole(path, text)
 
 
-def _title(group: Group) -> str:
-    """What the rigs of a group share."""
+def _title(group: RigGroup) -> str:
+    """Title of a group: the shared cause."""
     if group.kind == "named":
         return group.what
-    return f"unexplained: {group.what}" if group.what else "unexplained, with nothing in common that is known"
+    return f"unexplained: {group.what}" if group.what else "unexplained, without a known common cause"

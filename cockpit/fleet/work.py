@@ -1,4 +1,4 @@
-"""The work on a fleet: what is kept is not done again, and whatever ends the work, the next one goes on where it ended."""
+"""Work on a fleet: stored results are not repeated, and an interrupted run resumes where it ended."""
 
 import os
 import time
@@ -12,24 +12,24 @@ from cockpit.fleet.groups import Diagnosed, Failed, Fleet, fleet_of
 from cockpit.fleet.kept import digest_of, evidence_files, keep, kept
 from cockpit.fleet.page import write_page
 from cockpit.run.writable import writing
-from diagnosis.blind.version import tool_version
 from diagnosis.diagnose_many import EvidenceFolder, FolderResult
 from diagnosis.report.page import write_report
 from diagnosis.result import Diagnosis
+from diagnosis.version import tool_version
 
 INDEX, INDEX_JSON = "index.html", "index.json"
-_LONGEST_NAME_BYTES = 200  # of 255 that a disk takes; a number and `.html.part` follow
+_LONGEST_NAME_BYTES = 200  # of the 255 bytes of a file name; a number and `.html.part` follow
 
 
 class FleetFolder:
-    """The folder of a fleet: a report and a kept result for each rig, and the index, which is whole at any time.
+    """The folder of a fleet: a report and a stored result per rig, and the index, which is complete at any time.
 
-    A fault is no result: its folder is tried again.
+    Faults are not stored: their folders are tried again.
 
     Args:
-        at: the folder; made where it is not there.
+        at: the folder; created if missing.
         sources: all folders of the fleet.
-        budget_s: time that a folder may take; None: all that it takes.
+        budget_s: time limit per folder; None: no limit.
 
     """
 
@@ -39,22 +39,22 @@ class FleetFolder:
         self._reports = report_names([source.name for source in sources])
         self._digests = {source.name: self._digest(source) for source in sources}
         self._outcomes: dict[str, FolderResult] = {}
-        self._written: dict[str, str] = {}  # reports, by the name of the source
-        self.refused: list[Fault] = []  # what could not be written
+        self._written: dict[str, str] = {}  # reports by name of the source
+        self.refused: list[Fault] = []  # failed writes
 
     def kept(self) -> list[FolderResult]:
-        """The results that are there from before; their diagnoses are without pictures."""
+        """Stored results of earlier runs; their diagnoses have no pictures."""
         for source in self._sources:
             digest = self._digests[source.name]
-            found = kept(self._at, digest) if digest else None
-            if found is not None:
-                diagnosis, self._written[source.name] = found
+            stored = kept(self._at, digest) if digest else None
+            if stored is not None:
+                diagnosis, self._written[source.name] = stored
                 self._outcomes[source.name] = FolderResult(source, diagnosis, None)
         self._index()
         return list(self._outcomes.values())
 
     def add(self, outcome: FolderResult) -> None:
-        """Write the report, the result and the index anew."""
+        """Write the report and the result, and update the index."""
         name, diagnosis = outcome.source.name, outcome.diagnosis
         self._outcomes[name] = without_pictures(outcome)
         if diagnosis is not None:
@@ -62,14 +62,14 @@ class FleetFolder:
         self._index()
 
     def fleet(self) -> Fleet:
-        """What is known so far."""
-        found = [self._outcomes[source.name] for source in self._sources if source.name in self._outcomes]
+        """The fleet from the results so far."""
+        outcomes = [self._outcomes[source.name] for source in self._sources if source.name in self._outcomes]
         done = [
-            Diagnosed(one.source.name, one.diagnosis, self._written.get(one.source.name, ""))
-            for one in found
-            if one.diagnosis is not None
+            Diagnosed(outcome.source.name, outcome.diagnosis, self._written.get(outcome.source.name, ""))
+            for outcome in outcomes
+            if outcome.diagnosis is not None
         ]
-        failed = [Failed(one.source.name, *one.fault) for one in found if one.fault is not None]
+        failed = [Failed(outcome.source.name, *outcome.fault) for outcome in outcomes if outcome.fault is not None]
         left = [source.name for source in self._sources if source.name not in self._outcomes]
         return fleet_of(done, failed, left)
 
@@ -78,7 +78,7 @@ class FleetFolder:
         write_report(diagnosis, source.name, self._at / report, evidence_files(source.folder))
         self._written[source.name] = report
         digest = self._digests[source.name]
-        if digest and digest == self._digest(source):  # its files may have changed while it was diagnosed
+        if digest and digest == self._digest(source):  # its files may have changed during the diagnosis
             keep(self._at, digest, diagnosis, report)
 
     def _index(self) -> None:
@@ -91,11 +91,11 @@ class FleetFolder:
             with writing():
                 write()
         except Fault as fault:
-            if fault.line not in {one.line for one in self.refused}:  # the index is written many times
+            if fault.line not in {refused.line for refused in self.refused}:  # the index is written many times
                 self.refused.append(fault)
 
     def _digest(self, source: EvidenceFolder) -> str:
-        """Empty where the evidence cannot be read: then the diagnosis says why."""
+        """Digest of the source; empty for unreadable evidence, whose diagnosis reports the reason."""
         try:
             return digest_of(source.folder, self._tool, self._budget_s)
         except (Fault, OSError):
@@ -103,10 +103,10 @@ class FleetFolder:
 
 
 def with_estimate(outcomes: Iterator[FolderResult], left: int) -> Generator[tuple[FolderResult, str]]:
-    """Each outcome with the time that the other folders may still take, in words; empty after the last one.
+    """Each outcome with the estimated time left, in words; empty after the last outcome.
 
     Args:
-        outcomes: in the order in which they finish.
+        outcomes: in order of completion.
         left: their number.
 
     """
@@ -123,20 +123,20 @@ def _in_words(duration_s: float) -> str:
 
 
 def without_pictures(outcome: FolderResult) -> FolderResult:
-    """Pictures are by far the largest part, and hundreds of folders are meant to fit into memory."""
+    """The outcome without its pictures, the largest part: hundreds of folders must fit into memory."""
     return outcome._replace(diagnosis=outcome.diagnosis and outcome.diagnosis._replace(pictures=()))
 
 
 def report_names(names: list[str]) -> dict[str, str]:
-    """A file name for the report of each, none that of the index; a name may be a path, because several folders have the same."""
-    found: dict[str, str] = {}
+    """Distinct file names for the reports, different from the index; a name may be a path, to separate folders of equal name."""
+    reports: dict[str, str] = {}
     taken = {Path(INDEX).stem}
     for name in names:
         whole = name.strip("/").replace("/", "_")
-        while len(os.fsencode(whole)) > _LONGEST_NAME_BYTES:  # of a path the end tells most
+        while len(os.fsencode(whole)) > _LONGEST_NAME_BYTES:  # keep the end of a path, its most specific part
             whole = whole[1:]
         tries = (whole if number == 1 else f"{whole}-{number}" for number in count(1))
-        one = next(one for one in tries if one.casefold() not in taken)  # some disks take a and A for the same
-        taken.add(one.casefold())
-        found[name] = f"{one}.html"
-    return found
+        unique = next(stem for stem in tries if stem.casefold() not in taken)  # some file systems ignore case
+        taken.add(unique.casefold())
+        reports[name] = f"{unique}.html"
+    return reports

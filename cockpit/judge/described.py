@@ -1,43 +1,43 @@
-"""The description of a run's sensors and axis, as far as its log has one: every number may be missing on a foreign rig."""
+"""Description of a run's sensors and axis in its log. On a foreign rig any number may be missing."""
 
 import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from bridge.log.check.channel import Channel, channels_of
+from bridge.log.check.channel import ChannelLimits, channels_of
 from bridge.log.metadata import is_number
 
-# Largest difference of force and spring, as a share of the larger. Smaller: a stiffness that is described 30 % wrong is doubted;
-# larger: a force sensor of half or twice the scale, 0.5, passes. With effects that bend the relation, and for a rig without a
-# description, of whose stiffness the controller may know a tenth, only the sign counts.
+# Largest difference of force and spring, as a share of the larger. Smaller: a described stiffness that is 30 % wrong is doubted.
+# Larger: a force sensor of half or twice the scale, 0.5, passes. With effects that bend the relation, and for a rig without a
+# description, whose configured stiffness may be 10 times wrong, only the sign counts.
 _APART, _APART_SIGN = 0.4, 1.05
 _BENT = {"drive-hardening", "frame-compliance", "drive-damping", "force-sensor-lag", "drive-backlash"}
 
 
 class Described(NamedTuple):
-    """Of a rig and its controller; NaN for a number that is not known."""
+    """Description of a rig and its controller; NaN for unknown numbers."""
 
-    channels: dict[str, Channel]
+    channels: dict[str, ChannelLimits]
     stiffness_N_per_m: (
-        float  # of the drive, as the force sensor shows it; without a rig, as the controller is configured
+        float  # of the drive, in readings of the force sensor; without a rig, from the controller's configuration
     )
-    apart: float  # share by which force and spring may differ
+    apart: float  # allowed difference of force and spring, as a share
     drop_N: float  # F_s - F_c
     slip_m: float  # length of a slip, 2 (F_s - F_c) / k_d
     mass_kg: float  # of the slide
     contact_per_s2: float  # stiffness of the contact over the mass
-    uses_force: bool  # the verdict rests on it: the controller uses it, or the rig is described and has it
+    uses_force: bool  # the verdict depends on the force: the controller uses it, or the rig is described
     uses_slide: bool
-    accel_bandwidth_Hz: float  # for which the controller corrects v_a; infinite where it is not known
+    accel_bandwidth_Hz: float  # for which the controller corrects v_a; infinite if unknown
 
 
 def described(plant: Mapping[str, Any] | None, controller: Mapping[str, Any] | None) -> Described:
-    """From the configurations in a log; None for a missing one."""
+    """Description from the configurations in a log; None for a missing configuration."""
     tables = {"rig": (plant or {}).get("rig"), "controller": controller}
 
     def number(path: str, otherwise: float = math.nan) -> float:
-        found = _at(tables, path)
-        return float(found) if is_number(found) else otherwise
+        value = _at(tables, path)
+        return float(value) if is_number(value) else otherwise
 
     def grown(effect: str) -> float:
         return 1.0 + number(f"rig.effects.{effect}.ratio", 0.0)

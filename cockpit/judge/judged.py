@@ -1,4 +1,4 @@
-"""Judging a run from its log, or from the arrays of a log that was read."""
+"""Judges a run from its log, or from the arrays of a log in memory."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -13,11 +13,11 @@ from cockpit.judge.setup import is_known
 from cockpit.judge.verdict import RunVerdict
 from diagnosis.features.cycles import Cycles
 
-_PIECE_ROWS = 4096  # of a log in memory, which the judge takes at once
+_PIECE_ROWS = 4096  # of a log in memory, per call of the judge
 
 
 class Judged(NamedTuple):
-    """What came of a log."""
+    """Results of a log."""
 
     verdict: RunVerdict
     check: LogCheck  # the findings of `log check`
@@ -30,11 +30,11 @@ def judge_log(
     margins: bool = False,
     stretch_from_s: float | None = None,
 ) -> Judged:
-    """Judge a log and check it, in one pass and in memory that does not grow with the log. Raises Fault BAD_LOG.
+    """Judge and check a log in one pass, in constant memory. Raises Fault BAD_LOG.
 
     Args:
         path: of the log.
-        progress: called with the share of the log that was read, 0 to 1.
+        progress: called with the share of the log read so far, 0 to 1.
         margins, stretch_from_s: as in `RunJudge`.
 
     """
@@ -55,12 +55,12 @@ def judge(path: Path) -> RunVerdict:
 
 
 def judge_tables(run: RunData) -> tuple[RunVerdict, Cycles | None]:
-    """Judge a log that is in memory, as pictures and pages need it; the verdict and the slips. Raises Fault BAD_LOG."""
+    """Judge a log in memory, for figures and pages; its verdict and slips. Raises Fault BAD_LOG."""
     judge = RunJudge(run.path, run.headers)
     judge.log.events.add(run.events)
     tables = {name: getattr(run, name) for name in ("trace", "applied", "command", "state", "announce", "sensors")}
     pieces = max(map(len, tables.values())) // _PIECE_ROWS + 1
-    for piece in range(pieces):  # of the same time, but for what is missing
+    for piece in range(pieces):  # of the same time, except for missing messages
         for name, table in tables.items():
             part = table[len(table) * piece // pieces : len(table) * (piece + 1) // pieces]
             judge.add(name, part, part["t_ns"])

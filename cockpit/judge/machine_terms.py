@@ -1,15 +1,15 @@
 """A run in the terms of machine tools: following error, quadrant error at reversals, and the dose of vibration.
 
-Following error: nominal less actual position, as numerical controls have it (Heidenhain, iTNC 530 technical manual, 6.8: "servo
-lag"). Nominal is the drive's position, actual the slide's: without slips it is the give of the spring, F / k_d, and what the
-zeros of both transducers are apart.
+Following error: nominal less actual position, as defined by numerical controls (Heidenhain, iTNC 530 technical manual, 6.8:
+"servo lag"). Nominal is the drive's position, actual the slide's: without slips it is the extension of the spring, F / k_d, plus
+the difference of the zeros of both transducers.
 
-Quadrant error: the peak that friction leaves where an axis changes its sign, the "quadrant glitch" of circular tests (ISO 230-4
-has such tests, but not this number). Here: the largest following error after a change of sign, until the slide has moved for as
-long as it stood, less the mean from the end of that stick to the end of the stroke, which a constant correction takes away.
+Quadrant error: the peak caused by friction where an axis changes its sign, the "quadrant glitch" of circular tests (ISO 230-4
+has such tests, but not this number). Definition: the largest following error from a change of sign until the slide has moved for
+as long as it rested, less the mean from the end of that stick to the end of the stroke. A constant correction removes the mean.
 
-Dose: the integral of v_a^2 over time. It is energy-equivalent, as A(8) of ISO 5349-1 is for the acceleration of a hand, and says
-nothing of people: their weightings end at 1 kHz.
+Dose: the integral of v_a^2 over time. It is energy-equivalent, as A(8) of ISO 5349-1 is for the acceleration of a hand, but
+not a measure of human exposure: those weightings end at 1 kHz.
 """
 
 from collections.abc import Callable
@@ -18,28 +18,28 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Bools, Floats
 from bridge.log.watches.arrays import noise_of
 from bridge.wire import stickslip_pb2 as wire
-from cockpit.judge.window import Moved, Window
+from cockpit.judge.window import HasMoved, Window
 
-Floats = npt.NDArray[np.floating[Any]]
-Bools = npt.NDArray[np.bool_]
-
-_FOLLOWS = 0.5  # of the drive's way: a slide that makes more has ended its stick
-_AT_TURN_SIGMAS = 6.0  # of the drive's noise within which it is where it turned
-_CHANGE_S = 0.25  # before the turn at the end of a window: the controller sees it some 0.03 s earlier or later
-_SEEN_SIGMAS = 10.0  # of the noise of both ways: the way of the drive on which its slide is judged
+_FOLLOWS = 0.5  # share of the drive's travel: a slide with more has ended its stick
+_AT_TURN_SIGMAS = 6.0  # of the drive's noise: within it the drive is at its turning point
+_CHANGE_S = (
+    0.25  # margin before the turn at the end of a window: the controller reports it up to 0.03 s earlier or later
+)
+_SEEN_SIGMAS = 10.0  # of the noise of both positions: travel of the drive over which its slide is judged
 
 
 class Following(NamedTuple):
-    """How the slide follows the drive in a stretch of a run, while the drive moves. From means of a block."""
+    """How the slide follows the moving drive in a stretch of a run. From means of blocks."""
 
     moving_s: float
     error_rms_m: float
-    error_peak_m: float  # largest size
-    error_ripple_m: float  # rms about the mean of each direction: what no constant offset takes away
+    error_peak_m: float  # largest magnitude
+    error_ripple_m: float  # rms about the mean of each direction: a constant offset does not remove it
     reversals: int  # changes of sign of the drive's velocity
-    reversal_stick_s: float  # the longest time from one until the slide follows; 0 without reversals
+    reversal_stick_s: float  # longest time from a reversal until the slide follows; 0 without reversals
     quadrant_error_m: float  # the largest; 0 without reversals
 
 
@@ -47,33 +47,33 @@ class Reversal(NamedTuple):
     """One change of sign of the drive's velocity."""
 
     t_s: float
-    stick_s: float  # until the slide makes half of the drive's way; to the end of the stroke if it never does
-    quadrant_error_m: float  # 0 where the slide never follows
+    stick_s: float  # until the slide makes half of the drive's travel, at most to the end of the stroke
+    quadrant_error_m: float  # 0 if the slide never follows
 
 
-class Motion(NamedTuple):
+class BlockMotion(NamedTuple):
     """A stretch of a run block by block, [blocks] each, and its reversals."""
 
     t_s: Floats
-    error_m: Floats | None  # drive less slide; None where one of them has no position
-    direction: npt.NDArray[np.int64]  # of the drive, 0 where it stands
-    dose_m2_per_s: Floats  # v_a^2 times the block, 0 where the exciter rests
+    error_m: Floats | None  # drive less slide; None if a position is missing
+    direction: npt.NDArray[np.int64]  # of the drive, 0 at rest
+    dose_m2_per_s: Floats  # v_a^2 times the block duration, 0 while the exciter rests
     reversals: list[Reversal]
 
 
 class FollowingSum:
-    """How the slide follows the drive in a stretch of a run, gathered piece by piece."""
+    """How the slide follows the drive in a stretch of a run, summed piece by piece."""
 
     def __init__(self) -> None:
-        self.moving = 0  # blocks in which the drive moves, whether or not its slide has a position
+        self.moving = 0  # blocks with a moving drive, with or without a position of the slide
         self._blocks = 0
         self._squares_m2 = self._peak_m = self._dose_m2_per_s = 0.0
         self._ways = {-1: (0, 0.0, 0.0), 1: (0, 0.0, 0.0)}  # by direction: blocks, mean, squares about the mean
         self._reversals = 0
         self._stick_s = self._quadrant_m = 0.0
 
-    def add(self, motion: Motion, counts: Callable[[Floats], Bools]) -> None:
-        """The blocks and reversals whose times count."""
+    def add(self, motion: BlockMotion, counts: Callable[[Floats], Bools]) -> None:
+        """Add the blocks and reversals selected by `counts`."""
         counted = counts(motion.t_s)
         self._dose_m2_per_s += float(motion.dose_m2_per_s[counted].sum())
         self.moving += int(np.count_nonzero(counted & (motion.direction != 0)))
@@ -91,14 +91,14 @@ class FollowingSum:
             self._squares_m2 += float((error_m**2).sum())
             self._peak_m = max(self._peak_m, float(np.abs(error_m).max()))
         inside = counts(np.array([reversal.t_s for reversal in motion.reversals]))
-        for reversal, here in zip(motion.reversals, inside, strict=True):
-            if here:
+        for reversal, is_inside in zip(motion.reversals, inside, strict=True):
+            if is_inside:
                 self._reversals += 1
                 self._stick_s = max(self._stick_s, reversal.stick_s)
                 self._quadrant_m = max(self._quadrant_m, reversal.quadrant_error_m)
 
     def result(self, block_s: float) -> Following | None:
-        """All of it; None where no block moves, or a position is missing."""
+        """The sums; None without motion or without a position."""
         if not self._blocks:
             return None
         return Following(
@@ -118,51 +118,55 @@ class FollowingSum:
 
 
 class MotionOf:
-    """The motion of a run, window by window, from its positions and from what its controller saw of the drive."""
+    """Motion of a run, window by window, from its positions and the drive velocity of its controller."""
 
     def __init__(self) -> None:
-        self._moved = Moved()
+        self._moved = HasMoved()
         self._last: tuple[float, float, float, int] | None = (
-            None  # the last block of the windows before in which the drive moved
+            None  # last block with a moving drive in the windows before
         )
-        self._until_s = -np.inf  # to which changes of direction were judged
+        self._until_s = -np.inf  # changes of direction are judged up to this time
 
-    def __call__(self, window: Window, block_s: float) -> Motion:
-        """The rows of a window that are to be judged."""
+    def __call__(self, window: Window, block_s: float) -> BlockMotion:
+        """Motion in the judged rows of a window."""
         rows, trace, slide_m, drive_m = _paired(window)
         t_s = window.blocks.t_ns[rows] / 1e9
         moves = (trace["state"] != wire.STANDSTILL) & np.isfinite(trace["drive_velocity_mps"])
         direction = np.where(moves, np.sign(trace["drive_velocity_mps"]), 0.0).astype(np.int64)
-        own = (rows >= window.first) & (rows < window.end)
+        judged = (rows >= window.first) & (rows < window.end)
         v_a_mps = trace["vibration_velocity_mps"]
         shaken = _shaken(window, rows)
         dose = np.where(shaken & np.isfinite(v_a_mps), v_a_mps, 0.0) ** 2 * block_s
         slide_moved, drive_moved = self._moved("slide", slide_m), self._moved("drive", drive_m)
-        there = slide_moved and drive_moved and len(rows) > 0  # a transducer that is not there stands
-        found = self._reversals(window, t_s, slide_m, drive_m, direction) if there else []
-        error_m = (drive_m - slide_m)[own] if there else None
-        return Motion(t_s[own], error_m, direction[own], dose[own], found)
+        measured = slide_moved and drive_moved and len(rows) > 0  # a missing transducer never moves
+        reversals = self._reversals(window, t_s, slide_m, drive_m, direction) if measured else []
+        error_m = (drive_m - slide_m)[judged] if measured else None
+        return BlockMotion(t_s[judged], error_m, direction[judged], dose[judged], reversals)
 
     def _reversals(
         self, window: Window, t_s: Floats, slide_m: Floats, drive_m: Floats, direction: npt.NDArray[np.int64]
     ) -> list[Reversal]:
-        """The changes of direction of a window; the one at its end belongs to the next, which sees the stroke after it."""
+        """Changes of direction in a window. A change at its end belongs to the next window, with the stroke after it."""
         until_s = np.inf if window.is_last else window.own_ns[1] * 1e-9 - _CHANGE_S
         columns: Any = t_s, slide_m, drive_m, direction
-        if self._last is not None and self._last[0] < t_s[0]:  # the drive may have stood since
-            columns = tuple(np.concatenate([[one], column]) for one, column in zip(self._last, columns, strict=True))
-        changed_s, found = _changes(*columns)
-        mine = [one for at_s, one in zip(changed_s, found, strict=True) if self._until_s <= at_s < until_s]
+        if self._last is not None and self._last[0] < t_s[0]:  # the drive may have rested since
+            columns = tuple(
+                np.concatenate([[value], column]) for value, column in zip(self._last, columns, strict=True)
+            )
+        changed_s, reversals = _changes(*columns)
+        judged = [
+            reversal for at_s, reversal in zip(changed_s, reversals, strict=True) if self._until_s <= at_s < until_s
+        ]
         self._until_s = until_s
         moving = np.flatnonzero((direction != 0) & (t_s < until_s))
         if len(moving):
             last = moving[-1]
             self._last = float(t_s[last]), float(slide_m[last]), float(drive_m[last]), int(direction[last])
-        return mine
+        return judged
 
 
 def _paired(window: Window) -> tuple[npt.NDArray[np.int64], Any, Floats, Floats]:
-    """Rows of the blocks of a window that have both places and a step of the controller, these steps, and the places."""
+    """Rows of the blocks with both positions and a step of the controller; these steps; the positions."""
     blocks, trace = window.blocks, window.trace
     rows = np.arange(len(blocks.sequence))
     if len(rows) != len(trace) or not np.array_equal(blocks.sequence, trace["block"]):
@@ -176,7 +180,7 @@ def _paired(window: Window) -> tuple[npt.NDArray[np.int64], Any, Floats, Floats]
 
 
 def _shaken(window: Window, rows: npt.NDArray[np.int64]) -> Bools:
-    """Blocks in which the exciter moved."""
+    """Blocks with a moving exciter."""
     numbers, applied = window.blocks.sequence[rows], window.applied
     if np.array_equal(numbers, applied["sequence"]):
         return applied["amplitude_m"] > 0.0
@@ -184,11 +188,11 @@ def _shaken(window: Window, rows: npt.NDArray[np.int64]) -> Bools:
 
 
 def reversals_of(t_s: Floats, slide_m: Floats, drive_m: Floats, direction: npt.NDArray[np.int64]) -> list[Reversal]:
-    """The changes of sign of the drive's velocity, stops between both signs left out.
+    """Changes of sign of the drive's velocity; stops between both signs are ignored.
 
     Args:
-        t_s, slide_m, drive_m: time and places, [blocks].
-        direction: of the drive, 0 where it stands; it may be late.
+        t_s, slide_m, drive_m: time and positions, [blocks].
+        direction: of the drive, 0 at rest; it may be late.
 
     """
     return _changes(t_s, slide_m, drive_m, direction)[1]
@@ -197,32 +201,32 @@ def reversals_of(t_s: Floats, slide_m: Floats, drive_m: Floats, direction: npt.N
 def _changes(
     t_s: Floats, slide_m: Floats, drive_m: Floats, direction: npt.NDArray[np.int64]
 ) -> tuple[list[float], list[Reversal]]:
-    """The reversals, and when the direction was seen to change for each."""
+    """The reversals, and the time at which the controller reported each."""
     moving = np.flatnonzero(direction)
     at = np.flatnonzero(np.diff(direction[moving])) + 1
     if not len(at):
         return [], []
-    changes, lasts = moving[at], moving[at - 1]  # the first block with another sign, and the last with the one before
+    changes, lasts = moving[at], moving[at - 1]  # first block with the new sign, last block with the old sign
     seen_m = _SEEN_SIGMAS * np.hypot(noise_of(slide_m), noise_of(drive_m))
     at_turn_m = _AT_TURN_SIGMAS * noise_of(drive_m)
     begins = [0]
-    for change in changes:  # from the sign to the place at which the drive turned, which was before
+    for change in changes:  # from the reported sign back to the turning point
         place_m = direction[change] * drive_m[begins[-1] : change + 1]
         begins.append(begins[-1] + int(np.flatnonzero(place_m <= place_m.min() + at_turn_m)[-1]))
     ends = [*np.minimum(begins[2:], lasts[1:] + 1), moving[-1] + 1]
-    found = [
+    changed = [
         (float(t_s[change]), _reversal(t_s[begin:end], way * slide_m[begin:end], way * drive_m[begin:end], seen_m))
         for change, begin, end, way in zip(changes, begins[1:], ends, direction[changes], strict=True)
         if end - begin > 1
     ]
-    return [at_s for at_s, _ in found], [reversal for _, reversal in found]
+    return [at_s for at_s, _ in changed], [reversal for _, reversal in changed]
 
 
 def _reversal(t_s: Floats, slide_m: Floats, drive_m: Floats, seen_m: float) -> Reversal:
-    """Of a stroke that begins with its change of sign, both places along the drive."""
+    """Reversal at the begin of a stroke; both positions along the drive's direction."""
     back = (
         np.searchsorted(np.maximum.accumulate(drive_m), drive_m - seen_m, side="right") - 1
-    )  # where it was `seen_m` ago
+    )  # position `seen_m` earlier
     back = np.minimum(back, np.arange(len(back)) - 1)
     now = np.flatnonzero(back >= 0)
     way_m = drive_m[now] - drive_m[back[now]]

@@ -1,7 +1,7 @@
-"""What is left of the amplitude loop's margins with the delay of the run, and of the exciter's stroke, from the log alone.
+"""Remaining margins of the amplitude loop at the delay of the run, and use of the exciter's stroke, from the log alone.
 
-The loop works in the logarithm of v_a: what the exciter delivers of its command is an offset there, which is learnt, so a weak
-exciter costs stroke and no stability. The margins are those for a delay that is a block longer than the learnt one.
+The loop works in the logarithm of v_a: the ratio of delivered to commanded vibration is an offset there, which is learned, so a
+weak exciter costs stroke but no stability. The margins are for a delay one block longer than the learned delay.
 """
 
 from pathlib import Path
@@ -25,11 +25,11 @@ class Margins(NamedTuple):
 
     phase_margin_deg: float
     gain_margin: float
-    loop_delay_s: float  # learnt; 0 where nothing vibrated
-    delivered_min: float  # share of the commanded v_a, 5 % of the time below
-    delivered_max: float
-    amplitude_m: float  # the largest commanded
-    amplitude_max_m: float  # what limits it
+    loop_delay_s: float  # learned; 0 without vibration
+    delivered_min: float  # 5 % quantile of delivered over commanded v_a
+    delivered_max: float  # 95 % quantile
+    amplitude_m: float  # largest command
+    amplitude_max_m: float  # its limit
 
     def as_dict(self) -> dict[str, Any]:
         """For `--json`."""
@@ -37,14 +37,14 @@ class Margins(NamedTuple):
 
 
 class MarginSum:
-    """What the exciter delivered of its commands, and how far they went, window by window."""
+    """Delivered share of the commands, and the largest command, window by window."""
 
     def __init__(self) -> None:
         self._share = Histogram()
         self._amplitude_m = 0.0
 
     def add(self, window: Window) -> None:
-        """The commands of a window that are to be judged."""
+        """Add the judged commands of a window."""
         command = window.command[window.own(window.command)]
         self._amplitude_m = max(self._amplitude_m, float(command["amplitude_m"].max(initial=0.0)))
         _, at_trace, at_command = np.intersect1d(window.trace["block"], command["block"], return_indices=True)
@@ -74,10 +74,10 @@ class MarginSum:
 
 
 def margins_in_words(margins: Margins) -> list[str]:
-    """As lines for the operator."""
+    """Lines for the operator."""
     m = margins
     lines = [
-        f"loop     {m.loop_delay_s * 1e3:.3g} ms late, as learnt; a block later still: phase margin {m.phase_margin_deg:.0f} "
+        f"loop     {m.loop_delay_s * 1e3:.3g} ms delay, learned; at one block more: phase margin {m.phase_margin_deg:.0f} "
         f"degrees, gain margin {m.gain_margin:.1f}"
     ]
     if m.amplitude_m > 0.0:

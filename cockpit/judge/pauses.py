@@ -1,4 +1,4 @@
-"""Stalls of the computer in a run, and which commands were late because of them."""
+"""Stalls of the computer in a run, and the commands that they delayed."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -13,45 +13,45 @@ from cockpit.judge.watches import LatencyWatch
 from cockpit.judge.window import Window
 
 Times = npt.NDArray[np.floating[Any]] | npt.NDArray[np.int64]
-# Lateness of a process from which it stalled. Smaller: the scheduling of every busy desktop, 1 to 3 ms, counts; larger: stalls
-# are missed in which the rig falls back. A stall of up to 16 ms loses nothing.
+# Lateness above which a process counts as stalled. Smaller: the scheduling jitter of a busy desktop, 1 to 3 ms, counts. Larger:
+# stalls are missed in which the rig falls back. A stall of up to 16 ms loses nothing.
 _STALL_NS = 5_000_000
-_MOST_OF_A_ROW = 1 << 16  # late commands of one block that are counted: more are damaged bytes
+_MOST_OF_A_ROW = 1 << 16  # limit of the late commands per block: more are damaged bytes
 
 
 class Pauses(NamedTuple):
-    """Stalls of every core at the same time, as the recorder saw them, and the commands that were late in them."""
+    """Simultaneous stalls of all cores, seen by the recorder, and the commands late because of them."""
 
     number: int
     total_ms: float
     longest_ms: float
-    late_inside: int  # commands later than 1 ms while a stall was between their block and the plant
+    late_inside: int  # commands later than 1 ms with a stall between their block and the plant
     late_outside: int  # all other late ones
-    late_one_core: int  # those of `late_outside` while one core stalled alone, not because of the loop's priority
-    within_1_ms_outside: float  # share of the commands that no stall held up
+    late_one_core: int  # part of `late_outside` while one core alone stalled, not because of the loop's priority
+    within_1_ms_outside: float  # share of the commands without a stall
 
 
 class Computer(NamedTuple):
-    """Stalls that the recorder saw, and lateness of plant and controller."""
+    """Stalls seen by the recorder, and lateness of plant and controller."""
 
     stalls: int
     longest_ms: float
-    whose: str  # plant, controller, or every core; empty where nothing was late
-    at_s: float  # begin of the longest
+    whose: str  # plant, controller, or every core; empty if nothing was late
+    at_s: float  # begin of the longest stall
 
 
 class CommandSum:
-    """The late commands that a stall held up, window by window, from the plant's row of each block.
+    """Commands delayed by a stall, window by window, from the plant's row of each block.
 
-    A row has the number of commands before its block, the number of late ones, and the block that the newest command answers.
+    A row has the number of commands before its block, the number of late ones, and the block answered by the newest command.
     """
 
     def __init__(self) -> None:
-        self._newest: int | None = None  # block that the newest command so far answers
+        self._newest: int | None = None  # block answered by the newest command so far
         self._inside = self._one_core = 0
 
     def add(self, window: Window, block_ns: float, pauses: Sequence[RunPause], one_core: Sequence[RunPause]) -> None:
-        """Take the rows of a window that are to be judged, with the known stalls."""
+        """Add the judged rows of a window, with the known stalls."""
         applied = window.applied[window.own(window.applied)]
         if not len(applied):
             return
@@ -83,9 +83,9 @@ class CommandSum:
 
 
 def _held_up(due_ns: Times, came_ns: Times, pauses: Sequence[RunPause]) -> npt.NDArray[np.bool_]:
-    """Commands that stalls held up for at least half of their delay, [commands].
+    """Commands for which stalls cause at least half of the delay, [commands].
 
-    Half, as the work that a stall leaves behind takes time as well. A stall is reported up to one timer period too short.
+    Half, because the backlog after a stall takes time as well. A stall is reported up to one timer period too short.
     """
     if not pauses or not len(due_ns):
         return np.zeros(len(due_ns), bool)
@@ -103,19 +103,19 @@ class StallSum:
 
     def __init__(self) -> None:
         self._stalls = 0
-        self._until_ns = np.iinfo(np.int64).min  # end of the latest
+        self._until_ns = np.iinfo(np.int64).min  # end of the latest stall
         self._longest = (0, 0, "")  # length [ns], begin [ns], whose
 
     def add(self, window: Window, pauses: Sequence[RunPause]) -> None:
-        """Take the stalls of a window that are to be judged."""
+        """Add the judged stalls of a window."""
         from_ns, until_ns = window.own_ns
         seen = [("every core", *pause) for pause in pauses if from_ns <= pause.from_ns < until_ns]
         for whose, rows, name in (("plant", window.applied, "late_ns"), ("controller", window.trace, "lateness_ns")):
-            own = rows[window.own(rows)]
-            if len(own):
-                late = own[name] > _STALL_NS
-                late[own[name].argmax()] = True
-                seen += [(whose, t_ns, t_ns + late_ns) for t_ns, late_ns in own[["t_ns", name]][late].tolist()]
+            judged = rows[window.own(rows)]
+            if len(judged):
+                late = judged[name] > _STALL_NS
+                late[judged[name].argmax()] = True
+                seen += [(whose, t_ns, t_ns + late_ns) for t_ns, late_ns in judged[["t_ns", name]][late].tolist()]
         for whose, begin_ns, end_ns in sorted(seen, key=lambda stall: stall[1]):
             if end_ns - begin_ns > self._longest[0]:
                 self._longest = end_ns - begin_ns, begin_ns, whose
@@ -130,7 +130,7 @@ class StallSum:
 
 
 def computer_in_words(computer: Computer | None, not_watched: str) -> str:
-    """One line: how often the computer stalled, for how long at most, and who was held up."""
+    """One line: number of stalls of the computer, the longest, and the stalled process."""
     if computer is None:
         return "computer simulated time: no stall of the computer can change the run"
     longest = f"{computer.longest_ms:.1f} ms ({computer.whose}, at {computer.at_s:.2f} s)"
@@ -142,7 +142,7 @@ def computer_in_words(computer: Computer | None, not_watched: str) -> str:
 
 
 def pauses_in_words(pauses: Pauses | None) -> list[str]:
-    """The stalls that the recorder watched, as a line; none of a run in simulated time, or where they were not watched."""
+    """Stalls seen by the recorder, as a line; empty in simulated time, or if they were not watched."""
     if pauses is None:
         return []
     late = counted(pauses.late_outside, "command")

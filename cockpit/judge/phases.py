@@ -1,19 +1,18 @@
-"""The stretches of a run: before the controller, while it takes over, after, and without anybody in charge."""
+"""Stretches of a run: before the controller, hand-over, after, and without a controller in charge."""
 
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from cockpit.judge.machine_terms import Following, FollowingSum, Motion
+from bridge.arrays import Floats
+from cockpit.judge.machine_terms import BlockMotion, Following, FollowingSum
 from cockpit.judge.slips import Forces
 from cockpit.judge.strokes import Swing
 
-Floats = npt.NDArray[np.floating[Any]]
 Stretches = list[tuple[float, float]]
 
-# The first ramp of a run starts from an unloaded spring, which is no swing of what follows: so much of a phase, or half.
+# Begin of a phase, half of it at most, without its swing: the first ramp of a run starts from an unloaded spring.
 _RAMP_S = 4.0
 
 
@@ -26,11 +25,9 @@ class Phase(NamedTuple):
     swing_N: (
         float  # of the drive force, largest to smallest block mean in the steady part of a stroke; median of strokes
     )
-    strokes: (
-        int  # of which that is the median; 0 where the drive moves evenly in none, and the swing is that of all blocks
-    )
+    strokes: int  # number of these strokes; 0 without even motion: then the swing is over all blocks
     mean_force_N: float
-    following: Following | None  # None where no drive moved, or a position was not measured
+    following: Following | None  # None without motion of the drive or without a measured position
     vibration_dose_mm2_per_s: float  # integral of v_a^2
 
     def as_dict(self) -> dict[str, Any]:
@@ -39,7 +36,7 @@ class Phase(NamedTuple):
 
 
 class PhaseSum:
-    """A stretch of a run, gathered window by window. Its end is infinite while it is not known.
+    """A stretch of a run, summed window by window. Its end is infinite while unknown.
 
     Args:
         from_s, to_s: begin and end.
@@ -48,8 +45,8 @@ class PhaseSum:
 
     def __init__(self, from_s: float, to_s: float) -> None:
         self.from_s, self.to_s = from_s, to_s
-        self.missing = 0  # blocks that are not in the log, or hold no force
-        self.unsure = 0  # slips in which blocks are missing
+        self.missing = 0  # blocks missing in the log, or without a force
+        self.unsure = 0  # slips with missing blocks
         self.slips = 0
         self._blocks = 0
         self._whole, self._steady = Swing(), Swing()
@@ -60,8 +57,8 @@ class PhaseSum:
         """Blocks in which the drive moved."""
         return self._following.moving
 
-    def add(self, forces: Forces, motion: Motion | None, without: Stretches) -> None:
-        """The part of a window that is in the stretch, but for what lies in the stretches `without`."""
+    def add(self, forces: Forces, motion: BlockMotion | None, without: Stretches) -> None:
+        """Add the part of a window inside the stretch and outside of the stretches `without`."""
 
         def counts(at_s: Floats) -> Any:
             return (at_s > self.from_s) & (at_s <= self.to_s) & ~within(at_s, without)
@@ -81,7 +78,7 @@ class PhaseSum:
             self._following.add(motion, counts)
 
     def result(self, block_s: float) -> Phase | None:
-        """What happened; None without a block."""
+        """The sums; None without a block."""
         if not self._blocks:
             return None
         seconds = self._blocks * block_s
@@ -100,38 +97,38 @@ class PhaseSum:
 
 
 def within(at_s: Floats, stretches: Iterable[tuple[float, float]]) -> Any:
-    """Whether times lie in any of the stretches."""
-    found = np.zeros(len(at_s), bool)
+    """True for times inside any of the stretches."""
+    inside = np.zeros(len(at_s), bool)
     if not len(at_s):
-        return found
+        return inside
     low_s, high_s = float(at_s.min()), float(at_s.max())
     for first_s, last_s in stretches:
         if first_s < high_s and last_s >= low_s:
-            found |= (at_s > first_s) & (at_s <= last_s)
-    return found
+            inside |= (at_s > first_s) & (at_s <= last_s)
+    return inside
 
 
 def together(phases: Iterable[Phase | None]) -> Phase | None:
-    """Several stretches as one; how the slide followed, in the longest. None without any."""
-    there = [phase for phase in phases if phase is not None]
-    if not there:
+    """Several stretches merged into one, with the following of the longest. None without any."""
+    given = [phase for phase in phases if phase is not None]
+    if not given:
         return None
-    seconds, slips = sum(phase.seconds for phase in there), sum(phase.slips for phase in there)
-    widest = max(there, key=lambda phase: phase.swing_N)
+    seconds, slips = sum(phase.seconds for phase in given), sum(phase.slips for phase in given)
+    widest = max(given, key=lambda phase: phase.swing_N)
     return Phase(
         seconds=seconds,
         slips=slips,
         slips_per_min=60.0 * slips / seconds,
         swing_N=widest.swing_N,
         strokes=widest.strokes,
-        mean_force_N=sum(phase.mean_force_N * phase.seconds for phase in there) / seconds,
-        following=max(there, key=lambda phase: phase.seconds).following,
-        vibration_dose_mm2_per_s=sum(phase.vibration_dose_mm2_per_s for phase in there),
+        mean_force_N=sum(phase.mean_force_N * phase.seconds for phase in given) / seconds,
+        following=max(given, key=lambda phase: phase.seconds).following,
+        vibration_dose_mm2_per_s=sum(phase.vibration_dose_mm2_per_s for phase in given),
     )
 
 
 def apart(whole: tuple[float, float], without: Stretches) -> Stretches:
-    """The parts of a stretch that lie in none of others, which may overlap."""
+    """Parts of a stretch outside of all others, which may overlap."""
     at_s, end_s = whole
     parts: Stretches = []
     for from_s, until_s in sorted(without):

@@ -1,17 +1,17 @@
 """v_a over v_d while the rig vibrates, judged at both ends.
 
-Below 1.05 stick-slip may return; far above the set point exciter, mount and workpiece vibrate without use, or v_a is measured
-wrongly. The set point is that of the configuration, or a higher one to which the controller raised it after slips.
-Judged are steps in EXCITE with a drive that moves evenly, after the ramp. Left out are stalls of the computer and the second
-after each: v_a is then as old as the last block before the stall.
+Below 1.05 stick-slip may return. Far above the set point the vibration wears exciter, mount and workpiece without benefit, or v_a
+is measured wrongly. The set point is the configured one, or a higher one if the controller raised it after slips.
+Judged are steps in EXCITE with an evenly moving drive, after the ramp, except stalls of the computer and the second after each:
+during a stall v_a is as old as the last block before it.
 """
 
 import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Bools, Floats
 from bridge.log.in_charge import NO_COMMAND
 from bridge.log.watches.arrays import Longest
 from bridge.wire import stickslip_pb2 as wire
@@ -20,39 +20,36 @@ from cockpit.judge.watches import STANDSTILL_MPS
 from cockpit.judge.window import Rows, Window
 from controller.codes import GAP, LATE, STALE
 
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
-
 ALARM_RATIO = 1.05
-# v_a / v_d in set points above which it is too large, and for how long without a break: in a sound run a rising set point or a
-# resonance of the mount exceeds it again and again for the 10 to 60 ms that the loop needs. Shipped scenarios: 0.02 s at most.
-# Smaller ratio: a drive that slows down by more than a third fails; shorter: the loop's own delay counts; larger: 3.18 passes.
+# Limit of v_a / v_d in set points, and of the time above it without a break. In a sound run a rising set point or a resonance of
+# the mount exceeds it repeatedly for the 10 to 60 ms of the loop's response. Shipped scenarios: 0.02 s at most.
+# Smaller ratio: a drive that slows down by more than a third fails. Shorter: the delay of the loop counts. Larger: 3.18 passes.
 _MOST_SET_POINTS = 1.5
 MOST_ABOVE_S = 0.2
-_RAMP_S = 0.15  # 40 ms of ramp at the default slew, and the measurement's filter behind it
-_STEADY_S, _STEADY_SHARE = 0.1, 0.1  # a drive that changed by less in this time moves evenly
+_RAMP_S = 0.15  # 40 ms of ramp at the default slew, plus the filter of the measurement
+_STEADY_S, _STEADY_SHARE = 0.1, 0.1  # a smaller change of the drive velocity in this time counts as even motion
 _RAMPED_DOWN = (wire.STALE_INPUT, wire.NOT_FINITE, wire.OPERATOR_STOP)
-_LATE_BLOCKS = 2.0  # that a block leaves late, from which the computer stalled
+_LATE_BLOCKS = 2.0  # delay of a block that counts as a stall of the computer
 
 
 class RatioVerdict(NamedTuple):
-    """v_a over v_d in a run; 0 where nothing was judged."""
+    """v_a over v_d in a run; 0 if nothing was judged."""
 
     lowest: float
     highest: float
     judged_s: float
     below_s: float  # under 1.05, a warning: without slips the run is ok
-    above_s: float  # over 1.5 set points, in all
-    longest_above_s: float  # the same, in one stretch
+    above_s: float  # over 1.5 set points, total
+    longest_above_s: float  # the longest such stretch
     left_out_s: float  # vibration in stalls and the second after them
 
     @property
     def ok(self) -> bool:
-        """Whether v_a / v_d was never above 1.5 set points for more than 0.2 s."""
+        """True if v_a / v_d never exceeded 1.5 set points for more than 0.2 s."""
         return self.longest_above_s <= MOST_ABOVE_S
 
     def in_words(self) -> str:
-        """A line; empty where nothing was judged."""
+        """A line; empty if nothing was judged."""
         if not self.judged_s:
             return ""
         wrong: list[str] = []
@@ -76,12 +73,12 @@ class RatioWatch:
         self._judged = self._below = self._all_above = self._left_out = 0
 
     def add(self, window: Window) -> None:
-        """Take the steps of a window; the rows before it show a ramp or a stall that began earlier."""
+        """Add the steps of a window; the rows before it show earlier ramps and stalls."""
         trace = window.trace
         t_s, speed_mps = trace["t_ns"] * 1e-9, np.abs(trace["drive_velocity_mps"])
-        own = window.own(trace)
+        judged = window.own(trace)
         excited = (trace["mode"] == wire.EXCITE) & ~np.isin(trace["limit"], _RAMPED_DOWN)
-        counts = own & excited & (_since_begin(excited) * self._block_s > _RAMP_S) & self._steady(speed_mps)
+        counts = judged & excited & (_since_begin(excited) * self._block_s > _RAMP_S) & self._steady(speed_mps)
         counts &= (t_s > self._setup.settled_from_s) & np.isfinite(trace["vibration_velocity_mps"])
         after = self._after_stall(t_s, trace, window.applied)
         self._left_out += int(np.count_nonzero(counts & after))
@@ -94,7 +91,7 @@ class RatioWatch:
         set_point = np.maximum(
             trace["velocity_ratio"], self._setup.v_ratio
         )  # older logs have no set point in the trace
-        above = (counts & (ratio > _MOST_SET_POINTS * set_point))[own]
+        above = (counts & (ratio > _MOST_SET_POINTS * set_point))[judged]
         self._all_above += int(np.count_nonzero(above))
         self._above.add(above)
 
@@ -106,8 +103,8 @@ class RatioWatch:
         return steady
 
     def _after_stall(self, t_s: Floats, trace: Rows, applied: Rows) -> Bools:
-        """Steps in a stall of either side, or within a second after it."""
-        # a fallback before the first command is no stall
+        """Steps in a stall of either side, or in the second after it."""
+        # a fallback before the first command does not count as a stall
         answers = applied["command_block"] != np.uint64(NO_COMMAND)
         stalls = ((applied["fallback"] != 0) & answers) | (applied["late_ns"] > _LATE_BLOCKS * self._block_s * 1e9)
         stalled_s = t_s[(trace["events"] & (GAP | STALE | LATE)) != 0]
@@ -116,13 +113,13 @@ class RatioWatch:
         return np.asarray(t_s - at_s[last] <= SETTLING_S)
 
     def result(self) -> RatioVerdict:
-        """The figures, at the end of the log."""
+        """Figures at the end of the log."""
         steps = self._judged, self._below, self._all_above, self._above.longest, self._left_out
         lowest = self._lowest if self._judged else 0.0
         return RatioVerdict(lowest, self._highest, *(count * self._block_s for count in steps))
 
 
 def _since_begin(excited: Bools) -> Floats:
-    """Steps since the vibration began, at each step; a vibration in the first row began before."""
+    """Steps since the begin of the vibration; a vibration in the first row began earlier."""
     index = np.arange(len(excited), dtype=np.float64)
     return index - np.maximum.accumulate(np.where(excited, -math.inf, index)) - 1.0

@@ -1,54 +1,52 @@
 """Relations between the sensors of an axis, second by second: force and spring, and vibration of base, slide and controller.
 
-A channel that is swapped with another channel, of the wrong sign or scale, or not connected breaks a relation. A relation is
-compared in each second in which its signals exceed their noise; one second in which it is broken is a doubt.
+A channel that is swapped, of the wrong sign or scale, or not connected breaks a relation. A relation is compared in each second
+in which its signals exceed their noise; a single broken second is a doubt.
 """
 
 import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Bools, Floats
 from bridge.log.watches.arrays import noise_of
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.judge.described import Described
 from cockpit.judge.window import Rows, Window, means
 
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
-
-# Force and spring are compared about their means in this many parts of a second, without drift, zeros and scales of both
-# positions. One part: positions whose scales differ by 0.2 % are doubted at 1 mm/s; more: fewer seconds exceed the noise.
+# Force and spring are compared about their means in this many parts of a second, which removes drift, zeros and scales of both
+# positions. One part: positions whose scales differ by 0.2 % are doubted at 1 mm/s. More: fewer seconds exceed the noise.
 _PARTS = 4
-# Power of force or extension over the power of both noises, from which a second is compared. Smaller: noise makes more of the
-# difference, 4 % of the power at 25; larger: less of a run is compared.
+# Power of force or extension over the power of both noises above which a second is compared. Smaller: a larger part of the
+# difference is noise, 4 % of the power at 25. Larger: less of a run is compared.
 _EXCITED = 25.0
-# Least vibration that is compared, over the noise of the accelerometer. Smaller: noise counts; larger: no slow feed is compared.
+# Least compared vibration, over the noise of the accelerometer. Smaller: noise counts. Larger: no slow feed is compared.
 _SEEN = 100.0
-# Share of a second in which the rig vibrates, from which it is compared. Larger: a drive that inches is never compared; smaller:
-# ramps of the vibration fill most of a second, at 0.05 in `mount-stops` of the bank; at 0.25 they fill a twelfth at most.
+# Share of vibration in a second above which it is compared. Larger: an inching drive is never compared. Smaller: ramps of the
+# vibration fill most of a second, at 0.05 in `mount-stops` of the bank; at 0.25 they fill a twelfth at most.
 _COMPARED = 0.25
-# Factor between v_a in the log and in the controller, either way. Smaller: 1.05 doubts none of 19 sound logs, but counts other
-# vibration of a real base, which the controller filters out; larger: with 1.5 five of nine that are clipped in the log pass.
+# Allowed factor between v_a in the log and in the controller, either way. Smaller: 1.05 doubts none of 19 sound logs, but counts
+# other vibration of a real base, which the controller filters out. Larger: with 1.5 five of nine logs with clipping pass.
 _SAME_V_A = 1.25
 # rms of the slide over rms of the base under vibration: 0.5 at most in the bank, except in slips. Smaller: a stiff contact
-# counts; larger: swapped accelerometers pass.
+# counts. Larger: swapped accelerometers pass.
 _LOUDER = 1.3
-# Noises of the slide's accelerometer: below the first it shows only noise, above the second friction must show. In the bank it
-# shows 0.16 of the expected or more. Second smaller: the long slip of `drill-string`, 11, counts; larger: less is compared.
+# In noises of the slide's accelerometer: below the first it shows only noise, above the second friction must be visible. In the
+# bank it shows at least 0.16 of the expectation. Second smaller: the long slip of `drill-string`, 11, counts. Larger: less is
+# compared.
 _QUIET, _SHAKEN = 2.0, 20.0
 
 
 class Doubt(NamedTuple):
-    """A channel that is wrong by itself, or a relation that is broken."""
+    """A faulty channel, or a broken relation."""
 
     code: str
     text: str
-    decides: bool  # the verdict rests on the channel
+    decides: bool  # the verdict depends on the channel
 
 
-class Relations:
+class ChannelRelations:
     """All relations of a run, window by window."""
 
     def __init__(self, of: Described, block_s: float) -> None:
@@ -57,10 +55,10 @@ class Relations:
         steps_N = [position_N, position_N, of.channels["drive_force_N"].step]
         self._steps_N2 = float(np.nansum(np.square(steps_N))) / 12.0  # noise of the resolutions of positions and force
         self.vibrated = False
-        self._found: dict[str, tuple[str, int]] = {}  # by code: the text of the first second, and how many there are
+        self._found: dict[str, tuple[str, int]] = {}  # by code: text of the first broken second, and their number
 
     def add(self, window: Window) -> None:
-        """Take a window, cut into seconds backwards from its end; its first second may begin in the window before."""
+        """Add a window, cut into seconds backwards from its end; its first second may begin in the window before."""
         count, blocks, of = self._count, window.blocks, self._of
         if window.end < count:
             return
@@ -106,12 +104,12 @@ class Relations:
         text += "base_accel_mps2 not connected?"
         most("SENSOR_SWAPPED", vibrates, slide_mps2 <= _LOUDER * base_mps2, text, slide_mps2, base_mps2)
         per_omega_s = np.divide(1.0, omega, out=np.zeros(at.shape), where=vibrates)
-        # through a contact that sticks, at most the friction of one that slides
+        # transmitted by a sticking contact, limited by the sliding friction
         shaken_mps2 = np.minimum(self._of.contact_per_s2 * base_mps2 * per_omega_s**2, force_N / self._of.mass_kg)
         shakes = vibrates & (shaken_mps2 > _SHAKEN * noise_mps2)
         text = "mass_accel_mps2 shows {:.3g} m/s2, its noise, where friction shakes the slide by {:.3g} m/s2: is it connected?"
         most("SENSOR_DEAD", shakes, slide_mps2 >= _QUIET * noise_mps2, text, slide_mps2, shaken_mps2)
-        # the controller does not follow the vibration of a loop check
+        # the controller does not measure v_a during a loop check
         trace = _rows_at(window.trace, "block", window.blocks.sequence[at])
         v_a_mps = trace["vibration_velocity_mps"]
         both = vibrates & (v_a_mps > 0.0) & (trace["mode"] == wire.EXCITE)
@@ -130,7 +128,7 @@ class Relations:
             self._found[code] = first, seconds + 1
 
     def doubts(self) -> list[Doubt]:
-        """Relations that are broken."""
+        """Broken relations."""
         return [Doubt(code, f"{text} ({seconds} s in all)", True) for code, (text, seconds) in self._found.items()]
 
 

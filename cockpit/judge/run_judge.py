@@ -1,6 +1,6 @@
-"""The judge of a run: messages in, piece by piece, in the order of the log; at the end the verdict.
+"""Judge of a run: takes messages piece by piece in the order of the log, and returns the verdict at the end.
 
-It is a composition of watches, each with a method for every topic that it reads, and of sums over windows. A watch of messages
+It is composed of watches, each with a method for every topic that it reads, and of sums over windows. A watch of messages
 goes into `_watches`, a sum over blocks and steps into `_judge_window`.
 """
 
@@ -17,11 +17,11 @@ from bridge.log.check.log_check import LogWatch
 from bridge.log.damage import Damage, damage_findings, foreign_in_words
 from bridge.log.in_charge import GONE_S, InCharge
 from bridge.log.metadata import Metadata, configuration_of
-from bridge.log.storage.chain import Chain, chain_findings
+from bridge.log.storage.chain import HashChain, chain_findings
 from bridge.units import counted
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.event_codes import WEAK_REASONS, harms, is_told
+from bridge.wire.event_codes import WEAK_REASONS, harms, is_listed
 from bridge.wire.messages import CHANNELS, Records
 from cockpit.judge.described import described
 from cockpit.judge.machine_terms import MotionOf
@@ -34,18 +34,18 @@ from cockpit.judge.slips import bins_of, forces_of
 from cockpit.judge.tested import too_little, untested
 from cockpit.judge.verdict import MISSING_SHARE, RunVerdict
 from cockpit.judge.watches import FrozenWatch, LatencyWatch, StepWatch
-from cockpit.judge.window import Moved, Waiting, reduced
+from cockpit.judge.window import HasMoved, WaitingRows, reduced
 from diagnosis.features.cycles import Cycles
 
 if TYPE_CHECKING:
     from cockpit.judge.margins import Margins, MarginSum
 
-_COUNTED_ELSEWHERE = {"NOT_FINITE", "DRIVE_UNSEEN", *WEAK_REASONS}  # from the blocks and steps themselves
+_COUNTED_ELSEWHERE = {"NOT_FINITE", "DRIVE_UNSEEN", *WEAK_REASONS}  # counted from blocks and steps
 _LETTER = re.compile(
     r"(^|: )[FCSM]: "
-)  # of NAMUR NE 107, before the help of a cause: the line is a trip or a warning already
+)  # of NAMUR NE 107, before the help of a cause; redundant in a line marked as trip or warning
 _OF_EVERY_BLOCK = ("applied", "command", "trace")
-_CONTROLLED = tuple(name for name in CHANNELS if name != "mass_accel_mps2")  # channels that the controller works with
+_CONTROLLED = tuple(name for name in CHANNELS if name != "mass_accel_mps2")  # channels used by the controller
 
 
 class RunJudge:
@@ -53,9 +53,9 @@ class RunJudge:
 
     Args:
         path: of its log.
-        headers: the tables of the log, which may be filled while it is read.
-        margins: of the amplitude loop are wanted.
-        stretch_from_s: begin of a further stretch, up to the end, whoever is in charge.
+        headers: tables of the log, possibly filled during reading.
+        margins: with the margins of the amplitude loop.
+        stretch_from_s: begin of a further stretch to the end, with or without a controller.
 
     """
 
@@ -67,39 +67,39 @@ class RunJudge:
         stretch_from_s: float | None = None,
     ) -> None:
         self.log = LogWatch()
-        self.cycles: Cycles | None = None  # all slips, once `result` was called; None without a force
-        self.stretch: Phase | None = None  # the one that was wanted, once `result` was called
+        self.cycles: Cycles | None = None  # all slips, after `result`; None without a force
+        self.stretch: Phase | None = None  # the stretch from `stretch_from_s`, after `result`
         self._stretch_from_s = stretch_from_s
         self._path, self._headers = path, headers
-        self._waiting = Waiting()
+        self._waiting = WaitingRows()
         self._latency, self._steps, self._frozen = LatencyWatch(), StepWatch(), FrozenWatch()
         self._watches: Sequence[Any] = (self._latency, self._frozen, self._steps)
-        self._motion, self._moved = MotionOf(), Moved()
+        self._motion, self._moved = MotionOf(), HasMoved()
         self._commands, self._stalls = CommandSum(), StallSum()
         self._margins: MarginSum | None = None
-        if margins:  # imported here, as the controller's design comes with it
+        if margins:  # imported late: it loads the design of the controller
             from cockpit.judge import margins as of_loop
 
             self._margins = of_loop.MarginSum()
-        self._sensor_watch: SensorWatch | None = None  # made, with the next, at the first window
+        self._sensor_watch: SensorWatch | None = None  # created, like `_ratio`, at the first window
         self._ratio: RatioWatch | None = None
         self._setup: Setup | None = None
         self._bins = 0
         self._first_ns: int | None = None
         self._last_ns = self._applied_ns = 0
-        self._has_force = self._answered = False  # a block has a force; a block has a fresh command
-        self._disarmed_s = np.inf  # when the rig first disarmed itself, as it had no fresh command
+        self._has_force = self._answered = False  # some block has a force; some block has a fresh command
+        self._disarmed_s = np.inf  # first time at which the rig disarmed itself without a fresh command
         self._gain_seen = False  # a loop check confirmed the exciter's gain
         self._phases: dict[str, PhaseSum] = {}
-        self._alone: dict[float, PhaseSum] = {}  # by begin
+        self._alone: dict[float, PhaseSum] = {}  # by begin [s]
         self._cycles: list[Cycles] = []
 
     def begin(self, headers: Metadata) -> None:
-        """The tables of a log that was begun after the judge was made."""
+        """Set the tables of a log begun after the creation of the judge."""
         self._headers = headers
 
     def add(self, topic: str, records: Records, log_time_ns: npt.NDArray[np.int64]) -> None:
-        """Take messages of a streaming topic, [messages]. Raises Fault BAD_LOG."""
+        """Add messages of a streaming topic, [messages]. Raises Fault BAD_LOG."""
         if not len(records):
             return
         self.log.add(topic, records, log_time_ns)
@@ -120,7 +120,7 @@ class RunJudge:
                 self._disarmed_s = min(self._disarmed_s, 1e-9 * float(records["t_ns"][left.argmax()]))
 
     def add_others(self, topic: str, payloads: Sequence[bytes]) -> None:
-        """Take messages of another topic."""
+        """Add messages of another topic."""
         self.log.add_others(topic, payloads)
 
     def _sensors(self, records: Records) -> None:
@@ -138,8 +138,8 @@ class RunJudge:
         return self._setup
 
     def _begin_phases(self, setup: Setup) -> None:
-        """The stretches of the run; of an imported log the whole is `before`."""
-        began_s = max((self._first_ns or 0) * 1e-9 - setup.block_s, 0.0)  # a log may begin late
+        """Create the stretches of the run; an imported log is all `before`."""
+        began_s = max((self._first_ns or 0) * 1e-9 - setup.block_s, 0.0)  # the log may begin late
         if setup.imported:
             self._phases = {"before": PhaseSum(0.0, np.inf)}
             return
@@ -157,7 +157,7 @@ class RunJudge:
             self._phases["stretch"] = PhaseSum(self._stretch_from_s, np.inf)
 
     def _judge_window(self, setup: Setup, is_last: bool) -> None:
-        """Judge the blocks that wait, all of them where they are the last."""
+        """Judge the pending blocks; all of them with `is_last`."""
         if not self._phases:
             self._begin_phases(setup)
         window = self._waiting.window(is_last, setup.block_s)
@@ -188,20 +188,20 @@ class RunJudge:
             self._waiting.judged(window, forces.turned, forces.stroke, setup.block_s)
 
     def _fallbacks(self) -> Stretches:
-        """When the rig was without a fresh command, to infinity where it still is."""
+        """Stretches without a fresh command; infinite end if still open."""
         charge = self.log.charge
         return [*charge.stretches, *([(charge.open_from_s, np.inf)] if charge.open_from_s is not None else [])]
 
     def _gone(self) -> Stretches:
-        """Fallbacks that no stall explains."""
+        """Fallbacks too long for a stall."""
         return [stretch for stretch in self._fallbacks() if stretch[1] - stretch[0] > GONE_S]
 
     def _without(self, setup: Setup, is_last: bool) -> Stretches:
-        """Stretches that do not count as the controller's: stops, fallbacks and stalls, with a second to settle after each."""
+        """Stretches excluded from the judgement of the controller: stops, fallbacks and stalls, each with a settling second."""
         return [*self._steps.stops(setup.block_s, is_last), *_settling([*self._fallbacks(), *self._steps.stale])]
 
-    def result(self, damage: Damage, chain: Chain, foreign: dict[str, int]) -> RunVerdict:
-        """The verdict, at the end of the log. Raises Fault BAD_LOG."""
+    def result(self, damage: Damage, chain: HashChain, foreign: dict[str, int]) -> RunVerdict:
+        """Verdict at the end of the log. Raises Fault BAD_LOG."""
         charge = self.log.charge.result()
         setup = self._known_setup()
         if self._waiting.blocks:
@@ -226,7 +226,7 @@ class RunJudge:
         latency = self._latency.result()
         events = self.log.events
         not_watched = events.not_watched if latency is not None else ""
-        faults, told = self._lines(charge, damage, chain, foreign)
+        faults, others = self._lines(charge, damage, chain, foreign)
         ratio = self._ratio.result() if self._ratio is not None else None
         watch = self._sensor_watch
         slips_s = self.cycles.breakaway_t_s if self.cycles is not None else np.empty(0)
@@ -269,7 +269,7 @@ class RunJudge:
             computer=self._stalls.result() if latency is not None else None,
             not_watched=not_watched,
             faults=faults,
-            told=told,
+            told=others,
             chain=chain,
             normal_scheduling=[
                 event.source
@@ -285,68 +285,68 @@ class RunJudge:
         )
 
     def margins(self) -> "Margins":
-        """The margins of the amplitude loop. Raises ValueError where they were not wanted, Fault BAD_LOG."""
+        """Margins of the amplitude loop. Raises ValueError without `margins` at creation, Fault BAD_LOG."""
         if self._margins is None:
-            raise ValueError("margins: must be wanted when the judge is made")
+            raise ValueError("margins: must be requested at the creation of the judge")
         return self._margins.result(self._headers, self._path, self._steps.loop_delay_s)
 
     def _planned_s(self, setup: Setup) -> float:
-        """Length of a run whose log ends before it, and without the plant's END; 0 for any other."""
+        """Planned length if the log ends earlier and without the plant's END; else 0."""
         early = self._last_ns * 1e-9 < setup.duration_s - 0.5 * setup.block_s
         return setup.duration_s if early and not self.log.events.has("plant", "END") else 0.0
 
     def _slips_in(self, stretches: Stretches, without: Iterable[tuple[float, float]] = ()) -> int:
-        """Slips in any of the stretches and in none of the others, each counted once."""
+        """Number of slips inside any of the stretches and outside of `without`."""
         at_s = self.cycles.breakaway_t_s if self.cycles is not None else np.empty(0)
         return int(np.count_nonzero(within(at_s, stretches) & ~within(at_s, without)))
 
     def _lost_blocks(self, damage: Damage) -> tuple[int, bool]:
-        """Blocks that are missing in the log, and whether their number is known.
+        """Number of blocks missing in the log, and whether it is exact.
 
-        A damaged chunk may hold the first or the last blocks: then the number in the plant's END counts.
+        A damaged chunk may contain the first or the last blocks: then the number in the plant's END counts.
         """
         watch, whole = self.log.topics["sensors"], damage.whole and not damage.before
         if self.log.events.blocks_sent is None:
             return watch.missing, whole
-        first = 0 if whole else watch.first_number  # a recorder may have come late
+        first = 0 if whole else watch.first_number  # the recorder may have started late
         return watch.missing + first + self._lost_at_the_end(), True
 
     def _lost_at_the_end(self) -> int:
-        """Blocks after the last one in the log, by the plant's END."""
+        """Number of blocks after the last one in the log, by the plant's END."""
         return max((self.log.events.blocks_sent or 0) - self.log.topics["sensors"].end, 0)
 
     def _misses_known(self) -> bool:
-        """Whether the log has every step of the controller, up to the last block: only the step after a gap names it."""
+        """True if the log has every step of the controller up to the last block; a gap is reported only by the step after it."""
         last = max(self.log.topics["sensors"].end, self.log.events.blocks_sent or 0) - 1
         return self.log.topics["trace"].missing == 0 and self._steps.last_block >= last
 
     def _lines(
-        self, charge: InCharge, damage: Damage, chain: Chain, foreign: dict[str, int]
+        self, charge: InCharge, damage: Damage, chain: HashChain, foreign: dict[str, int]
     ) -> tuple[list[str], list[str]]:
-        """Events and findings that harm the run or its log, and others; one line for all events of one code of one source."""
+        """Harmful events and findings, and the other ones; one line per code and source."""
         faults: list[str] = []
-        told: list[str] = []
+        others: list[str] = []
         counts, listed = self.log.events.counts, set[tuple[str, str]]()
         for event in self.log.events.kept:
             key = event.source, event.code
-            if key in listed or event.code in _COUNTED_ELSEWHERE or not is_told(event.code):
+            if key in listed or event.code in _COUNTED_ELSEWHERE or not is_listed(event.code):
                 continue
             listed.add(key)
             many = f" (the first of {counts[key]})" if counts[key] > 1 else ""
             text = _LETTER.sub(r"\1", self._open_loop(event) if event.code == "OPEN_LOOP" else event.text)
-            (faults if harms(event.code) else told).append(f"{event.code}: {text}{many}")
-        told += foreign_in_words(foreign)
+            (faults if harms(event.code) else others).append(f"{event.code}: {text}{many}")
+        others += foreign_in_words(foreign)
         for code, text, is_fault in charge.sentences():
-            (faults if is_fault else told).append(f"{code}: {text}")
+            (faults if is_fault else others).append(f"{code}: {text}")
         looks = {name: self.log.signals[name].result() for name in _CONTROLLED}
-        gone = [found for name, seen in looks.items() for found in not_finite(name, seen, self.log.sample_s)]
+        gone = [finding for name, seen in looks.items() for finding in not_finite(name, seen, self.log.sample_s)]
         left_out = (f"NOT_FINITE: {finding.where}: {finding.text}; left out" for finding in gone)
         faults += [line for line in (self._clock(), *left_out, self._steps.unseen()) if line]
         findings = [*damage_findings(damage, self._path), *chain_findings(chain, self._path.name)]
-        return [*faults, *(f"{finding.kind}: {finding.text}" for finding in findings)], told
+        return [*faults, *(f"{finding.kind}: {finding.text}" for finding in findings)], others
 
     def _open_loop(self, event: wire.Event) -> str:
-        """The text of the controller's trip; where the rig had no fresh command just before, that is why v_a was low."""
+        """Text of the controller's trip. A preceding time without a fresh command explains the low v_a."""
         at_s = event.t_ns * 1e-9
         for from_s, until_s in self._fallbacks():
             if from_s <= at_s <= until_s + SETTLING_S:
@@ -355,26 +355,30 @@ class RunJudge:
         return event.text
 
     def _disarmed(self) -> str:
-        """That the rig disarmed itself, in words; empty where it did not."""
+        """Sentence if the rig disarmed itself; else empty."""
         if self._disarmed_s == np.inf:
             return ""
         why = f"the rig disarmed itself at {self._disarmed_s:.2f} s, as no fresh command reached it"
         return f"{why}: look at the controller and the link to it, then `stickslip arm`"
 
     def _clock(self) -> str:
-        """What is wrong with the time of the blocks, in words; empty where it follows their numbers."""
+        """Fault of the block times, in words; empty if the times follow the block numbers."""
         watch = self.log.topics["sensors"]
         if not watch.jumps:
             return ""
-        stands = watch.standing > watch.jumps // 2
-        how = f"stands at {counted(watch.standing, 'block')}" if stands else f"jumps at {counted(watch.jumps, 'block')}"
+        constant = watch.standing > watch.jumps // 2
+        how = (
+            f"is constant at {counted(watch.standing, 'block')}"
+            if constant
+            else f"jumps at {counted(watch.jumps, 'block')}"
+        )
         first, off_ns = watch.first_jump
         return f"CLOCK: t_ns of /sensors {how}, first {first} by {off_ns * 1e-6:g} ms: times are wrong from there"
 
     def _doubts(
-        self, charge: InCharge, after: Phase | None, block_s: float, chain: Chain, damage: Damage, all_known: bool
+        self, charge: InCharge, after: Phase | None, block_s: float, chain: HashChain, damage: Damage, all_known: bool
     ) -> list[str]:
-        """Why a run cannot be judged although something was tested."""
+        """Reasons against a verdict although something was tested."""
         doubts = [line for line in (self._clock(), self._disarmed(), too_little(after, self._phases, block_s)) if line]
         if charge.controller_until_s is not None:
             doubts.append(f"no step of the controller is in the log after {charge.controller_until_s:.2f} s")
@@ -389,10 +393,10 @@ class RunJudge:
             doubts.append("bytes of the log were changed after it was written")
         if not all_known:
             kinds = [f"{finding.kind}: {finding.text}" for finding in damage_findings(damage, self._path)]
-            doubts.append(f"how many blocks are missing is not known; {'; '.join(kinds)}")
+            doubts.append(f"the number of missing blocks is unknown; {'; '.join(kinds)}")
         return doubts
 
 
 def _settling(stretches: Iterable[tuple[float, float]]) -> Stretches:
-    """Stretches with the second after each, which the controller has to settle."""
+    """Stretches, each with the settling second after it."""
     return [(from_s, until_s + SETTLING_S) for from_s, until_s in stretches]

@@ -1,29 +1,27 @@
-"""Whether the sensors of a run can carry a verdict: dead, clipped, swapped and absent channels, and three counts of slips.
+"""Whether the sensors of a run can support a verdict: dead, clipped, swapped and absent channels, and three counts of slips.
 
-Only the times of slips grow with the run. A check without signals to compare has no finding.
+Only the list of slip times grows with the run. A check without signals to compare has no finding.
 """
 
 import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.log.check.channel import FEW_AT_END, channel_findings
 from bridge.log.check.log_check import LogWatch
 from bridge.wire.messages import CHANNELS
 from cockpit.judge.described import Described
 from cockpit.judge.phases import Stretches, within
-from cockpit.judge.relations import Doubt, Relations
+from cockpit.judge.relations import ChannelRelations, Doubt
 from cockpit.judge.slips import Forces
 from cockpit.judge.watches import FrozenWatch
 from cockpit.judge.window import Window
 
-Floats = npt.NDArray[np.floating[Any]]
-
-_FROZEN_S = 0.1  # of blocks that repeat. Larger: a shorter failure passes; smaller: a doubled block counts
-# Share of samples that are no finite number, above which a channel cannot carry a verdict. Larger: slips may hide in these
-# samples; smaller: a long run is not judged because of one dropout.
+_FROZEN_S = 0.1  # of repeated blocks. Larger: a shorter failure passes. Smaller: a single doubled block counts
+# Share of samples that are not finite above which a channel cannot support a verdict. Larger: slips may hide in these samples.
+# Smaller: one dropout prevents the verdict on a long run.
 _NOT_FINITE_SHARE = 1e-3
 _CODES = {"not-finite": "SENSOR_ABSENT", "dead": "SENSOR_DEAD", "clipped": "SENSOR_CLIPPED"}
 
@@ -33,7 +31,7 @@ class SensorVerdict(NamedTuple):
 
     findings: list[Doubt]
     by_force: int  # slips in the judged stretches
-    by_position: int | None  # None where the positions cannot show one
+    by_position: int | None  # None if the positions cannot show a slip
     by_trace: int
     surges: int  # of `by_trace`
 
@@ -43,29 +41,29 @@ class SensorVerdict(NamedTuple):
 
 
 class SensorWatch:
-    """Checks the channels of one log, their blocks that repeat, and window by window slips and relations."""
+    """Checks the channels of one log, their repeated blocks, and window by window slips and relations."""
 
     def __init__(self, of: Described, log: LogWatch, frozen: FrozenWatch, block_s: float) -> None:
         self._of, self._log, self._frozen = of, log, frozen
-        self._relations = Relations(of, block_s)
+        self._relations = ChannelRelations(of, block_s)
         self._least_N = self._least_m = (
-            0.0  # the smallest falls of force and of drive less slide that count in every window
+            0.0  # smallest falls of force and of drive less slide that count in every window
         )
         self._slips_s: dict[str, list[Floats]] = {"position": [], "slips": [], "surges": []}
 
     def add(self, window: Window, forces: Forces) -> None:
-        """Take a window with its slips by force and by position."""
+        """Add a window with its slips by force and by position."""
         self._relations.add(window)
         self._least_N, self._least_m = max(self._least_N, forces.least_N), max(self._least_m, forces.least_m)
         self._slips_s["position"].append(forces.by_position_s)
-        trace, own = window.trace, window.own(window.trace)
+        trace, judged = window.trace, window.own(window.trace)
         for name in ("slips", "surges"):
             # a restarted controller counts from 0
             more = np.maximum(np.diff(trace[name], prepend=trace[name][:1]), 0)
-            self._slips_s[name].append(np.repeat(trace["t_ns"][own] * 1e-9, more[own]))
+            self._slips_s[name].append(np.repeat(trace["t_ns"][judged] * 1e-9, more[judged]))
 
     def result(self, force_slips_s: Floats, judged: Stretches) -> SensorVerdict:
-        """The findings at the end of the log, with the times of the slips in the force; `judged`: when slips count."""
+        """Findings at the end of the log, with the slip times of the force; `judged`: stretches in which slips count."""
         of = self._of
         findings = [doubt for name in CHANNELS for doubt in self._of_channel(name)]
         broken = [doubt.text.partition(" ")[0] for doubt in findings]
@@ -74,8 +72,8 @@ class SensorWatch:
         slips_s["force"] = force_slips_s
         whole = {name: len(at_s) for name, at_s in slips_s.items()}
         inside = {name: int(within(at_s, judged).sum()) for name, at_s in slips_s.items()}
-        # not by surges, which come at stops and turns as well; nor by the controller alone, which counts up to 7 false slips in
-        # the bank
+        # Surges do not decide: they occur at stops and turns as well. Nor does the controller alone: in the bank it counts up to
+        # 7 false slips.
         if of.uses_force and any(not by["force"] and by["position"] and by["slips"] for by in (inside, whole)):
             text = "{force} by drive_force_N, {position} by the positions and {slips} by the controller"
             text = f"slips with the controller in charge: {text.format(**inside)}; in the whole log: {text.format(**whole)}"
@@ -91,23 +89,23 @@ class SensorWatch:
     def _of_channel(self, name: str) -> list[Doubt]:
         seen, log, decides = self._log.signals[name].result(), self._log, self._decides(name)
         few = {"not-finite": _NOT_FINITE_SHARE * seen.samples, "clipped": FEW_AT_END}
-        found = [
+        doubts = [
             Doubt(_CODES[finding.kind], f"{name} {finding.text}", decides)
             for finding in channel_findings(name, seen, log.sample_s, self._of.channels[name])
             if finding.times > few.get(finding.kind, 0)
         ]
         repeats_s = self._frozen.runs[name].longest * log.period_ns * 1e-9
         if repeats_s > _FROZEN_S:
-            found.append(Doubt("SENSOR_FROZEN", f"{name} repeats one block for {repeats_s:.3g} s", decides))
-        return found
+            doubts.append(Doubt("SENSOR_FROZEN", f"{name} repeats one block for {repeats_s:.3g} s", decides))
+        return doubts
 
     def _decides(self, name: str) -> bool:
-        """Whether the verdict rests on a channel."""
+        """True if the verdict depends on a channel."""
         return {
             "drive_force_N": self._of.uses_force,
             "mass_position_m": self._of.uses_slide,
             "drive_position_m": True,
             "base_accel_mps2": self._relations.vibrated,
-            # the controller finds swapped accelerometers by it
+            # the controller detects swapped accelerometers with it
             "mass_accel_mps2": math.isfinite(self._of.channels["mass_accel_mps2"].noise),
         }[name]

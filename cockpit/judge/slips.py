@@ -1,61 +1,60 @@
-"""The slips of a run, in the force of its drive.
+"""Slips of a run in the drive force.
 
-A slip is a fall of the force along the motion: of F where the drive goes forwards, of -F where it goes backwards. Where the drive
-turns, the force changes its sign as fast as a slip on a stiff axis, so each stroke of the drive is looked at by itself.
+A slip is a fall of the force along the motion: of F while the drive goes forwards, of -F while it goes backwards. At a turn of
+the drive the force changes its sign as fast as in a slip on a stiff axis, so each stroke of the drive is searched separately.
 
-The force falls as well where a soft drive rings, and where the drive stops and the slide comes after it. With the place of the
-slide the two are told apart: a slide that slips is faster than its drive was, as `docs/method/bank.md` has it.
+The force also falls when a soft drive rings, and when the drive stops and the slide catches up. The position of the slide
+separates these cases: a slipping slide is faster than its drive was, see `docs/method/bank.md`.
 
-The same rule on drive less slide, the spring's extension, counts the slips by position: a second witness, without the force.
+The same rule on drive less slide, the extension of the spring, counts the slips by position: a second count without the force.
 """
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Floats
 from cockpit.judge.setup import Setup
-from cockpit.judge.strokes import Stroke, steady_parts, strokes_of
-from cockpit.judge.window import Moved, Window
+from cockpit.judge.strokes import DriveStroke, steady_parts, strokes_of
+from cockpit.judge.window import HasMoved, Window
 from diagnosis.features.cycles import Cycles, find_cycles, smallest_drop_N
 
-Floats = npt.NDArray[np.floating[Any]]
-
-BIN_S = 1e-3  # of means, as slips are found in
-# Before and after a fall: the drive's velocity there decides, and no block may be missing there.
+BIN_S = 1e-3  # of the means in which slips are searched
+# Before and after a fall: the drive velocity is taken in these times, and no block may be missing in them.
 _BESIDE_S = 0.02
-_STOPS = 0.5  # of the drive's velocity before the fall
-# Velocity of the slide over the drive's, mean from 10 to 90 % of a fall: that of a sine whose peak is the 1.5 v_d of a slip.
+_STOPS = 0.5  # share of the drive velocity before the fall
+# Mean velocity of the slide over the drive from 10 to 90 % of a fall: a sine with the peak of a slip, 1.5 v_d.
 _RUNS_AHEAD = 1.4
 _NONE = Cycles(*(np.empty(0) for _ in Cycles._fields))
 
 
 class Forces(NamedTuple):
-    """The slips of a window, and its blocks whose force is a number, [blocks]."""
+    """Slips of a window, and its blocks with a finite force, [blocks]."""
 
-    cycles: Cycles  # forces at breakaway and re-stick have the sign that they have in the log
-    unsure: npt.NDArray[np.bool_]  # slips in which blocks are missing: what the force did there is not known, [slips]
+    cycles: Cycles  # forces at breakaway and re-stick keep their sign of the log
+    unsure: npt.NDArray[np.bool_]  # slips with missing blocks, in which the force is unknown, [slips]
     t_s: Floats
     mean_N: Floats
-    part: npt.NDArray[np.int64]  # number of the stroke in whose steady part a block is; -1 in none
-    missing: npt.NDArray[np.int64]  # blocks that are missing, or hold no force, just before this one
-    end: int  # row after the last of the window: where the drive turns, if it does
+    part: npt.NDArray[np.int64]  # number of the stroke whose steady part contains the block; -1 outside
+    missing: npt.NDArray[np.int64]  # blocks missing or without a force just before this block
+    end: int  # row after the last of the window: a turn of the drive, if any
     turned: bool
-    stroke: int  # number of the stroke that begins, or goes on, at `end`
-    least_N: float  # the smallest fall of the force that counts; infinite where no force is known
-    by_position_s: Floats  # times of the slips in drive less slide, by the rule of the force
-    least_m: float  # the smallest fall of drive less slide that counts; infinite where a position is not known
+    stroke: int  # number of the stroke at `end`
+    least_N: float  # smallest fall of the force that counts; infinite without a force
+    by_position_s: Floats  # slip times in drive less slide, by the rule for the force
+    least_m: float  # smallest fall of drive less slide that counts; infinite without a position
 
 
 def bins_of(samples: int, period_ns: float) -> int:
-    """Into how many bins of about 1 ms the samples of a block go."""
+    """Number of bins of about 1 ms per block."""
     return math.gcd(samples, max(round(period_ns * 1e-9 / BIN_S), 1))
 
 
-def forces_of(window: Window, setup: Setup, moved: Moved) -> Forces:
-    """The slips and the forces of a window."""
+def forces_of(window: Window, setup: Setup, moved: HasMoved) -> Forces:
+    """Slips and forces of a window."""
     block_s, blocks = setup.block_s, window.blocks
     finite = np.asarray(np.isfinite(blocks.force_N).all(axis=1))
     usable = np.flatnonzero(finite)
@@ -79,16 +78,16 @@ def forces_of(window: Window, setup: Setup, moved: Moved) -> Forces:
     strokes = strokes_of(place_m)
     part = steady_parts(place_m, mean_N[begins:], strokes, block_s, window.after_turn)
     first = int(np.searchsorted(usable, window.first))
-    present = next((i for i, one in enumerate(strokes) if begins + one.end > first), 0)
+    present = next((i for i, stroke in enumerate(strokes) if begins + stroke.end > first), 0)
     part[part >= 0] += window.stroke - present
     part = np.concatenate([np.full(begins, -1), part])
-    end, turned = _end(window, [int(usable[begins + one.first]) for one in strokes[1:]])
+    end, turned = _end(window, [int(usable[begins + stroke.first]) for stroke in strokes[1:]])
     limits_s, bin_s = [time_ns * 1e-9 for time_ns in window._replace(end=end).own_ns], block_s / bins
-    found: list[Cycles] = []
+    slips: list[Cycles] = []
     by_position_s: list[Floats] = [np.empty(0)]
     bin_t_s, behind_m = sample_s[:, :: samples // bins].ravel(), drive_m - slide_m
     least_m = smallest_drop_N(bin_t_s, behind_m) if np.isfinite(behind_m).all() else math.inf
-    for stroke in (Stroke(begins + one.first, begins + one.end, one.way) for one in strokes):
+    for stroke in (DriveStroke(begins + begin, begins + stop, way) for begin, stop, way in strokes):
         if stroke.end <= first or usable[stroke.first] >= end:
             continue
         rows, inside = slice(stroke.first, stroke.end), slice(stroke.first * bins, stroke.end * bins)
@@ -97,15 +96,15 @@ def forces_of(window: Window, setup: Setup, moved: Moved) -> Forces:
         means_N = along_N.reshape(len(along_N), bins, -1).mean(axis=2).ravel()
         t_s = bin_t_s[inside]
         falls = find_cycles(sample_s[rows].ravel(), along_N.ravel(), drop_N, setup.slowest_fall_s)
-        found.append(_signed(_slips_among(falls, limits_s, _Stroke(t_s, means_N, drive, slide), bin_s), stroke.way))
+        slips.append(_signed(_slips_among(falls, limits_s, _Stroke(t_s, means_N, drive, slide), bin_s), stroke.way))
         if math.isfinite(least_m):
             falls = find_cycles(t_s, drive - slide, least_m, setup.slowest_fall_s)
             places = _Stroke(t_s, drive - slide, drive, slide)
             by_position_s.append(_slips_among(falls, limits_s, places, bin_s).breakaway_t_s)
-    cycles = Cycles(*(np.concatenate(parts) for parts in zip(*found, strict=True))) if found else _NONE
+    cycles = Cycles(*(np.concatenate(parts) for parts in zip(*slips, strict=True))) if slips else _NONE
     mine = slice(first, int(np.searchsorted(usable, end)))
     steps = np.diff(blocks.sequence, prepend=blocks.sequence[:1] - 1) - 1
-    goes_on = (i for i, one in enumerate(strokes) if usable[begins + one.end - 1] >= end)
+    goes_on = (i for i, stroke in enumerate(strokes) if usable[begins + stroke.end - 1] >= end)
     return Forces(
         cycles,
         _unsure(cycles, blocks.t_ns * 1e-9, steps),
@@ -123,7 +122,7 @@ def forces_of(window: Window, setup: Setup, moved: Moved) -> Forces:
 
 
 def _end(window: Window, turns: list[int]) -> tuple[int, bool]:
-    """Where a window ends: at the last turn in its second half, else where it must; and whether the drive turns there."""
+    """End of a window: the last turn in its second half, else its latest end; True if it is a turn."""
     if window.is_last:
         return window.end, False
     late = [row for row in turns if (window.first + window.end) // 2 < row <= window.end]
@@ -131,7 +130,7 @@ def _end(window: Window, turns: list[int]) -> tuple[int, bool]:
 
 
 def _unsure(cycles: Cycles, t_s: Floats, steps: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-    """Slips within which blocks are missing, [slips]."""
+    """Slips with missing blocks, [slips]."""
     gaps = np.flatnonzero(steps > 0)
     unsure = np.zeros(cycles.slips, bool)
     for at in gaps if len(gaps) and cycles.slips else ():
@@ -145,7 +144,7 @@ def _unsure(cycles: Cycles, t_s: Floats, steps: npt.NDArray[np.int64]) -> npt.ND
 
 
 class _Stroke(NamedTuple):
-    """A stroke of the drive, all along the drive; no number where a place is not known. [bins]."""
+    """A stroke along the direction of the drive, [bins]; NaN for an unknown position."""
 
     t_s: Floats
     force_N: Floats
@@ -153,8 +152,8 @@ class _Stroke(NamedTuple):
     slide_m: Floats
 
 
-def _place_m(means_m: Floats, name: str, setup: Setup, moved: Moved) -> Floats:
-    """Means of bins, straight lines where they are no numbers; NaN throughout for a channel that is not there, or stands."""
+def _place_m(means_m: Floats, name: str, setup: Setup, moved: HasMoved) -> Floats:
+    """Means of bins, interpolated where not finite; all NaN for a channel that is missing or never moves."""
     place_m = means_m.ravel()
     known = np.isfinite(place_m)
     if not moved(name, place_m) or name in setup.absent or not known.any():
@@ -170,12 +169,12 @@ def _signed(cycles: Cycles, way: int) -> Cycles:
 
 
 def _slips_among(falls: Cycles, limits_s: Sequence[float], stroke: _Stroke, bin_s: float) -> Cycles:
-    """Those of the falls of a stroke that are slips; only the ones from and until the limits are looked at."""
-    own = (falls.breakaway_t_s >= limits_s[0]) & (falls.breakaway_t_s < limits_s[1])
+    """Falls of a stroke between the limits that are slips."""
+    judged = (falls.breakaway_t_s >= limits_s[0]) & (falls.breakaway_t_s < limits_s[1])
     first = np.searchsorted(stroke.t_s, falls.breakaway_t_s, side="right") - 1
     last = [*first, len(stroke.t_s) - 1][1:]
     slips = np.array(
-        [mine and _is_slip(stroke, a, b, bin_s) for a, b, mine in zip(first, last, own, strict=True)], bool
+        [is_judged and _is_slip(stroke, a, b, bin_s) for a, b, is_judged in zip(first, last, judged, strict=True)], bool
     )
     stick = slips[: len(falls.restick_t_s)]
     return Cycles(
@@ -187,7 +186,7 @@ def _slips_among(falls: Cycles, limits_s: Sequence[float], stroke: _Stroke, bin_
 
 
 def _is_slip(stroke: _Stroke, first: int, last: int, bin_s: float) -> bool:
-    """Whether the slide runs ahead in the fall of the force between two bins; its place not known: whether the drive goes on."""
+    """True if the slide outruns the drive in the fall between two bins; without its position: if the drive goes on."""
     force_N = stroke.force_N[first : last + 1]
     force_N = force_N[: int(force_N.argmin()) + 1]
     drop_N = float(force_N[0] - force_N[-1])
@@ -200,6 +199,6 @@ def _is_slip(stroke: _Stroke, first: int, last: int, bin_s: float) -> bool:
     was = (stroke.drive_m[begin] - stroke.drive_m[before]) / (begin - before)
     goes_on = (stroke.drive_m[after] - stroke.drive_m[end]) / (after - end)
     slides, drives = ((place_m[end] - place_m[begin]) / (end - begin) for place_m in (stroke.slide_m, stroke.drive_m))
-    if not slides > drives:  # no place, or one that is wrong: a force falls only where the slide outruns its drive
+    if not slides > drives:  # no position, or a wrong one: the force falls only if the slide outruns its drive
         return not goes_on < _STOPS * was
     return not slides <= _RUNS_AHEAD * max(was, goes_on)

@@ -1,4 +1,4 @@
-"""The envelope of a rig as a picture: where it sticks and slips, and how much vibration removes that."""
+"""Stability of a rig as a picture: where it sticks and slips, and how much vibration removes that."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -18,32 +18,32 @@ _KINDS = (
     (1, _AMBER, "smooth if undisturbed; stick-slip that has started can go on"),
     (0, _GREEN, "stable: smooth sliding"),
 )
-_RATIO_SET_POINT = 1.2  # of v_a to v_d: the margin that the controller keeps from the edge
+_RATIO_SET_POINT = 1.2  # of v_a to v_d: the margin of the controller
 
 
 class MapResult(NamedTuple):
-    """The numbers behind the picture, SI, ready for JSON. None: no such value exists."""
+    """Numbers behind the picture, SI, for JSON. None: no such value exists."""
 
     picture: str
     drive_velocity_mps: float
     drive_stiffness_N_per_m: float
     stable_without_vibration: bool
     growth_per_s: float  # largest real part of the poles at the operating point, without vibration
-    smallest_vibration_velocity_mps: float | None  # stable from here on; None: not up to 5 v_d
-    # ends stick-slip that has started, too: not below v_d where that could go on (0 where there is none)
+    smallest_vibration_velocity_mps: float | None  # least stable value; None: none up to 5 v_d
+    # also ends stick-slip that has started: at least v_d if that could go on; 0 if no vibration is needed
     removing_vibration_velocity_mps: float | None
     critical_velocity_mps: float | None  # None: steady sliding is unstable at every velocity
-    self_sustained_velocity_mps: float | None  # None: stick-slip that has started never dies out
-    left_out: tuple[str, ...]  # effects of the rig that this theory has no place for
+    self_sustained_velocity_mps: float | None  # None: started stick-slip never dies out
+    left_out: tuple[str, ...]  # effects of the rig outside this theory
     answer: str
 
 
 def stability_map(rig: RigConfig, out: Path, files: Iterable[Path] = ()) -> MapResult:
     """Draw the map of `rig`, which comes from `files`, to `out`, a .png, .svg or .pdf file, and return its numbers.
 
-    The operating point is the velocity of the drive's profile that needs the most vibration: the highest one, but for a
-    damped drive, where the lower ones are the unstable ones. Raises Fault CONFIG if the drive never moves, and OSError
-    if `out` cannot be written.
+    The operating point is the velocity of the drive's profile that needs the most vibration: the highest, or with a damped
+    drive, which is unstable at low velocities, possibly a lower one. Raises Fault CONFIG if the drive never moves, and
+    OSError if `out` cannot be written.
     """
     import math
 
@@ -90,28 +90,28 @@ def stability_map(rig: RigConfig, out: Path, files: Iterable[Path] = ()) -> MapR
 
 
 def _answer(name: str, result: MapResult) -> str:
-    """Two sentences: what happens here, and from which drive velocity on it no longer would."""
+    """Two sentences: behaviour at the operating point, and the critical drive velocity."""
     v_d, critical, sustained = (
         result.drive_velocity_mps,
         result.critical_velocity_mps,
         result.self_sustained_velocity_mps,
     )
-    here = f"{name} at {_mm(v_d)} mm/s: "
+    text = f"{name} at {_mm(v_d)} mm/s: "
     vibration = result.removing_vibration_velocity_mps
     remedy = "no vibration" if vibration is None else f"{_mm(vibration)} mm/s of vibration or more"
     if not result.stable_without_vibration:
-        here += f"stick-slip without vibration; {remedy} removes it"
+        text += f"stick-slip without vibration; {remedy} removes it"
     elif sustained is None or v_d < sustained:
-        here += f"a start at rest ends in stick-slip, though steady sliding is stable; {remedy} removes it"
+        text += f"a start at rest ends in stick-slip, though steady sliding is stable; {remedy} removes it"
     else:
-        here += "no stick-slip, no vibration needed"
+        text += "no stick-slip, no vibration needed"
     if result.left_out:
-        here += f".\nNot in this theory, and left out: {', '.join(result.left_out)}"
+        text += f".\nNot in this theory, and left out: {', '.join(result.left_out)}"
     if critical is None:
-        return f"{here}.\nNo drive velocity is fast enough: the drive has no damping."
+        return f"{text}.\nNo drive velocity is fast enough: the drive has no damping."
     if critical == 0.0:
-        return f"{here}.\nSteady sliding is stable at every drive velocity."
-    return f"{here}.\nCritical velocity {_mm(critical)} mm/s."
+        return f"{text}.\nSteady sliding is stable at every drive velocity."
+    return f"{text}.\nCritical velocity {_mm(critical)} mm/s."
 
 
 def _mm(velocity_mps: float) -> str:
@@ -150,7 +150,7 @@ def _draw_without_vibration(axes: Any, rig: RigConfig, result: MapResult) -> Non
     sustained = grid[0] < self_sustained_velocity_mps(rig, grid[1])
     areas = _regions(axes, velocity_mps * 1e3, stiffness * 1e-3, unstable, sustained)
     if result.critical_velocity_mps is None:
-        # with no border to draw, the lines beyond which the instability is slow are what there is to know
+        # without a border, draw the lines of slow growth instead
         growth_per_s = stability_map(rig, *grid)
         for level_per_s, style in ((1.0, "-"), (1e-3, "--")):
             axes.contour(
@@ -181,7 +181,7 @@ def _draw_with_vibration(axes: Any, rig: RigConfig, result: MapResult) -> None:
     velocity_mps = np.linspace(top_mps / 360.0, top_mps, 360)
     vibration_mps = np.linspace(0.0, top_mps, 361)
     unstable = hurwitz_margin(rig, velocity_mps, None, vibration_mps[:, None]) < 0.0
-    # a vibration of v_d ends started stick-slip, one just below leaves a swing of 0.2 to 0.5 N on the paper's rig
+    # v_a = v_d ends started stick-slip; slightly less leaves a swing of 0.2 to 0.5 N on the paper's rig
     sustained = (velocity_mps < self_sustained_velocity_mps(rig)) & (vibration_mps[:, None] < velocity_mps)
     areas = _regions(axes, velocity_mps * 1e3, vibration_mps * 1e3, unstable, sustained)
     line_mm = np.array([0.0, top_mps * 1e3])
@@ -200,7 +200,7 @@ def _draw_with_vibration(axes: Any, rig: RigConfig, result: MapResult) -> None:
 
 
 def _regions(axes: Any, x: "Floats", y: "Floats", unstable: Any, sustained: Any) -> list[Any]:
-    """Colour the regions; returns a legend entry for each that is there."""
+    """Colour the regions; returns a legend entry for each visible region."""
     import numpy as np
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch

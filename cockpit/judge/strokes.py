@@ -1,55 +1,54 @@
-"""The strokes of a drive, and how far its force swings inside them: at a turn it changes its sign, slip or no slip."""
+"""Strokes of a drive, and the swing of its force inside them: at a turn the force changes its sign, with or without a slip."""
 
 import itertools
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.log.watches.arrays import median, noise_of
 from diagnosis.look.turns import turns
 
-Floats = npt.NDArray[np.floating[Any]]
-
-_SHORTEST_STROKE = 1e-3  # of the drive's whole travel, which is some steps of its encoder
-_TURN_SIGMAS = 10.0  # of the noise of the drive's place, which a stroke is longer than
-_BESIDE_S = 0.02  # before a block and after it, over which the drive's velocity is taken; the smaller counts
-_MOVES = 0.02  # of the stroke's fastest: slower is a dwell
-_AWAY_FROM_TURN = 0.5  # of the stroke's usual velocity: slower, beside a turn, is the turn
-_WHOLE = (
-    0.5  # of the longest steady part: a shorter one, cut by the end of a phase, shows less of a swing than there is
-)
+_SHORTEST_STROKE = 1e-3  # of the whole travel of the drive: a few steps of its encoder
+_TURN_SIGMAS = 10.0  # of the noise of the drive position: shortest stroke
+_BESIDE_S = 0.02  # before and after a block, for the drive velocity; the smaller counts
+_MOVES = 0.02  # of the fastest of the stroke: slower is a dwell
+_AWAY_FROM_TURN = 0.5  # of the median velocity of the stroke: slower next to a turn is part of the turn
+_WHOLE = 0.5  # of the longest steady part: a shorter part, cut by the end of a phase, underestimates the swing
 
 
-class Stroke(NamedTuple):
-    """A part of the drive's way between two turns, or an end of the record."""
+class DriveStroke(NamedTuple):
+    """Travel of the drive between two turns, or an end of the record."""
 
     first: int
     end: int  # the block after the last
     way: int  # 1 or -1
 
 
-def strokes_of(drive_m: Floats) -> list[Stroke]:
-    """The strokes of a drive, from its place in each block; one of all blocks where the place is not known."""
+def strokes_of(drive_m: Floats) -> list[DriveStroke]:
+    """Strokes of a drive, from its position in each block; a single stroke for an unknown position."""
     count = len(drive_m)
     if np.isnan(drive_m).any():
-        return [Stroke(0, count, 1)]
+        return [DriveStroke(0, count, 1)]
     shortest_m = max(_SHORTEST_STROKE * float(np.ptp(drive_m)), _TURN_SIGMAS * float(noise_of(drive_m)))
     at = [0] * count
     turned = turns(drive_m.tolist(), shortest_m, at)
     limits = [0, *at[:turned], count]
-    return [Stroke(first, end, (-1) ** i) for i, (first, end) in enumerate(itertools.pairwise(limits)) if end > first]
+    return [
+        DriveStroke(first, end, (-1) ** i) for i, (first, end) in enumerate(itertools.pairwise(limits)) if end > first
+    ]
 
 
 def steady_parts(
-    drive_m: Floats, force_N: Floats, strokes: list[Stroke], block_s: float, after_turn: bool
+    drive_m: Floats, force_N: Floats, strokes: list[DriveStroke], block_s: float, after_turn: bool
 ) -> npt.NDArray[np.int64]:
-    """In the steady part of which stroke each block is, from 0; -1 at turns, while the spring turns over, and in dwells.
+    """Number of the stroke whose steady part contains each block, from 0; -1 at turns, while the spring reverses, and in dwells.
 
     Args:
-        drive_m, force_N: place of the drive, NaN where it is not known, and force of its spring, [blocks].
+        drive_m, force_N: position of the drive, NaN if unknown, and force of its spring, [blocks].
         strokes: of the drive.
-        block_s: length of a block.
+        block_s: duration of a block.
         after_turn: the drive turned at the first block.
 
     """
@@ -71,7 +70,7 @@ def steady_parts(
         if end < len(drive_m):
             moving = moving[moving <= fast[-1]]
         along_N = way * force_N[first + moving]
-        if turned:  # the spring is turned over once the force is where it stays
+        if turned:  # the spring is reversed once the force reaches its level
             known_N = along_N[np.isfinite(along_N)]
             moving = moving[int(np.argmax(along_N >= median(known_N))) if len(known_N) else 0 :]
         part[first + moving] = number
@@ -79,7 +78,7 @@ def steady_parts(
 
 
 class Swing:
-    """The swing of a force, stroke by stroke; of many rows a few numbers for each stroke."""
+    """Swing of a force, reduced to a few numbers per stroke."""
 
     def __init__(self) -> None:
         self.blocks = 0
@@ -88,7 +87,7 @@ class Swing:
         self._strokes: dict[int, tuple[int, float, float]] = {}  # blocks, lowest and highest force
 
     def add(self, force_N: Floats, part: npt.NDArray[np.int64]) -> None:
-        """Forces, and the number of the stroke in whose steady part each is, -1 in none; [blocks], in order of time."""
+        """Add forces with the number of their stroke, -1 outside of steady parts; [blocks], in order of time."""
         if not len(force_N):
             return
         self.blocks += len(force_N)
@@ -112,7 +111,7 @@ class Swing:
         return self._sum_N / self.blocks
 
     def result(self) -> tuple[float, int]:
-        """Largest less smallest force in the steady part of a stroke, median of strokes; of how many, 0: that of all blocks."""
+        """Median over strokes of the largest less smallest force in the steady part; number of strokes, 0: over all blocks."""
         if not self._strokes:
             return self._highest_N - self._lowest_N, 0
         counts, lows, highs = np.array(list(self._strokes.values())).T

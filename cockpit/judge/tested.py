@@ -16,23 +16,23 @@ def untested(
     after: Phase | None,
     in_charge_s: float,
 ) -> str:
-    """Why nothing was tested; empty where something was.
+    """Reason for which nothing was tested; empty if something was.
 
     Args:
         setup: of the run.
         steps: of the controller.
         seconds: end of the last block; 0 without any.
-        unreadable: why the first block that cannot be read cannot; empty where all can.
-        answered: whether a block has a fresh command.
+        unreadable: error of the first unreadable block; empty without any.
+        answered: a block has a fresh command.
         after: the stretch in which the controller is judged.
-        in_charge_s: time of the controller, its settling too.
+        in_charge_s: time of the controller, including its settling.
 
     """
     if setup.imported:
-        return "measured data of another program: no controller was there to be judged"
+        return "measured data of another program: no controller to judge"
     if not seconds:
         return (
-            f"no block can be read: {unreadable}; every block must hold all channels"
+            f"no block can be read: {unreadable}; every block must have all channels"
             if unreadable
             else "no block was recorded"
         )
@@ -49,13 +49,13 @@ def untested(
     if in_charge_s <= 0.0 or not answered:
         return "the controller was not in charge in this run"
     why = f"too short to judge: it has {SETTLING_S:g} s to settle"
-    if in_charge_s > SETTLING_S:  # its force is no number, or stops and stalls left no second to settle in
+    if in_charge_s > SETTLING_S:  # the force is not finite, or stops and stalls left no second to settle
         why = "but none of it can be judged"
     return f"the controller was in charge for {in_charge_s:.2g} s, {why}"
 
 
 def too_little(after: Phase | None, phases: Mapping[str, PhaseSum], block_s: float) -> str:
-    """Why the motion with the controller in charge is too short to show a slip; empty where it is long enough."""
+    """Reason for which the controlled motion is too short to show a slip; empty if it is long enough."""
     if after is None:
         return ""
     moving_s, before = phases["after"].moving * block_s, phases["before"]

@@ -1,10 +1,10 @@
-"""The figures of a run, and whether control is ok, not ok or not judged."""
+"""Figures of a run, and the verdict on its control: ok, not ok or not judged."""
 
 from typing import Any, NamedTuple
 
 from bridge.faults import FAULTS
 from bridge.log.in_charge import WEAK_S, InCharge
-from bridge.log.storage.chain import Chain
+from bridge.log.storage.chain import HashChain
 from bridge.units import counted
 from bridge.wire.event_codes import EVENTS, TESTS, TRIPS, harms
 from cockpit.judge.pauses import Computer, Pauses
@@ -14,77 +14,77 @@ from cockpit.judge.sensor_watch import SensorVerdict
 from cockpit.judge.watches import Latency
 
 OK, NOT_OK, NOT_JUDGED = "ok", "not ok", "not judged"
-# Share of the judged blocks that may be missing. Larger: slips hide in a gap; smaller: one stall of the recorder, 80 ms in 8 s,
-# leaves a run without a verdict.
+# Allowed share of missing blocks in the judged time. Larger: slips hide in a gap. Smaller: one stall of the recorder, 80 ms in
+# 8 s, leaves a run without a verdict.
 MISSING_SHARE = 0.01
-# of the events that harm: about the log and not about the rig
+# harmful events of the log, not of the rig
 _OF_THE_LOG = {"GAP", "DROPPED", "LOG_WRITE", "LOG_LOST", "LOG_REPLACED"}
 _OF_THE_RIG = {code for code in EVENTS if harms(code)} - _OF_THE_LOG
 _TRIPS = {"FAULT", *TRIPS}
 
 
 class RunVerdict(NamedTuple):
-    """A run's figures."""
+    """Figures of a run."""
 
     log: str
     seconds: float
-    planned_s: float  # of a run whose log ends before, and without the plant's END; 0 for any other
+    planned_s: float  # planned length if the log ends earlier and without the plant's END; else 0
     blocks: int
     lost_blocks: int
-    lost_messages: int  # at least: only the number of blocks is known for certain
-    all_losses_known: bool  # False: a log that is cut or damaged may lack more than it shows
-    absent: list[str]  # topics of every block that have no message in the log
-    controller_missed: int  # blocks that never came to the controller, by its own count
-    misses_known: bool  # False: the log lacks steps of the controller, which may have missed more blocks
+    lost_messages: int  # lower limit: only the number of blocks is exact
+    all_losses_known: bool  # False: a cut or damaged log may lack more
+    absent: list[str]  # topics without any message that should have one per block
+    controller_missed: int  # blocks lost before the controller, by its count
+    misses_known: bool  # False: the log lacks steps of the controller, so it may have missed more blocks
     enabled_from_s: float
-    stopped_s: float  # by an operator, and no part of `after`
-    charge: InCharge  # when the rig was on its own, which is no part of `after` either, and blocks without an answer
-    alone: Phase | None  # the rig on its own, for longer than a stall explains
+    stopped_s: float  # by an operator; excluded from `after`
+    charge: InCharge  # times without a controller, excluded from `after`, and blocks without an answer
+    alone: Phase | None  # the rig without a controller, for longer than a stall explains
     before: Phase | None
-    taking_over: Phase | None  # the second that the controller has to settle, between `before` and `after`
+    taking_over: Phase | None  # the settling second between `before` and `after`
     after: Phase | None
-    unsure_slips: int  # of those in `after`: blocks are missing within them
-    stopped_slips: int  # in `stopped_s` and the second after it, which are no part of `after` either
-    stalled_slips: int  # in short fallbacks and the second after each, which are no part of `after` either
-    drive_velocity_max_mps: float  # as measured
+    unsure_slips: int  # slips in `after` with missing blocks
+    stopped_slips: int  # in `stopped_s` and the second after it; excluded from `after`
+    stalled_slips: int  # in short fallbacks and the second after each; excluded from `after`
+    drive_velocity_max_mps: float  # measured
     velocity_ratio_min: float
     velocity_ratio_max: float
     ratio: RatioVerdict | None  # v_a over v_d, judged at both ends; None for an imported log
-    highest_set_point: float  # of v_a over v_d while it vibrated: the controller raises it at the start and after slips
-    sensors: SensorVerdict | None  # whether they can carry a verdict; None for an imported log
+    highest_set_point: float  # of v_a over v_d during vibration: the controller raises it at the start and after slips
+    sensors: SensorVerdict | None  # whether they can support a verdict; None for an imported log
     latency: Latency | None
-    late_commands: int  # that took more than 1 ms
-    pauses: Pauses | None  # of every core of the computer; None in lockstep, and where they were not watched
+    late_commands: int  # later than 1 ms
+    pauses: Pauses | None  # stalls of all cores; None in lockstep, or if not watched
     computer: Computer | None  # all stalls; None in lockstep
-    not_watched: str  # why the computer's stalls are not known; empty where they are, and in lockstep
-    faults: list[str]  # events and findings that harm the run, or its log
+    not_watched: str  # reason for which stalls are unknown; else empty
+    faults: list[str]  # harmful events and findings
     told: list[str]  # other events
-    chain: Chain
-    normal_scheduling: list[str]  # processes without a real-time priority; in lockstep none needs it
-    untested: str  # why nothing was tested; empty where the drive moved with the controller in charge
-    doubts: list[str]  # why the run cannot be judged although something was tested
-    imported: str  # the file of another program that the log was made from; empty for a run
-    gain_verified: bool  # of the exciter: by a loop check of the rig, or by the configuration
+    chain: HashChain
+    normal_scheduling: list[str]  # processes without a real-time priority; irrelevant in lockstep
+    untested: str  # reason for which nothing was tested; empty if the drive moved under control
+    doubts: list[str]  # reasons against a verdict although something was tested
+    imported: str  # source file of an imported log; empty for a run
+    gain_verified: bool  # gain of the exciter: by a loop check, or by the configuration
 
     @property
     def control(self) -> str:
-        """Whether the controller did its work: OK, NOT_OK or NOT_JUDGED."""
+        """Verdict on the controller: OK, NOT_OK or NOT_JUDGED."""
         return self._judged()[0]
 
     @property
     def reason(self) -> str:
-        """Why it did not, or why that is not known; empty where it did."""
+        """Reason for NOT_OK or NOT_JUDGED; empty for OK."""
         return self._judged()[1]
 
     @property
     def cut(self) -> str:
-        """Where the log ends, in words, if that is before the end of its run; else empty."""
+        """End of the log, in words, if before the end of its run; else empty."""
         ends = f"the log ends at {self.seconds:.2f} s, the run was to end at {self.planned_s:.2f} s"
         return ends if self.planned_s and self.blocks else ""
 
     @property
     def good(self) -> bool:
-        """Whether control is OK; of an imported log, which has no controller, whether it is whole."""
+        """True if control is OK; for an imported log, without a controller, if it is complete."""
         if self.imported:
             return self.lost_blocks == 0 and not self.faults
         return self.control == OK
@@ -96,7 +96,7 @@ class RunVerdict(NamedTuple):
 
     @property
     def injected(self) -> list[str]:
-        """Faults that a scenario or an operator asked for."""
+        """Faults injected by a scenario or an operator."""
         return [line for line in self.told if _code(line) in TESTS]
 
     @property
@@ -106,7 +106,7 @@ class RunVerdict(NamedTuple):
         return [line for line in (*self.faults, *self.told) if line not in apart]
 
     def exit_status(self, strict: bool) -> int:
-        """Of a command that judges: 0 ok, 1 not ok, 14 not judged; `strict`: 1 with any loss or late command, too."""
+        """Exit status of a judging command: 0 ok, 1 not ok, 14 not judged; `strict`: also 1 for any loss or late command."""
         if strict and self.losses():
             return 1
         if self.control == NOT_JUDGED and not self.imported:
@@ -114,16 +114,16 @@ class RunVerdict(NamedTuple):
         return 0 if self.good else 1
 
     def losses(self) -> list[str]:
-        """Lost and late messages in words: an acceptance test allows none."""
+        """Lost and late messages in words, for acceptance tests."""
         counts = (
             (self.lost_messages, "message lost in the log", "messages lost in the log"),
             (self.controller_missed, "block missed by the controller", "blocks missed by the controller"),
             (self.late_commands, "late command", "late commands"),
             (self.charge.unanswered, "block without a command", "blocks without a command"),
         )
-        found = [f"no message of /{name} in the log" for name in self.absent]
-        found += [counted(number, *names) for number, *names in counts if number]
-        return [*found, *([] if self.all_losses_known else ["how many messages are lost is not known"])]
+        losses = [f"no message of /{name} in the log" for name in self.absent]
+        losses += [counted(number, *names) for number, *names in counts if number]
+        return [*losses, *([] if self.all_losses_known else ["the number of lost messages is unknown"])]
 
     def _judged(self) -> tuple[str, str]:
         if self.imported:
@@ -132,7 +132,7 @@ class RunVerdict(NamedTuple):
         if not wrong and (self.untested or self.after is None):
             return NOT_JUDGED, self.untested
         blind = self.blind
-        if not blind:  # else the figures that the sensors show decide nothing
+        if not blind:  # else the sensors' figures decide nothing
             wrong += self._figures_that_fail()
         if wrong:
             return NOT_OK, "; ".join(wrong)
@@ -148,12 +148,12 @@ class RunVerdict(NamedTuple):
 
     @property
     def blind(self) -> list[str]:
-        """Findings on sensors on which the verdict rests."""
+        """Findings on sensors that decide the verdict."""
         findings = self.sensors.findings if self.sensors is not None else []
         return [f"{finding.code}: {finding.text}" for finding in findings if finding.decides]
 
     def _who_failed(self) -> list[str]:
-        """Failures that need no sensor of the axis: a controller that was gone, trips, a vibration without effect."""
+        """Failures known without a sensor of the axis: absent controller, trips, ineffective vibration."""
         if self.alone is not None:
             held_s = max(self.seconds - self.enabled_from_s - self.stopped_s - self.alone.seconds, 0.0)
             gone = ", then it was gone" if self.charge.controller_until_s is not None else ""
@@ -162,7 +162,7 @@ class RunVerdict(NamedTuple):
         return [*wrong, *(name for name, seconds in self.charge.reasons_s.items() if seconds > WEAK_S)]
 
     def _figures_that_fail(self) -> list[str]:
-        """Failures that the sensors show: slips, and far more vibration than is needed."""
+        """Failures shown by the sensors: slips, and far too much vibration."""
         wrong: list[str] = []
         if self.after is not None and self.after.slips > self.unsure_slips:
             wrong.append(f"{counted(self.after.slips, 'slip')} with the controller in charge")
@@ -185,5 +185,5 @@ class RunVerdict(NamedTuple):
 
 
 def _code(line: str) -> str:
-    """The code of an event with which a line begins."""
+    """Code of the event at the start of a line."""
     return line.partition(":")[0]

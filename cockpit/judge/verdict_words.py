@@ -11,18 +11,18 @@ from cockpit.judge.pauses import computer_in_words, pauses_in_words
 from cockpit.judge.phases import Phase
 from cockpit.judge.verdict import NOT_JUDGED, NOT_OK, OK, RunVerdict
 
-VERDICT = "verdict"  # the metadata record of a log that `stickslip run` has judged
-_MOST_WARNINGS = 3  # in the short form; more would push the six lines off the screen of a run on a busy computer
+VERDICT = "verdict"  # metadata record written by `stickslip run`
+_MOST_WARNINGS = 3  # in the short form; more would scroll the six lines off the screen
 _FADE_S = 0.2  # of the vibration at the end of a run
 
 
 def in_words(verdict: RunVerdict, verbose: bool, without: Phase | None = None) -> list[str]:
-    """The verdict as lines: the answer in six, and with `verbose` all figures.
+    """The verdict in six lines, or with `verbose` with all figures.
 
     Args:
         verdict: of the run.
-        verbose: whether all figures are wanted.
-        without: the stretch after as it is without the controller, if that was simulated.
+        verbose: all figures.
+        without: the stretch after, simulated without the controller, if available.
 
     """
     v = verdict
@@ -51,7 +51,7 @@ def in_words(verdict: RunVerdict, verbose: bool, without: Phase | None = None) -
 
 
 def shortened(lines: list[str], verbose: bool) -> list[str]:
-    """The first lines of many, unless all are wanted."""
+    """The first lines of many, or all with `verbose`."""
     if verbose or len(lines) <= _MOST_WARNINGS:
         return lines
     kind = lines[0].partition(" ")[0]
@@ -59,7 +59,7 @@ def shortened(lines: list[str], verbose: bool) -> list[str]:
 
 
 def _figures(verdict: RunVerdict) -> list[str]:
-    """All that the six lines leave out."""
+    """The lines beyond the first six."""
     v = verdict
     lines: list[str] = []
     if v.taking_over is not None and v.taking_over.slips:
@@ -100,13 +100,13 @@ def _figures(verdict: RunVerdict) -> list[str]:
 
 
 def strictly(verdict: RunVerdict, strict: bool) -> list[str]:
-    """A line with the losses that an acceptance test does not allow; none without `strict` or without losses."""
+    """A line with the losses that fail an acceptance test; empty without `strict` or without losses."""
     losses = verdict.losses() if strict and verdict.exit_status(strict=False) != 1 else []
     return [f"strict   not ok: {', '.join(losses)}"] if losses else []
 
 
 def data_in_words(verdict: RunVerdict) -> str:
-    """How much of the run is in the log, and whether the controller had the missing blocks."""
+    """Completeness of the log, and whether the controller received the missing blocks."""
     v = verdict
     total = v.blocks + v.lost_blocks
     missed = f"the controller missed {'' if v.misses_known else 'at least '}{v.controller_missed}"
@@ -120,7 +120,9 @@ def data_in_words(verdict: RunVerdict) -> str:
         if not parts:
             known = v.all_losses_known
             parts = [
-                f"whole: {counted(total, 'block')}" if known else f"{total} blocks; how many are missing is not known"
+                f"whole: {counted(total, 'block')}"
+                if known
+                else f"{total} blocks; the number of missing blocks is unknown"
             ]
         parts += [missed] if v.controller_missed else []
     others = v.lost_messages - v.lost_blocks
@@ -128,7 +130,7 @@ def data_in_words(verdict: RunVerdict) -> str:
 
 
 def _machine_terms(before: Phase | None, after: Phase | None) -> list[str]:
-    """Following error, reversals and dose with the controller, and before it if it came later; without a controller none."""
+    """Following error, reversals and dose under control and before it; empty without a controller."""
     if after is None or after.following is None:
         return []
     was = before.following if before is not None else None
@@ -140,7 +142,7 @@ def _machine_terms(before: Phase | None, after: Phase | None) -> list[str]:
 
 
 def following_in_words(now: Following, other: Following | None, name: str) -> list[str]:
-    """Following error and reversals of a stretch as lines, beside those of another stretch called `name`, if there is one."""
+    """Following error and reversals of a stretch as lines, with another stretch `name` for comparison, if given."""
     lines = [f"error    {_error(now)}"]
     if other is not None:
         lines[0] += f" ({name}: {_um(other.error_rms_m)}, {_um(other.error_peak_m)}, {_um(other.error_ripple_m)})"
@@ -172,8 +174,8 @@ def _swing(phase: Phase) -> str:
 
 
 def _worst_reversal(following: Following) -> str:
-    stands = f"the slide stands for {1e3 * following.reversal_stick_s:.0f} ms"
-    return f"{_um(following.quadrant_error_m)} um, {stands}, the worst of {following.reversals}"
+    rests = f"the slide rests for {1e3 * following.reversal_stick_s:.0f} ms"
+    return f"{_um(following.quadrant_error_m)} um, {rests}, the worst of {following.reversals}"
 
 
 def _um(size_m: float) -> str:
@@ -181,14 +183,14 @@ def _um(size_m: float) -> str:
 
 
 def noted(verdict: RunVerdict) -> dict[str, Any]:
-    """The fields of the table `verdict` in a log."""
-    apart = "log", "chain", "good", "headline"  # the first two change when the file is moved, or written again
+    """Fields of the table `verdict` in a log."""
+    apart = "log", "chain", "good", "headline"  # the first two change when the file is moved or rewritten
     figures = {name: value for name, value in verdict.as_dict().items() if name not in apart}
     return {"good": verdict.good, "headline": headline(verdict), "figures": figures}
 
 
 def headline(verdict: RunVerdict) -> str:
-    """The answer in one line; of a log that is cut, where it ends comes first."""
+    """The answer in one line; for a cut log preceded by its end."""
     answer = _answer(verdict)
     return f"{verdict.cut}; {answer}" if verdict.cut and verdict.cut not in answer else answer
 
@@ -196,7 +198,7 @@ def headline(verdict: RunVerdict) -> str:
 def _answer(verdict: RunVerdict) -> str:
     v = verdict
     if v.imported:
-        return _what_is_there(v)
+        return _imported_answer(v)
     if v.alone is not None:
         slips = f"; {counted(v.alone.slips, 'slip')} without a controller" if v.alone.slips else ""
         return f"{v.reason}{slips}"
@@ -206,7 +208,7 @@ def _answer(verdict: RunVerdict) -> str:
     if v.control == NOT_JUDGED and (v.untested or v.after is None):
         return v.untested
     rest = ""
-    if v.stopped_slips:  # a picture of the run shows them
+    if v.stopped_slips:  # visible in a figure of the run
         rest = f"; {counted(v.stopped_slips, 'slip')} while it was stopped or not armed"
     if v.after is not None and v.after.slips > v.unsure_slips and not v.blind:
         return f"stick-slip is still there: {counted(v.after.slips, 'slip')} while the controller was in charge{rest}"
@@ -220,8 +222,8 @@ def _answer(verdict: RunVerdict) -> str:
     return f"no stick-slip with the controller in charge{rest}"
 
 
-def _what_is_there(verdict: RunVerdict) -> str:
-    """The answer for measured data of another program."""
+def _imported_answer(verdict: RunVerdict) -> str:
+    """Answer for measured data of another program."""
     whole = verdict.before
     if whole is None:
         return f"{verdict.seconds:.1f} s of measured data without a drive force: slips cannot be counted"

@@ -1,4 +1,4 @@
-"""Latency, repeated blocks and steps of the controller, message by message in a memory that does not grow."""
+"""Latency, repeated blocks and steps of the controller, message by message in constant memory."""
 
 from typing import NamedTuple
 
@@ -13,14 +13,14 @@ from bridge.wire.messages import CHANNELS, Records
 from cockpit.judge.setup import SETTLING_S
 from controller.codes import STALE
 
-STANDSTILL_MPS = 2e-5  # the controller's own, unless it was set up otherwise
-# A drive that turns is at rest for a moment, and may slip then: 17 times in an hour of the belt axis, which has 718 turns.
-# Smaller: these count as slips with a dead transducer; larger: a transducer at the end of its range is found later.
+STANDSTILL_MPS = 2e-5  # default of the controller
+# A turning drive rests for a moment and may slip: 17 times in an hour of the belt axis, with 718 turns.
+# Smaller: these count as slips with a dead transducer. Larger: a transducer at the end of its range is found later.
 _TURN_S = 0.2
 
 
 class Latency(NamedTuple):
-    """Block out to its command in."""
+    """Latency from a block to its command."""
 
     p50_us: float  # percentiles to 0.25 %
     p99_us: float
@@ -29,15 +29,15 @@ class Latency(NamedTuple):
 
 
 class LatencyWatch:
-    """Delays of the commands, as the plant recorded them."""
+    """Delays of the commands, recorded by the plant."""
 
     def __init__(self) -> None:
         self.took_us = Histogram()
-        self.late = 0  # commands that took more than 1 ms
+        self.late = 0  # commands later than 1 ms
         self.blocks = self.commands = 0
 
     def applied(self, records: Records) -> None:
-        """Take rows of the rig, [blocks]."""
+        """Add rows of the rig, [blocks]."""
         self.blocks += len(records)
         self.commands += int(records["commands"].sum())
         self.late += int(records["commands_late"].sum())
@@ -45,56 +45,56 @@ class LatencyWatch:
         self.took_us.add(round_trip_ns[round_trip_ns > 0] * 1e-3)
 
     def result(self) -> Latency | None:
-        """The percentiles; None in lockstep, where nothing takes time."""
+        """Percentiles; None in lockstep, which has no latency."""
         if not self.took_us.count:
             return None
-        # a command that never came is a late one; the last block's comes after the end
+        # a missing command counts as late; the command of the last block arrives after the end
         in_time = min((self.commands - self.late) / max(self.blocks - 1, 1), 1.0)
         p50_us, p99_us, p999_us = (self.took_us.quantile(share) for share in (0.5, 0.99, 0.999))
         return Latency(p50_us, p99_us, p999_us, in_time)
 
 
 class FrozenWatch:
-    """Blocks that repeat the block before, sample by sample: a driver sends the last buffer of a converter that stopped."""
+    """Blocks equal to the block before, sample by sample: the driver of a stopped converter resends its last buffer."""
 
     def __init__(self) -> None:
-        self.runs = {name: Longest() for name in CHANNELS}  # of such blocks
+        self.runs = {name: Longest() for name in CHANNELS}  # of repeated blocks
         self._last: dict[str, npt.NDArray[np.float32]] = {}
 
     def sensors(self, records: Records) -> None:
-        """Take sensor blocks, [blocks]."""
+        """Add sensor blocks, [blocks]."""
         for name, run in self.runs.items():
             values = np.concatenate([self._last.get(name, np.full_like(records[name][:1], np.nan)), records[name]])
             self._last[name] = values[-1:].copy()
             repeats = values[1:, 0] == values[:-1, 0]
             at = np.flatnonzero(repeats)
-            # equal samples are a dead channel, not one that repeats
+            # constant samples mean a dead channel, not a repeated block
             repeats[at] = (values[at + 1] == values[at]).all(axis=1) & (values[at] != values[at, :1]).any(axis=1)
             run.add(repeats)
 
 
 class StepWatch:
-    """From the controller's steps: whether the rig was armed, missed blocks, stops."""
+    """Arming, missed blocks and stops, from the steps of the controller."""
 
     def __init__(self) -> None:
         self.steps = 0
-        self.missed = 0  # blocks that never came to the controller
+        self.missed = 0  # blocks lost before the controller
         self.last_block = -1
         self.armed = self.moved = False
-        self.highest_set_point = 0.0  # of v_a / v_d while it vibrated
+        self.highest_set_point = 0.0  # of v_a / v_d during vibration
         self.drive_velocity_max_mps = 0.0
         self.loop_delay_s = 0.0
         self._slips: int | None = None
-        self._unseen = 0  # slips while the drive position did not change
+        self._unseen = 0  # slips at a constant drive position
         self._unseen_s = 0.0
-        self._moved_s = -np.inf  # when the drive was last seen to move
-        self.stale: list[tuple[float, float]] = []  # first and last step of the stretches without a block in time
-        self._idle: list[tuple[float, float]] = []  # first and last step of each stretch that ended
+        self._moved_s = -np.inf  # last time of motion of the drive
+        self.stale: list[tuple[float, float]] = []  # first and last step of stretches without a timely block
+        self._idle: list[tuple[float, float]] = []  # first and last step of each finished stretch
         self._idle_from_s: float | None = None
         self._last_s = 0.0
 
     def trace(self, records: Records) -> None:
-        """Take steps of the controller, [steps]."""
+        """Add steps of the controller, [steps]."""
         if not len(records):
             return
         self.steps += len(records)
@@ -103,14 +103,14 @@ class StepWatch:
         not_armed = records["reason"] == wire.NOT_ARMED
         self.armed = self.armed or not not_armed.all()
         v_d_mps, t_s = records["drive_velocity_mps"], records["t_ns"] * 1e-9
-        stands = ~(np.abs(v_d_mps) > STANDSTILL_MPS)
-        self.moved = self.moved or not stands.all()
+        at_rest = ~(np.abs(v_d_mps) > STANDSTILL_MPS)
+        self.moved = self.moved or not at_rest.all()
         self.drive_velocity_max_mps = max(self.drive_velocity_max_mps, float(v_d_mps.max()))
         set_points = records["velocity_ratio"][records["mode"] == wire.EXCITE]
         self.highest_set_point = max(self.highest_set_point, float(set_points.max(initial=0.0)))
         self.loop_delay_s = max(self.loop_delay_s, float(records["loop_delay_s"].max()))
         slips = records["slips"].astype(np.int64)
-        moved_s = np.maximum.accumulate(np.where(stands, self._moved_s, t_s))
+        moved_s = np.maximum.accumulate(np.where(at_rest, self._moved_s, t_s))
         self._moved_s = float(moved_s[-1])
         rose = steps(slips, int(slips[0]) if self._slips is None else self._slips) > 0
         unseen = rose & (t_s - moved_s > _TURN_S)
@@ -131,18 +131,18 @@ class StepWatch:
         self._last_s = float(t_s[-1])
 
     def stops(self, block_s: float, is_last: bool) -> list[tuple[float, float]]:
-        """Times in which the controller was stopped or the rig not armed, with the second after each [s]."""
-        found = [(from_s - block_s, last_s + SETTLING_S) for from_s, last_s in self._idle]
+        """Stretches with a stopped controller or a rig not armed, with the second after each [s]."""
+        stretches = [(from_s - block_s, last_s + SETTLING_S) for from_s, last_s in self._idle]
         if self._idle_from_s is not None:
             until_s = self._last_s + SETTLING_S if is_last else np.inf
-            found.append((self._idle_from_s - block_s, until_s))
-        return found
+            stretches.append((self._idle_from_s - block_s, until_s))
+        return stretches
 
     def unseen(self) -> str:
-        """A line about slips at a constant drive position; empty without any."""
+        """Line about slips at a constant drive position; empty without any."""
         if not self._unseen:
             return ""
         return (
-            f"DRIVE_UNSEEN: {counted(self._unseen, 'slip')} while the drive position stood, first at {self._unseen_s:.3f} s: "
+            f"DRIVE_UNSEEN: {counted(self._unseen, 'slip')} at a constant drive position, first at {self._unseen_s:.3f} s: "
             "is its transducer at the end of its range, or loose?"
         )

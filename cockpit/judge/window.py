@@ -1,8 +1,8 @@
-"""The rows of a run that wait to be judged, and the windows in which they are.
+"""Pending rows of a run, and the windows in which they are judged.
 
-A log is judged window by window: up to 60 s of blocks, with what came just before and at least 10 s of what comes after. So each
-block is judged once, by the same rules, and a run of an hour needs the memory of one window. A window ends where the drive turns,
-if it does: each stroke is then judged as a whole.
+A log is judged window by window: up to 60 s of blocks, with 2 s before them and at least 10 s after them. So each block is judged
+once, by the same rules, and a run of an hour needs the memory of one window. A window ends at a turn of the drive, if there is a
+turn: each stroke is then judged as a whole.
 """
 
 import math
@@ -15,14 +15,14 @@ from bridge.wire.messages import Records
 
 Rows = npt.NDArray[Any]
 
-# Blocks that are judged at once. More: the thresholds for slips follow a change of the force less well, and memory grows (0.3 kB
-# a block). Fewer: strokes are cut. With 5000 the shipped scenarios give the same slips; the swing of the pneumatic seal, whose
-# strokes are longer than that, is 2.9 instead of 1.1 N.
+# Blocks per window. More: the thresholds for slips follow a change of the force less well, and memory grows (0.3 kB per block).
+# Fewer: strokes are cut. With 5000 the shipped scenarios give the same slips; the swing of the pneumatic seal, which has longer
+# strokes, is 2.9 instead of 1.1 N.
 WINDOW_BLOCKS = 60_000
-# Rows after a window that are known when it is judged. Less than 8 s: the part of a phase that its swing leaves out may depend on
-# the end of the run. More: memory.
+# Known rows after a judged window. Less than 8 s: the part of a phase excluded from its swing may depend on the end of the run.
+# More: memory.
 AHEAD_S = 10.0
-# Rows before a window that are seen again. Less: a slip (0.1 s) or a ramp of the vibration (0.15 s) that began before is cut.
+# Rows before a window kept for context. Less: a slip (0.1 s) or a ramp of the vibration (0.15 s) that began earlier is cut.
 BEHIND_S = 2.0
 
 TRACE_ROW = np.dtype(
@@ -43,8 +43,8 @@ APPLIED_ROW = np.dtype(
 _LAYOUTS = {"trace": TRACE_ROW, "applied": APPLIED_ROW, "command": COMMAND_ROW}
 
 
-class Blocks(NamedTuple):
-    """Sensor blocks, reduced to what the judge needs of them."""
+class JudgedBlocks(NamedTuple):
+    """Sensor blocks, reduced for the judge."""
 
     sequence: Rows  # int64, [blocks]
     t_ns: Rows  # int64, [blocks]
@@ -52,20 +52,20 @@ class Blocks(NamedTuple):
     drive_m: Rows  # float64, means of bins, [blocks, bins]
     slide_m: Rows
     base_mps2: Rows  # float64, rms about the mean of each block, [blocks]
-    slide_mps2: Rows  # the same of the slide's accelerometer
+    slide_mps2: Rows  # the same for the slide's accelerometer
 
-    def part(self, rows: Any) -> "Blocks":
-        """Some of the blocks."""
-        return Blocks(*(column[rows] for column in self))
+    def part(self, rows: Any) -> "JudgedBlocks":
+        """A selection of the blocks."""
+        return JudgedBlocks(*(column[rows] for column in self))
 
-    def copied(self) -> "Blocks":
-        """The same in memory that nothing else holds."""
-        return Blocks(*(column.copy() for column in self))
+    def copied(self) -> "JudgedBlocks":
+        """A copy in separate memory."""
+        return JudgedBlocks(*(column.copy() for column in self))
 
 
-def reduced(sensors: Records, bins: int) -> Blocks:
-    """The blocks of some messages, [blocks]; `bins` divides their samples."""
-    return Blocks(
+def reduced(sensors: Records, bins: int) -> JudgedBlocks:
+    """Reduce sensor messages, [blocks]; `bins` divides the number of samples."""
+    return JudgedBlocks(
         sensors["sequence"].astype(np.int64),
         sensors["t_ns"].astype(np.int64),
         np.ascontiguousarray(sensors["drive_force_N"]),
@@ -86,73 +86,73 @@ def means(samples: npt.NDArray[Any], bins: int) -> npt.NDArray[np.float64]:
 def _rms(samples: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
     """Root mean square about the mean of each block, [blocks]."""
     mean = np.einsum("ij->i", samples) / samples.shape[1]
-    with np.errstate(invalid="ignore"):  # samples that are no numbers
+    with np.errstate(invalid="ignore"):  # samples that are not finite
         square = np.einsum("ij,ij->i", samples, samples) / samples.shape[1] - mean * mean
     return np.sqrt(np.maximum(square, 0.0)).astype(np.float64)
 
 
 def rows_of(records: Records, layout: np.dtype[Any]) -> Rows:
-    """Some fields of messages, [messages]."""
-    found = np.empty(len(records), layout)
+    """Selected fields of messages, [messages]."""
+    rows = np.empty(len(records), layout)
     for name in layout.names or ():
-        found[name] = records[name]
-    return found
+        rows[name] = records[name]
+    return rows
 
 
 class Window(NamedTuple):
-    """Rows with their surroundings; those from `first` to before `end` are to be judged."""
+    """Rows with their context; the rows from `first` to before `end` are judged."""
 
-    blocks: Blocks
+    blocks: JudgedBlocks
     trace: Rows
     applied: Rows
     command: Rows
     first: int
     end: int
-    begins: int  # row with which the present stroke begins, or what is known of it
-    after_turn: bool  # the drive turned there
-    stroke: int  # its number
+    begins: int  # first known row of the present stroke
+    after_turn: bool  # the drive turned at `begins`
+    stroke: int  # number of the present stroke
     is_last: bool
 
     @property
     def own_ns(self) -> tuple[int, int]:
-        """Times of the rows that are to be judged, and of the first one after."""
+        """Time of the first judged row, and of the first row after them."""
         t_ns = self.blocks.t_ns
         far = np.iinfo(np.int64)
         from_ns = int(t_ns[self.first]) if self.first else far.min
         return from_ns, far.max if self.is_last else int(t_ns[self.end])
 
     def own(self, rows: Rows) -> npt.NDArray[np.bool_]:
-        """Which of the rows, by their times, are to be judged."""
+        """Select the judged rows by their times."""
         from_ns, until_ns = self.own_ns
         return np.asarray((rows["t_ns"] >= from_ns) & (rows["t_ns"] < until_ns))
 
 
-class Waiting:
-    """Rows that wait for their window."""
+class WaitingRows:
+    """Rows pending for their window."""
 
     def __init__(self) -> None:
         self.blocks = 0
-        self._sensors: list[Blocks] = []
+        self._sensors: list[JudgedBlocks] = []
         self._rows: dict[str, list[Rows]] = {name: [np.empty(0, layout)] for name, layout in _LAYOUTS.items()}
         self._first = self._begins = self._stroke = 0
         self._after_turn = False
 
-    def sensors(self, blocks: Blocks) -> None:
-        """Blocks that wait."""
+    def sensors(self, blocks: JudgedBlocks) -> None:
+        """Add blocks."""
         self._sensors.append(blocks)
         self.blocks += len(blocks.sequence)
 
     def others(self, topic: str, records: Records) -> None:
-        """Messages of `trace`, `applied` or `command` that wait."""
+        """Add messages of `trace`, `applied` or `command`."""
         self._rows[topic].append(rows_of(records, _LAYOUTS[topic]))
 
     def is_full(self, block_s: float) -> bool:
-        """Whether a window can be judged."""
+        """True if a window can be judged."""
         return self.blocks - self._first > WINDOW_BLOCKS + AHEAD_S / block_s
 
     def window(self, is_last: bool, block_s: float) -> Window:
-        """All rows that wait, at least one block; the end of the window is where it must end, at the latest."""
-        blocks = Blocks(*(np.concatenate(columns) for columns in zip(*self._sensors, strict=True)))
+        """All pending rows, at least one block; `end` is the latest end of the window."""
+        blocks = JudgedBlocks(*(np.concatenate(columns) for columns in zip(*self._sensors, strict=True)))
         rows = {name: np.concatenate(parts) for name, parts in self._rows.items()}
         return Window(
             blocks,
@@ -168,13 +168,13 @@ class Waiting:
         )
 
     def judged(self, window: Window, turned: bool, stroke: int, block_s: float) -> None:
-        """Forget the rows that no later window needs.
+        """Drop the rows that no later window needs.
 
         Args:
-            window: that was judged.
-            turned: whether the drive turned at its end.
-            stroke: number of the stroke with which the next window begins.
-            block_s: length of a block.
+            window: judged.
+            turned: the drive turned at its end.
+            stroke: number of the first stroke of the next window.
+            block_s: duration of a block.
 
         """
         keep = max(window.end - round(BEHIND_S / block_s), 0)
@@ -188,14 +188,14 @@ class Waiting:
         self._after_turn, self._stroke = turned, stroke
 
 
-class Moved:
-    """Whether the channels of place moved at all so far: one that is not there shows one number."""
+class HasMoved:
+    """Whether a position channel has moved so far: a missing channel is constant."""
 
     def __init__(self) -> None:
         self._ends: dict[str, tuple[float, float]] = {}
 
     def __call__(self, name: str, place_m: npt.NDArray[np.floating[Any]]) -> bool:
-        """With the places of one more window, [bins]."""
+        """Add the positions of a window, [bins]; True if the channel has moved so far."""
         known_m = place_m[np.isfinite(place_m)]
         low_m, high_m = self._ends.get(name, (math.inf, -math.inf))
         if len(known_m):

@@ -1,20 +1,21 @@
-"""A rig looked at while it runs: a page in a browser (`stickslip serve`) and a screen of a terminal (`stickslip watch`).
+"""A running rig, live: a browser page (`stickslip serve`) and a terminal screen (`stickslip watch`).
 
-listener   a viewer on the bus, which dials again whenever the rig was away; what it cannot take in time is dropped and counted
+listener   viewer session on the bus; reconnects whenever the rig was away; drops and counts messages that overflow its queue
 tables     messages of one topic as one array
-buckets    signals as smallest, mean and largest sample of some blocks; what was in force
+buckets    signals reduced to smallest, mean and largest sample per few blocks; the modes and limits in force
 trigger    samples at full rate around a slip
-tally      what was lost, how late commands were
-answer     the state of a rig in one sentence, and what its words mean
-view       all of it together: what a person is shown now
+tally      lost messages, latency of commands
+answer     state of a rig in one sentence; meanings of the words
+view       all of these together: the state to display
 frames     the same as bytes for a browser
 gate       which requests of a browser are answered
-token      the word that lets a person arm a rig from the page
-viewers    browsers that are connected; one that is too slow is dropped
-server     one port of this computer: the page, the frames, a person's words
-foxglove   the same for Foxglove and Lichtblick, by the extra `foxglove`
-page       the page: uPlot and the curves of `cockpit.review` inside
+token      secret that permits arming from the page
+viewers    connected browsers; slow ones are dropped
+server     one local port: the page, the frames, the operator's commands
+foxglove_server  the same for Foxglove and Lichtblick, with the extra `foxglove`
+operator_link  operator commands from the page
+page       HTML page with uPlot and the curves of `cockpit.review`
 screen     the same in a terminal
 
-Nothing here is in the loop: a session of the role viewer may put nothing on the bus, and the rig waits for no viewer.
+None of this is in the control loop: a viewer session may publish nothing, and the rig waits for no viewer.
 """

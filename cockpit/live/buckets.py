@@ -1,7 +1,7 @@
-"""Signals in buckets of some blocks: smallest, mean and largest sample, so that a slip of some ms shows, and what was in force.
+"""Signals reduced to buckets of a few blocks: smallest, mean and largest sample, so that a slip of a few ms stays visible.
 
-A bucket is 5 ms, or one block where a block is longer. The grid of buckets is that of the numbers of the blocks: what was lost
-is a hole in a curve, and never a curve that is drawn across it.
+A bucket is 5 ms, or one block where a block is longer. Buckets are aligned to block numbers, so that lost blocks leave a hole
+in a curve instead of a line drawn across it.
 """
 
 from typing import Any, NamedTuple
@@ -12,17 +12,17 @@ import numpy.typing as npt
 from bridge.wire.messages import CHANNELS, Records
 
 _BUCKET_NS = 5_000_000
-# Buckets for which messages of rig and controller may still come after the block; fewer: what answers a block is missing in it
+# Buckets held back until the rig's and the controller's messages about their blocks have arrived. Fewer: those are missing
 _BEHIND = 2
-# Messages of a topic that may wait for their blocks, 4 s; a controller whose rig is silent says the same 1000 times a second
+# Queue of a topic for messages whose block has not arrived: 4 s. A controller whose rig is silent repeats itself at 1 kHz
 _WAIT = 4096
-_MOST = 12_000  # that are kept for who opens a page: 60 s
+_MOST = 12_000  # buckets kept for newly opened pages: 60 s
 _OF_TRACE = (
     *("vibration_velocity_mps", "drive_velocity_mps", "wanted_velocity_mps", "wanted_amplitude_m"),
     *("time_to_slip_s", "breakaway_force_N", "slips", "mode", "state", "reason", "limit"),
 )
 _OF_APPLIED = (*("amplitude_m", "frequency_Hz", "guard_state", "cause", "guard_limit", "fallback", "heat_share"),)
-_UNKNOWN = {"time_to_slip_s": -1.0, "breakaway_force_N": 0.0, "frequency_Hz": 0.0}  # values that stand for "not known"
+_UNKNOWN = {"time_to_slip_s": -1.0, "breakaway_force_N": 0.0, "frequency_Hz": 0.0}  # values that mean "not known"
 LEAST, MEAN, MOST = "least", "mean", "most"
 COLUMNS = (
     *(f"{channel}.{which}" for channel in CHANNELS for which in (LEAST, MEAN, MOST)),
@@ -34,27 +34,27 @@ Floats = npt.NDArray[np.float32]
 
 
 class Buckets(NamedTuple):
-    """A stretch of buckets without a gap in their numbers."""
+    """Consecutive buckets."""
 
     first: int  # number of the first; bucket n ends (n + 1) bucket lengths after the start of the run
     values: Floats  # [columns, buckets], SI units; nan: not known, or lost
 
     @property
     def end(self) -> int:
-        """The number after the last."""
+        """Number after the last bucket."""
         return self.first + self.values.shape[1]
 
 
 class Bucketing:
-    """Makes buckets of one run.
+    """Reduces one run to buckets.
 
     Args:
-        block_ns: length of a block.
+        block_ns: duration of a block.
 
     """
 
     def __init__(self, block_ns: int) -> None:
-        self.blocks = max(1, round(_BUCKET_NS / block_ns))  # of a bucket
+        self.blocks = max(1, round(_BUCKET_NS / block_ns))  # per bucket
         self.step_s = self.blocks * block_ns * 1e-9
         self._rest: dict[str, list[Records]] = {"sensors": [], "trace": [], "applied": []}
         self._next: int | None = None
@@ -62,7 +62,7 @@ class Bucketing:
         self._kept: list[Buckets] = []
 
     def add(self, topic: str, table: Records, blocks: npt.NDArray[Any]) -> None:
-        """Take messages with the numbers of their blocks, [messages], in order."""
+        """Add messages in order; `blocks`: numbers of their blocks, [messages]."""
         if not len(table):
             return
         rest = [*self._rest[topic], table]
@@ -75,7 +75,7 @@ class Bucketing:
                 self._next = int(blocks[0]) // self.blocks
 
     def ready(self) -> Buckets | None:
-        """The buckets that are over since the last call; None where there is none."""
+        """Buckets completed since the last call; None without any."""
         if self._next is None:
             return None
         end = (self._newest + 1) // self.blocks - _BEHIND
@@ -107,10 +107,10 @@ class Bucketing:
         return made
 
     def kept(self) -> Buckets | None:
-        """Those of the last minute in one; None before the first."""
+        """All buckets of the last minute; None before the first."""
         if not self._kept:
             return None
-        values = np.concatenate([one.values for one in self._kept], axis=1)[:, -_MOST:]
+        values = np.concatenate([bucket.values for bucket in self._kept], axis=1)[:, -_MOST:]
         return Buckets(self._kept[-1].end - values.shape[1], values)
 
     def _keep(self, made: Buckets) -> None:
@@ -119,7 +119,7 @@ class Bucketing:
             del self._kept[0]
 
     def _taken(self, topic: str, end: int) -> tuple[Records, npt.NDArray[np.int64]]:
-        """The messages of buckets before `end`, with the numbers of their buckets; later ones stay."""
+        """Remove and return the messages of buckets before `end`, with their bucket numbers."""
         if not self._rest[topic]:
             return np.empty(0, np.uint8), np.empty(0, np.int64)
         table = np.concatenate(self._rest[topic]) if len(self._rest[topic]) > 1 else self._rest[topic][0]
@@ -130,13 +130,13 @@ class Bucketing:
 
 
 def block_numbers(topic: str, table: Records) -> npt.NDArray[Any]:
-    """The numbers of the blocks that messages are about, [messages]; of one that is about none, a number before all."""
+    """Block numbers of messages, [messages]."""
     numbers = table["block"] if topic == "trace" else table["sequence"]
     return np.minimum(numbers, np.uint64(2**62)).astype(np.int64)
 
 
 def _range(samples: Records, starts: npt.NDArray[np.int64]) -> dict[str, Records]:
-    """Smallest, mean and largest sample of each stretch of blocks, [stretches]; `samples` is [blocks, samples]."""
+    """Smallest, mean and largest sample per group of blocks, [groups]; `samples` is [blocks, samples]."""
     blocks = np.diff(np.append(starts, len(samples)))
     return {
         LEAST: np.minimum.reduceat(samples.min(axis=1), starts),

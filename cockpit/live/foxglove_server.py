@@ -1,7 +1,7 @@
-"""The live signals for Foxglove and Lichtblick: the topic `scope` of a log, and events as `foxglove.Log`, over a web socket.
+"""The live signals for Foxglove and Lichtblick over a WebSocket: the topic `scope` of a log, and events as `foxglove.Log`.
 
-Protocol, port and what a slow client loses are those of foxglove-sdk (https://docs.foxglove.dev/docs/sdk), which the extra
-`foxglove` brings. A client can only read: no capability is offered.
+foxglove-sdk (https://docs.foxglove.dev/docs/sdk), installed by the extra `foxglove`, defines the protocol, the port and which
+messages a slow client loses. Clients can only read: no capability is offered.
 """
 
 import time
@@ -12,23 +12,23 @@ import numpy as np
 
 from bridge.faults import Fault
 from bridge.log.viewers import foxglove_log
-from bridge.log.viewers.stretches import Blocks, Stretches
+from bridge.log.viewers.stretches import ScopeBlocks, Stretches
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import CHANNELS, SCOPE
 from bridge.wire.payloads import file_descriptor_set
 from bridge.wire.topics import SCOPE as SCOPE_TOPIC
-from cockpit.live.view import Step
+from cockpit.live.view import ViewUpdate
 
 HOST = "127.0.0.1"
-PORT = 8765  # what these programs offer when they are asked to connect
-_FAR_NS = 500_000_000  # between the computer's clock and that of the run, from which the run's is set anew
+PORT = 8765  # default of the Foxglove and Lichtblick connection dialogs
+_FAR_NS = 500_000_000  # disagreement of the computer's and the run's clock above which the run's start is re-estimated
 
 
 class Foxglove:
-    """A server of this computer alone; a context manager.
+    """A server on the loopback address only; a context manager.
 
     Args:
-        port: 0: any that is free.
+        port: 0: any free port.
 
     Raises Fault ENDPOINT_BUSY, ModuleNotFoundError without the extra.
 
@@ -37,7 +37,7 @@ class Foxglove:
     def __init__(self, port: int) -> None:
         import foxglove  # pyright: ignore[reportMissingImports]
 
-        self._context: Any = foxglove.Context()  # kept: its channels go with it
+        self._context: Any = foxglove.Context()  # keep a reference: its channels are deleted with it
 
         def channel(topic: str, name: str, described: bytes) -> Any:
             schema = foxglove.Schema(name=name, encoding="protobuf", data=described)
@@ -45,10 +45,10 @@ class Foxglove:
 
         described = file_descriptor_set(SCOPE_TOPIC.message)
         self._scope = channel("/" + SCOPE_TOPIC.name, SCOPE_TOPIC.message.DESCRIPTOR.full_name, described)
-        said = foxglove_log.FILES.SerializeToString()
-        self._log = channel("/" + foxglove_log.TOPIC, foxglove_log.SCHEMA, said)
+        log_files = foxglove_log.FILES.SerializeToString()
+        self._log = channel("/" + foxglove_log.TOPIC, foxglove_log.SCHEMA, log_files)
         self._stretches = Stretches()
-        self._began_ns: int | None = None  # of the run, by this computer's clock
+        self._began_ns: int | None = None  # start of the run by this computer's clock
         try:
             self._server: Any = foxglove.start_server(name="stickslip", host=HOST, port=port, context=self._context)
         except (RuntimeError, OSError) as error:
@@ -66,8 +66,8 @@ class Foxglove:
     ) -> None:
         self._server.stop()
 
-    def tell(self, step: Step) -> None:
-        """Send what is new."""
+    def tell(self, step: ViewUpdate) -> None:
+        """Send the news of a step."""
         if step.anew:
             self._stretches = Stretches()
             self._began_ns = None
@@ -78,19 +78,19 @@ class Foxglove:
         if table is not None:
             t_ns = table["t_ns"].astype(np.int64)
             samples = np.stack([table[name] for name in CHANNELS])
-            records, log_ns = self._stretches.made(Blocks(t_ns, self._since(t_ns), samples), last=False)
+            records, log_ns = self._stretches.made(ScopeBlocks(t_ns, self._since(t_ns), samples), last=False)
             if records is not None:
                 size = SCOPE.size
                 data = records.tobytes()
                 for number, at_ns in enumerate(log_ns.tolist()):
                     self._scope.log(data[number * size : (number + 1) * size], log_time=at_ns)
         now_ns = time.time_ns()
-        for one in step.events:
-            event = wire.Event(source=one.source, code=one.code, text=one.text)
+        for heard in step.events:
+            event = wire.Event(source=heard.source, code=heard.code, text=heard.text)
             self._log.log(foxglove_log.of_event(event, now_ns), log_time=now_ns)
 
     def _since(self, t_ns: Any) -> Any:
-        """Times of the run on this computer's clock: even, as blocks come in handfuls."""
+        """Times of the run on this computer's clock. Evenly spaced, although blocks arrive in batches."""
         newest_ns = time.time_ns() - int(t_ns[-1])
         if self._began_ns is None or abs(newest_ns - self._began_ns) > _FAR_NS:
             self._began_ns = newest_ns

@@ -9,21 +9,21 @@ import numpy.typing as npt
 
 from bridge.files import strict_json
 
-_ALIGNED = 4  # a browser reads floats only at multiples of their length
+_ALIGNED = 4  # a browser reads float32 only at offsets divisible by 4
 
 
 def frame(kind: str, table: dict[str, Any], columns: npt.NDArray[np.float32] | None = None) -> bytes:
-    """The bytes of one frame.
+    """Bytes of one frame.
 
     Args:
-        kind: what it is, for the page.
-        table: what JSON can hold.
-        columns: [columns, values]; the JSON says how many of each.
+        kind: kind of frame, for the page.
+        table: values that JSON can represent.
+        columns: [columns, values]; the JSON contains both counts.
 
     """
     rows, count = columns.shape if columns is not None else (0, 0)
-    told = {"kind": kind, **table, "rows": rows, "count": count}
-    text = json.dumps(strict_json(told), allow_nan=False, separators=(",", ":")).encode()
+    header = {"kind": kind, **table, "rows": rows, "count": count}
+    text = json.dumps(strict_json(header), allow_nan=False, separators=(",", ":")).encode()
     text += b" " * (-len(text) % _ALIGNED)
     data = np.ascontiguousarray(columns, "<f4").tobytes() if columns is not None else b""
     return struct.pack("<I", len(text)) + text + data

@@ -1,7 +1,7 @@
-"""Which requests are answered: those of the page that was opened on this computer, under the names that the page may have.
+"""Filter of HTTP requests: answers only the page opened on this computer under its permitted names.
 
-A page of another site can send a browser here, and a name that an attacker owns can lead to 127.0.0.1: the first is told by
-`Origin`, the second by `Host`.
+`Origin` exposes a page of another site that sends the browser here; `Host` exposes an attacker's domain name that resolves to
+127.0.0.1.
 """
 
 from collections.abc import Sequence
@@ -12,23 +12,23 @@ NAMES = ("127.0.0.1", "localhost")
 
 
 class Refusal(NamedTuple):
-    """An HTTP status, and a line for a person."""
+    """An HTTP status and a readable line."""
 
     status: int
     line: str
 
 
-NO_METHOD = Refusal(405, "GET alone")
+NO_METHOD = Refusal(405, "only GET is allowed")
 
 
 def refusal(path: str, hosts: Sequence[str], origins: Sequence[str], port: int, upgrades: bool) -> Refusal | None:
-    """Why a request is not answered; None where it is.
+    """Reason for which a request is refused; None if it is accepted.
 
     Args:
-        path: of the request, as it came.
+        path: of the request, unchanged.
         hosts: every value of the header `Host`.
         origins: every value of the header `Origin`.
-        port: that the server listens at.
+        port: of the server.
         upgrades: whether the request wants a web socket.
 
     """
@@ -36,9 +36,11 @@ def refusal(path: str, hosts: Sequence[str], origins: Sequence[str], port: int, 
     if len(hosts) != 1 or hosts[0].lower() not in names:
         return Refusal(421, f"Host must be {' or '.join(names)}: open the page under one of these")
     if path not in (PAGE, STREAM):
-        return Refusal(404, f"there is {PAGE} alone")
+        return Refusal(404, f"not found; the page is {PAGE}")
     if path == PAGE:
         return None
     if len(origins) != 1 or origins[0].lower() not in [f"http://{name}" for name in names]:
-        return Refusal(403, "Origin must be that of the page: another site may not listen, and not say a word to a rig")
-    return None if upgrades else Refusal(426, "this path is a web socket")
+        return Refusal(
+            403, "Origin must be the page itself: other sites may neither read from a rig nor send it commands"
+        )
+    return None if upgrades else Refusal(426, "this path is a WebSocket")

@@ -1,4 +1,4 @@
-"""A viewer on the bus, for as long as somebody looks: it dials again whenever the rig was away, and never holds up anyone."""
+"""Viewer session on the bus: reconnects whenever the rig was away, and delays no other process."""
 
 import contextlib
 import json
@@ -14,39 +14,42 @@ from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
 
 EVENTS = (PLANT_EVENT, CONTROLLER_EVENT, RECORDER_EVENT)
 ROLES = ("plant", "controller", "recorder")
-_LIMIT = 6000  # messages that may wait: 2 s of a run. Larger: who was held up shows what is long past
-_DIAL_S = 0.5  # of one attempt; longer: Ctrl-C is late by as much
-_AGAIN_S = 0.2  # between two attempts while no rig is there
+_LIMIT = (
+    6000  # queued messages: 2 s of a run. Larger: a stalled viewer shows older data. Smaller: it drops messages sooner
+)
+_DIAL_S = 0.5  # timeout of one attempt; Ctrl-C is delayed by up to as much
+_AGAIN_S = 0.2  # pause between two attempts
 _LOOK_S = 0.05
-_UNLINKED_S = 1.0  # from which a session is opened anew, with the password of the day; Zenoh alone mends shorter cuts
+_UNLINKED_S = (
+    1.0  # without a link before the session is reopened with the current password; Zenoh itself reconnects shorter cuts
+)
 _HEADER_S = 0.5
 
 
 class Presence(NamedTuple):
-    """Who is on the bus at one instant."""
+    """Participants on the bus at one instant."""
 
-    linked: bool  # whether there is a link to the rig
-    roles: frozenset[str]  # where the link is cut, those before, for as long as it may mend
-    trouble: str  # why there is no session, where it is more than that nobody answers
+    linked: bool  # the link to the rig is up
+    roles: frozenset[str]  # while the link is down: the last known, until it is given up
+    trouble: str  # why no session can be opened; empty if merely no peer answers
 
 
-_NOBODY = Presence(False, frozenset(), "")
+_NO_PRESENCE = Presence(False, frozenset(), "")
 
 
 class Listener:
-    """Follows a bus in a thread of its own; a context manager.
+    """Follows a bus in a separate thread; a context manager.
 
     Args:
-        config: of the bus.
+        config: connection to the bus.
 
-    `inbox` holds the messages of the signals and events that came, `presence` who is there, `headers` the configurations of rig
-    and controller by role.
+    `inbox`: received signals and events; `presence`: participants; `headers`: configurations of rig and controller by role.
 
     """
 
     def __init__(self, config: BusConfig) -> None:
         self.inbox = Inbox(_LIMIT)
-        self.presence = _NOBODY
+        self.presence = _NO_PRESENCE
         self.headers: dict[str, Any] = {}
         self._config = config
         self._over = threading.Event()
@@ -71,7 +74,7 @@ class Listener:
                         bus.listen(topic, self.inbox.push)
                     for topic in EVENTS:
                         bus.listen(topic, self.inbox.keep)
-                    realtime.hasten()
+                    realtime.raise_priority()
                     self._while_linked(bus)
             except Fault as fault:
                 trouble = "" if fault.kind.code == "NO_PEER" else fault.line
@@ -80,21 +83,21 @@ class Listener:
 
     def _while_linked(self, bus: Bus) -> None:
         linked_s = time.monotonic()
-        came: list[int] = []
+        arrivals: list[int] = []
         while not self._over.wait(_LOOK_S):
             now_s = time.monotonic()
             linked = bus.linked()
             linked_s = now_s if linked else linked_s
             if now_s - linked_s > _UNLINKED_S:
                 return
-            if not linked:  # tokens go with the link, and most cuts are mended within some hundredths of a second
+            if not linked:  # liveliness tokens vanish with the link; most cuts last less than 0.1 s
                 self.presence = self.presence._replace(linked=False)
                 continue
             self.presence = Presence(linked, frozenset(filter(bus.alive, ROLES)), "")
             counts = [bus.came(role) for role in ROLES[:2]]
-            if linked and counts != came:
-                came = counts
-                there = [role for role in ROLES[:2] if bus.alive(role)]
-                for role, header in bus.headers(there, _HEADER_S, self._over).items():
-                    with contextlib.suppress(ValueError, RecursionError):  # of another program
+            if linked and counts != arrivals:
+                arrivals = counts
+                alive = [role for role in ROLES[:2] if bus.alive(role)]
+                for role, header in bus.headers(alive, _HEADER_S, self._over).items():
+                    with contextlib.suppress(ValueError, RecursionError):  # header of a foreign program
                         self.headers[role] = json.loads(header.configuration)

@@ -1,11 +1,11 @@
-// The page: listens to the server, shows what comes, and says when nothing comes. A value that is old is not shown as one of now.
+// The page: shows the frames of the server and reports when they stop. Old values are never shown as current.
 "use strict";
 
-const CUT_MS = 1500; // without a frame from which the server counts as gone: it sends 20 a second
+const CUT_MS = 1500; // without a frame before the connection counts as lost; the server sends 20 frames per second
 const LOOK_MS = 250;
 const AGAIN_MS = 1000;
-const OLD_MS = 20_000; // from which what a word came to is no longer the state of the rig
-const READ_MS = 200; // between two figures that a person is to read
+const OLD_MS = 20_000; // after which the outcome of a command is hidden: it is no longer the state of the rig
+const READ_MS = 200; // between two updates of the figures, so that they can be read
 const WINDOWS_S = [2, 10, 30, 60];
 const EVENTS_SHOWN = 200;
 const element = (id) => document.getElementById(id);
@@ -13,7 +13,7 @@ const element = (id) => document.getElementById(id);
 let hello = null, store = null, scope = null, axis = null, socket = null, helps = new Map();
 let plots = [], heard_ms = performance.now(), window_s = 10, follows = true, dirty = false, phase = "", said = "", read_ms = 0, old = 0;
 
-/** Build everything that a run needs; `step_s` is null where none was seen. */
+/** Build the display of a run; `step_s` is null without a run. */
 function begin(step_s) {
   element("curves").replaceChildren();
   element("ribbon").replaceChildren();
@@ -25,7 +25,7 @@ function begin(step_s) {
   element("step").textContent = `${Number((1e3 * step_s).toPrecision(3))} ms`;
   axis = new TimeAxis(0, KEPT_S);
   const show = axis.show.bind(axis);
-  axis.show = (from, to) => { // a person who zooms wants to look, and not to see it move on
+  axis.show = (from, to) => { // zooming stops the scrolling
     follows = false;
     show(from, to);
     refresh();
@@ -51,15 +51,15 @@ function begin(step_s) {
   }
 }
 
-/** Draw the curves of the time that is shown. */
+/** Draw the curves of the visible time. */
 function refresh() {
   if (!store || store.end === null) return;
   axis.least = store.timeOf(store.first);
   axis.most = Math.max(store.timeOf(store.end - 1), axis.least + 1e-3);
-  const begin_s = Math.max(axis.most - window_s, axis.least); // a run that is younger than the window grows into it
+  const begin_s = Math.max(axis.most - window_s, axis.least); // a run shorter than the window fills it gradually
   const [from, to] = follows ? [begin_s, begin_s + window_s] : [axis.from, axis.to];
   if (follows) [axis.from, axis.to] = [from, to];
-  for (const one of plots) one.plot.setData(store.part(one.panel, from, to), false);
+  for (const { panel, plot } of plots) plot.setData(store.part(panel, from, to), false);
   for (const listener of axis.listeners) listener();
   element("shown").textContent = `${axis.from.toFixed(2)} to ${axis.to.toFixed(2)} s`;
   element("follow").classList.toggle("on", follows);
@@ -69,20 +69,20 @@ function showNow(now) {
   document.body.classList.toggle("off", now.phase !== "live");
   element("answer").className = `verdict ${now.answer.level}`;
   if (said !== now.answer.text) element("said").replaceChildren(...rich((said = now.answer.text))); // once: it is read aloud
-  element("whose").textContent = [now.rig && `rig ${now.rig}`, now.roles?.length ? `on the bus: ${now.roles.join(", ")}` : "nobody is on the bus"].filter(Boolean).join("; ");
+  element("whose").textContent = [now.rig && `rig ${now.rig}`, now.roles?.length ? `on the bus: ${now.roles.join(", ")}` : "no process on the bus"].filter(Boolean).join("; ");
   document.title = `${now.phase === "live" ? (now.guard_state === "FAULT" ? "FAULT" : (now.mode ?? "no controller")) : now.phase}: stickslip`;
   if (now.phase === phase && performance.now() - read_ms < READ_MS) return;
   [phase, read_ms] = [now.phase, performance.now()];
   element("tiles").replaceChildren(...tilesOf(now));
-  element("state").replaceChildren(table(["", "now", "which means"], stateRows(now, helps)));
+  element("state").replaceChildren(table(["", "now", "meaning"], stateRows(now, helps)));
   element("lost").replaceChildren(made("p", lostWords(now), { className: "small" }));
 }
 
-/** Draw in the plots what holds now: limits of the stroke, the force at which it breaks away. */
+/** Draw the current limits of the stroke and the breakaway force. */
 function showLimits(now) {
   for (const { panel } of plots) {
     if (panel.axis === "amplitude") panel.limits = (now.limits ?? []).map((one) => ({ words: one.words, value: 1e9 * one.value }));
-    if (panel.slips) panel.limits = now.breakaway_force_N ? [{ words: "breaks away, as learnt", value: now.breakaway_force_N }] : [];
+    if (panel.slips) panel.limits = now.breakaway_force_N ? [{ words: "breakaway force, learned", value: now.breakaway_force_N }] : [];
   }
 }
 
@@ -102,7 +102,7 @@ function receive(buffer) {
     hello = told;
     helps = new Map(told.words.map((one) => [`${one.column} ${one.word}`, one.help]));
     scope = new ScopeView(told);
-    element("events").replaceChildren(table(["time [s]", "here at", "who", "event", "NE 107", "its words", "what it means, and what to do"], []));
+    element("events").replaceChildren(table(["time [s]", "local time", "source", "event", "NE 107", "text", "meaning and remedy"], []));
     begin(told.step_s);
   } else if (told.kind === "anew") {
     begin(told.step_s);
@@ -124,7 +124,7 @@ function receive(buffer) {
   document.body.dataset.ready = "yes";
 }
 
-/** What came of a word, with its time of day, as the rig goes on; what is done is old after a while. */
+/** Show the outcome of a command with its time of day; a success is hidden after OLD_MS. */
 function tell(text, bad) {
   const place = element("told");
   place.textContent = `${new Date().toLocaleTimeString([], { hour12: false })}  ${text}`;
@@ -134,9 +134,9 @@ function tell(text, bad) {
   place.hidden = false;
 }
 
-/** Nothing is known without the server: say so, and blank what was. */
+/** Without the server the state is unknown: report that, and blank the old values. */
 function cut() {
-  showNow({ phase: "cut", answer: { level: "bad", text: "no connection to `stickslip serve`: nothing is known, and STOP of this page does nothing; use `stickslip stop` in a terminal, or the amplifier's switch" } });
+  showNow({ phase: "cut", answer: { level: "bad", text: "no connection to `stickslip serve`: the state is unknown, and STOP on this page does nothing; use `stickslip stop` in a terminal, or the amplifier's switch" } });
 }
 
 function connect() {
@@ -152,18 +152,18 @@ function connect() {
 
 function say(word) {
   if (socket?.readyState !== WebSocket.OPEN) {
-    tell(`${word.toLowerCase()}: NOT SAID: there is no connection to the server. Use \`stickslip ${word.toLowerCase()}\` in a terminal, or the amplifier's switch`, true);
+    tell(`${word.toLowerCase()}: NOT SENT: no connection to the server. Use \`stickslip ${word.toLowerCase()}\` in a terminal, or the amplifier's switch`, true);
     return;
   }
   socket.send(JSON.stringify({ word, token: word === "STOP" ? "" : element("token").value.trim() }));
-  if (word !== "SCOPE") tell(`${word.toLowerCase()}: said, waiting for the rig`, false);
+  if (word !== "SCOPE") tell(`${word.toLowerCase()}: sent, waiting for the rig`, false);
 }
 
 element("stop").addEventListener("click", () => {
   element("stop").classList.add("busy");
   say("STOP");
 });
-element("person").addEventListener("submit", (event) => event.preventDefault()); // Enter in the field says nothing
+element("person").addEventListener("submit", (event) => event.preventDefault()); // Enter in the field sends no command
 for (const button of document.querySelectorAll("[data-word]")) button.addEventListener("click", () => say(button.dataset.word));
 element("take").addEventListener("click", () => say("SCOPE"));
 element("follow").addEventListener("click", () => {
@@ -174,7 +174,7 @@ for (const seconds of WINDOWS_S) {
   const button = made("button", `${seconds} s`, { className: seconds === window_s ? "on" : "" });
   button.addEventListener("click", () => {
     [window_s, follows, dirty] = [seconds, true, true];
-    for (const one of element("windows").children) one.classList.toggle("on", one === button);
+    for (const choice of element("windows").children) choice.classList.toggle("on", choice === button);
   });
   into("windows", button);
 }
@@ -182,7 +182,7 @@ let looked_ms = performance.now();
 setInterval(() => {
   const late_ms = performance.now() - looked_ms - LOOK_MS;
   looked_ms = performance.now();
-  // a page that stood still itself has frames that wait to be read
+  // a page that stalled itself has unread frames
   if (late_ms < LOOK_MS && looked_ms - heard_ms > CUT_MS && hello) {
     cut();
     socket?.close();

@@ -1,4 +1,4 @@
-"""The page of a rig that is watched: one HTML file without a word from elsewhere, made once when the server starts."""
+"""The live page: one self-contained HTML file, assembled when the server starts."""
 
 import base64
 import hashlib
@@ -13,22 +13,22 @@ _SCRIPTS = ("store.js", "state.js", "scope.js", "live.js")
 
 
 class Page:
-    """The bytes of the page, and what a browser may do with it.
+    """The page as bytes, with its content security policy.
 
     Args:
-        port: that the server listens at.
+        port: of the server.
 
     """
 
     def __init__(self, port: int) -> None:
         parts = {
-            "STYLE": "\n".join([text_of("vendor/uPlot.min.css"), text_of("page.css"), _own("live.css")]),
+            "STYLE": "\n".join([text_of("vendor/uPlot.min.css"), text_of("page.css"), _file_text("live.css")]),
             "UPLOT": uplot(),
-            "SCRIPT": "\n".join([*map(text_of, SHARED_SCRIPTS), *map(_own, _SCRIPTS)]),
+            "SCRIPT": "\n".join([*map(text_of, SHARED_SCRIPTS), *map(_file_text, _SCRIPTS)]),
         }
-        page = filled(_own("live.html"), parts)
+        page = filled(_file_text("live.html"), parts)
         self.body = page.encode()
-        # the scripts that were sent may run, and no other; the page may talk to this server, and to nobody else
+        # only the scripts of this page may run, and the page may connect to this server only
         scripts = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
         hashes = " ".join(f"'sha256-{_sha256(script)}'" for script in scripts)
         streams = " ".join(f"ws://{name}:{port}" for name in NAMES)
@@ -38,7 +38,7 @@ class Page:
         )
 
 
-def _own(name: str) -> str:
+def _file_text(name: str) -> str:
     return (_FOLDER / name).read_text(encoding="utf-8")
 
 

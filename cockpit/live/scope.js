@@ -1,7 +1,7 @@
-// The scope: samples at full rate from before to after a slip. The newest is shown, unless a person holds one.
+// The scope: samples at full rate around a slip. Shows the newest capture unless the operator holds one.
 "use strict";
 
-const CAPTURES = 8; // that are kept to choose from
+const CAPTURES = 8; // kept for selection
 
 class ScopeView {
   constructor(hello) {
@@ -14,7 +14,7 @@ class ScopeView {
     this.captures = [];
     document.getElementById("captures").replaceChildren();
     document.getElementById("scope").replaceChildren();
-    document.getElementById("scopetold").textContent = "Waits for a slip that the controller counts.";
+    document.getElementById("scopetold").textContent = "Waiting for a slip counted by the controller.";
   }
 
   add(capture, values) {
@@ -44,7 +44,7 @@ class ScopeView {
     const log = { label: "", bands: [], slips: [], in_charge_from_s: null };
     const lost = capture.missing ? ` ${capture.missing} blocks are missing.` : "";
     document.getElementById("scopetold").textContent =
-      `Capture ${capture.number}: ${capture.cause} at ${capture.t_s.toFixed(3)} s of the run, which is 0 here; a sample every ${(1e6 * capture.sample_s).toFixed(0)} µs.${lost}`;
+      `Capture ${capture.number}: ${capture.cause} at ${capture.t_s.toFixed(3)} s of the run, shown as 0; one sample every ${(1e6 * capture.sample_s).toFixed(0)} µs.${lost}`;
     for (const panel of this.panels) {
       const curves = panel.curves.map((curve) => {
         const from = this.channels.indexOf(curve.name) * capture.count;

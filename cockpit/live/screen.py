@@ -1,4 +1,4 @@
-"""`stickslip watch`: a rig that runs on one screen of a terminal, or as a line of JSON now and then."""
+"""`stickslip watch`: a running rig on one terminal screen, or as periodic lines of JSON."""
 
 import collections
 import json
@@ -18,18 +18,18 @@ from bridge.units import counted, quantity
 from bridge.wire.zenoh_link import BusConfig
 from cockpit.live.answer import BAD, GOOD, LOOK, OFF, help_of
 from cockpit.live.listener import Listener
-from cockpit.live.view import LIVE, Said, View
+from cockpit.live.view import LIVE, EventRow, View
 
 _PERIOD_S = 0.1
 _STYLES = {GOOD: "bold green", LOOK: "bold yellow", BAD: "bold red", OFF: "bold"}
-_HEAD_LINES = 18  # of a screen above the events
+_HEAD_LINES = 18  # on the screen above the events
 _FEWEST_EVENTS = 3
 _UNKNOWN = "-"
 
 
 def lines(bus: BusConfig, stop: threading.Event, every_s: float) -> None:
-    """Print a line of JSON each `every_s` until `stop` is set: what holds then, and the events since the last one."""
-    events: list[Said] = []
+    """Print a line of JSON each `every_s` until `stop` is set: the current state, and the events since the line before."""
+    events: list[EventRow] = []
     with Listener(bus) as listener:
         view = View(listener, bus.endpoint)
         due_s = time.monotonic() + every_s
@@ -38,19 +38,19 @@ def lines(bus: BusConfig, stop: threading.Event, every_s: float) -> None:
             if time.monotonic() < due_s:
                 continue
             due_s = max(due_s + every_s, time.monotonic())
-            told = view.now() | {"events": [event._asdict() for event in events]}
-            print(json.dumps(strict_json(told), allow_nan=False), flush=True)
+            state = view.now() | {"events": [event._asdict() for event in events]}
+            print(json.dumps(strict_json(state), allow_nan=False), flush=True)
             events = []
 
 
 def show(bus: BusConfig, stop: threading.Event) -> None:
-    """Show the rig on one screen until `stop` is set; where there is no terminal, a line whenever the state is another."""
+    """Show the rig on one screen until `stop` is set; without a terminal, print a line at each change of state."""
     console = Console(file=sys.stdout, highlight=False)
-    events: collections.deque[Said] = collections.deque(maxlen=100)
+    events: collections.deque[EventRow] = collections.deque(maxlen=100)
     with Listener(bus) as listener:
         view = View(listener, bus.endpoint)
         if not console.is_terminal:
-            _tell_changes(view, stop)
+            _print_changes(view, stop)
             return
         with Live(console=console, screen=True, auto_refresh=False) as live:
             while not stop.wait(_PERIOD_S):
@@ -58,41 +58,43 @@ def show(bus: BusConfig, stop: threading.Event) -> None:
                 live.update(screen_of(view.now(), events, console.height), refresh=True)
 
 
-def _tell_changes(view: View, stop: threading.Event) -> None:
+def _print_changes(view: View, stop: threading.Event) -> None:
     before = ""
     while not stop.wait(_PERIOD_S):
         for event in view.step().events:
             print(_event_line(event), flush=True)
         now = view.now()
-        said = f"{now['phase']} {now.get('mode')} {now.get('reason')} {now.get('guard_state')}"
-        if said != before:
-            before = said
+        state = f"{now['phase']} {now.get('mode')} {now.get('reason')} {now.get('guard_state')}"
+        if state != before:
+            before = state
             print(f"state    {now['answer']['text']}", flush=True)
 
 
-def screen_of(now: Mapping[str, Any], events: collections.deque[Said], height: int) -> RenderableType:
-    """All of it, for a terminal of so many lines."""
+def screen_of(now: Mapping[str, Any], events: collections.deque[EventRow], height: int) -> RenderableType:
+    """The screen for a terminal of `height` lines."""
     answer = now["answer"]
     live = now["phase"] == LIVE
     head = Text(answer["text"], style=_STYLES[answer["level"]])
-    rig = f"rig {now['rig'] or 'of unknown name'}" if live else "no rig is heard"
-    bus = f"{rig}; on the bus: {', '.join(now['roles']) or 'nobody'}"
+    rig = f"rig {now['rig'] or 'of unknown name'}" if live else "no rig connected"
+    bus = f"{rig}; on the bus: {', '.join(now['roles']) or 'no process'}"
     if "recorder" not in now["roles"] and live:
-        bus += "; nothing is recorded"
+        bus += "; not recorded"
     table = Table.grid(padding=(0, 2))
     for name, words in _rows(now):
         table.add_row(Text(name, style="dim"), Text(words, style="" if live else "dim"))
     few = max(_FEWEST_EVENTS, height - _HEAD_LINES)
-    told = [Text(_event_line(event), style=_STYLES[BAD] if event.letter == "F" else "") for event in [*events][:few]]
+    event_lines = [
+        Text(_event_line(event), style=_STYLES[BAD] if event.letter == "F" else "") for event in [*events][:few]
+    ]
     return Group(
-        head, Text(bus, style="dim"), Text(""), table, Text(""), *(told or [Text("no events yet", style="dim")])
+        head, Text(bus, style="dim"), Text(""), table, Text(""), *(event_lines or [Text("no events yet", style="dim")])
     )
 
 
 def _rows(now: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Names and words of each line, for a person."""
+    """Name and text of each line."""
 
-    def told(name: str, unit: str) -> str:
+    def figure(name: str, unit: str) -> str:
         value = now.get(name)
         return _UNKNOWN if value is None else quantity(value, unit)
 
@@ -115,7 +117,7 @@ def _rows(now: Mapping[str, Any]) -> list[tuple[str, str]]:
     else:
         run += f"{counted(now['slips'], 'slip')}, {now['slips_of_late']} in the last {now['slips_over_s']:.0f} s"
     breaks = f", breaks away at {now['breakaway_force_N']:.2f} N" if now.get("breakaway_force_N") else ""
-    next_slip = number("time_to_slip_s", ".2f") + " s" if now.get("time_to_slip_s") is not None else "none is expected"
+    next_slip = number("time_to_slip_s", ".2f") + " s" if now.get("time_to_slip_s") is not None else "none expected"
     return [
         ("run", run if now["phase"] == LIVE else _UNKNOWN),
         ("guard", word("guard_state", "guard_state")),
@@ -125,9 +127,9 @@ def _rows(now: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("limit", word("limit", "limit")),
         ("contact", word("state", "state")),
         ("force", f"{number('drive_force_N', '.2f')} N{breaks}"),
-        ("v_a/v_d", f"{number('velocity_ratio', '.2f')}: v_a {told('vibration_velocity_mps', 'm/s')}, v_d "
-                    f"{told('drive_velocity_mps', 'm/s')}, set point {told('wanted_velocity_mps', 'm/s')}"),
-        ("applied", f"{told('amplitude_m', 'm')}{of} at {number('frequency_Hz', '.0f')} Hz"),
+        ("v_a/v_d", f"{number('velocity_ratio', '.2f')}: v_a {figure('vibration_velocity_mps', 'm/s')}, v_d "
+                    f"{figure('drive_velocity_mps', 'm/s')}, set point {figure('wanted_velocity_mps', 'm/s')}"),
+        ("applied", f"{figure('amplitude_m', 'm')}{of} at {number('frequency_Hz', '.0f')} Hz"),
         ("next slip", next_slip if now.get("mode") else _UNKNOWN),
         ("commands", commands),
         ("lost", _lost(lost)),
@@ -138,11 +140,11 @@ def _lost(lost: Mapping[str, int] | None) -> str:
     if lost is None:
         return _UNKNOWN
     return (
-        f"{counted(lost['controller'], 'block')} to the controller, {counted(lost['viewer'], 'block')} to this screen, "
-        f"of which {counted(lost['dropped'], 'message')} dropped here"
+        f"{counted(lost['controller'], 'block')} to the controller, {counted(lost['viewer'], 'block')} to this screen; "
+        f"{counted(lost['dropped'], 'message')} dropped here"
     )
 
 
-def _event_line(event: Said) -> str:
+def _event_line(event: EventRow) -> str:
     letter = f" ({event.letter})" if event.letter else ""
     return f"{event.t_s:9.3f} s  {event.source:<10} {event.code}{letter}: {event.text}"

@@ -1,4 +1,4 @@
-"""`stickslip serve`: one port of this computer with the page, the frames of a rig, and a person's words to it."""
+"""`stickslip serve`: one local port with the page, the frames of a rig, and the operator's commands to it."""
 
 import asyncio
 import contextlib
@@ -24,25 +24,25 @@ from cockpit.live.buckets import COLUMNS, Buckets
 from cockpit.live.frames import frame
 from cockpit.live.gate import NO_METHOD, PAGE, refusal
 from cockpit.live.listener import Listener
+from cockpit.live.operator_link import SCOPE, Words, wish_of
 from cockpit.live.page import Page
-from cockpit.live.person import SCOPE, Words, wish_of
 from cockpit.live.trigger import Capture
-from cockpit.live.view import Step, View
+from cockpit.live.view import View, ViewUpdate
 from cockpit.live.viewers import MOST_VIEWERS, Viewers
 from cockpit.review.panels import PANELS
 
 HOST = "127.0.0.1"
-PERIOD_S = 0.05  # of a frame
+PERIOD_S = 0.05  # between two frames
 _LATENCY_S = 1.0  # between two histograms
-_MOST_CONNECTIONS = 48  # of more, the oldest that asked for nothing yet gives way, and the newest where all are pages
+_MOST_CONNECTIONS = 48  # beyond them the oldest connection without a request is closed; if all are pages, the newest
 _OPEN_S = 5.0
-_MOST_BYTES = 1024  # of a message of a page; the longest has a word and a token
-_MOST_WISHES = 4  # of one page that wait for an answer
+_MOST_BYTES = 1024  # largest message of a page; the longest contains a command and a token
+_MOST_WISHES = 4  # unanswered commands of one page
 _HEADERS = {
     "Content-Type": "text/html; charset=utf-8",
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
-    "X-Frame-Options": "DENY",  # the buttons must not lie under those of another site
+    "X-Frame-Options": "DENY",  # against click-jacking by another site
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
@@ -51,7 +51,7 @@ _HEADERS = {
 
 
 def listening(port: int) -> socket.socket:
-    """A socket of this computer alone. Raises Fault ENDPOINT_BUSY."""
+    """A socket on the loopback address only. Raises Fault ENDPOINT_BUSY."""
     try:
         return socket.create_server((HOST, port))
     except (OSError, OverflowError) as error:
@@ -64,13 +64,13 @@ class Server:
 
     Args:
         bus: of the rig.
-        token: that arms from the page.
-        port: that it listens at.
-        also: gets each step, as another server does.
+        token: permits arming from the page.
+        port: of `sock` in `run`.
+        also: called with each step, for a second server.
 
     """
 
-    def __init__(self, bus: BusConfig, token: str, port: int, also: Callable[[Step], None] | None = None) -> None:
+    def __init__(self, bus: BusConfig, token: str, port: int, also: Callable[[ViewUpdate], None] | None = None) -> None:
         self._port, self._also = port, also
         self._words = Words(bus, token)
         self._listener = Listener(bus)
@@ -78,12 +78,12 @@ class Server:
         self._page = Page(port)
         self._viewers = Viewers()
         self._connections = 0
-        self._silent: dict[ServerConnection, None] = {}  # connections that are no page yet, oldest first
+        self._silent: dict[ServerConnection, None] = {}  # connections without a page yet, oldest first
         self._latency_s = 0.0
 
     def run(self, sock: socket.socket, stop: threading.Event, ready: Callable[[], None]) -> None:
-        """Serve until `stop` is set; `ready` is called when pages are answered."""
-        # what strangers send is told in no log: an error of theirs is theirs
+        """Serve until `stop` is set; `ready` is called once requests are accepted."""
+        # Do not log malformed requests of clients.
         logger = logging.getLogger("stickslip.live")
         logger.addHandler(logging.NullHandler())
         logger.propagate = False
@@ -96,7 +96,7 @@ class Server:
         outer = self
 
         class Counted(ServerConnection):
-            """A connection that is counted, for whose sake another is ended where there are too many."""
+            """Counts the connections; a new one beyond the limit closes an idle one."""
 
             def connection_made(self, transport: asyncio.BaseTransport) -> None:
                 outer._connections += 1
@@ -117,7 +117,7 @@ class Server:
             sock=sock,
             process_request=self._answer,
             create_connection=Counted,
-            compression=None,  # of numbers that are never the same it saves little, and costs the server's time
+            compression=None,  # measured values compress badly, at the cost of CPU time
             max_size=_MOST_BYTES,
             max_queue=_MOST_WISHES,
             open_timeout=_OPEN_S,
@@ -135,19 +135,19 @@ class Server:
                 await asyncio.sleep(due_s - time.monotonic())
 
     def _answer(self, _connection: ServerConnection, request: Request) -> Response | None:
-        """The page, or why not; None for a web socket that is let in."""
+        """The page or a refusal; None to accept a WebSocket."""
         headers = request.headers
         upgrades = "websocket" in headers.get("Upgrade", "").lower()
         names = headers.get_all("Host"), headers.get_all("Origin")
         no = NO_METHOD if request.method != "GET" else refusal(request.path, *names, self._port, upgrades)
         if no is not None:
             body = f"{no.line}\n".encode()
-            told = _HEADERS | {"Content-Type": "text/plain; charset=utf-8", "Content-Length": str(len(body))}
-            return Response(no.status, http.HTTPStatus(no.status).phrase, Headers(told), body)
+            fields = _HEADERS | {"Content-Type": "text/plain; charset=utf-8", "Content-Length": str(len(body))}
+            return Response(no.status, http.HTTPStatus(no.status).phrase, Headers(fields), body)
         if request.path != PAGE:
             return None
-        told = _HEADERS | {"Content-Security-Policy": self._page.policy, "Content-Length": str(len(self._page.body))}
-        return Response(200, "OK", Headers(told), self._page.body)
+        fields = _HEADERS | {"Content-Security-Policy": self._page.policy, "Content-Length": str(len(self._page.body))}
+        return Response(200, "OK", Headers(fields), self._page.body)
 
     def _tick(self) -> None:
         step = self._view.step()
@@ -165,40 +165,40 @@ class Server:
         run = self._view.run
         return {"step_s": run.buckets.step_s if run is not None else None}
 
-    def _now(self, step: Step) -> bytes:
-        """What is new, and the state of this instant."""
-        told = self._view.now() | {"events": [event._asdict() for event in step.events]}
-        told |= {"viewers": len(self._viewers), "viewers_dropped": self._viewers.dropped}
+    def _now(self, step: ViewUpdate) -> bytes:
+        """Frame of the news and the current state."""
+        state = self._view.now() | {"events": [event._asdict() for event in step.events]}
+        state |= {"viewers": len(self._viewers), "viewers_dropped": self._viewers.dropped}
         if time.monotonic() > self._latency_s + _LATENCY_S and self._view.run is not None:
             self._latency_s = time.monotonic()
-            told["latency"] = self._view.run.tally.latency()
-        return _bucketed("now", told, step.buckets)
+            state["latency"] = self._view.run.tally.latency()
+        return _bucketed("now", state, step.buckets)
 
     def _first(self) -> list[bytes]:
-        """What a page gets when it opens: what things are called, the last minute, the events and the last capture."""
+        """Frames for a newly opened page: names and words, the last minute, the events and the last capture."""
         run, view = self._view.run, self._view
         kept = run.buckets.kept() if run is not None else None
-        told = {
+        hello = {
             "columns": COLUMNS,
             "channels": CHANNELS,
             "panels": [_panel(panel) for panel in PANELS],
-            "words": [one._asdict() for one in words()],
+            "words": [word._asdict() for word in words()],
             **self._grid(),
         }
         events = [event._asdict() for event in view.events]
         latency = run.tally.latency() if run is not None else None
-        first = [frame("hello", told), _bucketed("now", view.now() | {"events": events, "latency": latency}, kept)]
+        first = [frame("hello", hello), _bucketed("now", view.now() | {"events": events, "latency": latency}, kept)]
         return [*first, *([_captured(view.capture)] if view.capture is not None else [])]
 
     async def _attend(self, socket: ServerConnection) -> None:
-        """Show a page the rig, and do what it asks for."""
+        """Send a page the state of the rig, and execute its commands."""
         self._silent.pop(socket, None)
         tasks: set[asyncio.Task[None]] = set()
         async with contextlib.AsyncExitStack() as seen:
             if len(self._viewers) < MOST_VIEWERS:
                 await seen.enter_async_context(self._viewers.added(socket, self._first()))
             else:
-                line = f"{MOST_VIEWERS} pages are open already: close one. STOP works here, too"
+                line = f"{MOST_VIEWERS} pages are already open: close one. STOP works on this page, too"
                 await socket.send(frame("full", {"line": line}))
             with contextlib.suppress(ConnectionClosed):
                 async for message in socket:
@@ -210,25 +210,25 @@ class Server:
                         continue
                     while len(tasks) >= _MOST_WISHES:
                         await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-                    task = asyncio.create_task(self._obey(socket, wish))
+                    task = asyncio.create_task(self._run_command(socket, wish))
                     tasks.add(task)
                     task.add_done_callback(tasks.discard)
 
-    async def _obey(self, socket: ServerConnection, wish: Any) -> None:
+    async def _run_command(self, socket: ServerConnection, wish: Any) -> None:
         answer = await self._words.say(wish)
         with contextlib.suppress(ConnectionClosed):
             await socket.send(frame("answer", answer))
 
 
-def _bucketed(kind: str, told: dict[str, Any], buckets: Buckets | None) -> bytes:
+def _bucketed(kind: str, table: dict[str, Any], buckets: Buckets | None) -> bytes:
     if buckets is None:
-        return frame(kind, told)
-    return frame(kind, told | {"first": buckets.first}, buckets.values)
+        return frame(kind, table)
+    return frame(kind, table | {"first": buckets.first}, buckets.values)
 
 
 def _captured(capture: Capture) -> bytes:
-    told = {name: value for name, value in capture._asdict().items() if name != "samples"}
-    return frame("capture", told, capture.samples)
+    table = {name: value for name, value in capture._asdict().items() if name != "samples"}
+    return frame("capture", table, capture.samples)
 
 
 def _panel(panel: Any) -> dict[str, Any]:
@@ -239,5 +239,5 @@ def _panel(panel: Any) -> dict[str, Any]:
         "open": panel.is_open,
         "unit": signals[0].unit,
         "axis": signals[0].axis,
-        "curves": [one._asdict() for one in signals],
+        "curves": [signal._asdict() for signal in signals],
     }

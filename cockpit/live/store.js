@@ -1,7 +1,7 @@
-// What has come: signals in an even grid of buckets, states as stretches with a word each, slips and events.
+// Received data: signals on an even grid of buckets, states as stretches with a word each, slips and events.
 "use strict";
 
-const KEPT_S = 60; // of curves; the server keeps as much for who opens the page
+const KEPT_S = 60; // of curves; the server keeps as much for newly opened pages
 
 /** The last minute of one run. */
 class Store {
@@ -38,8 +38,8 @@ class Store {
     this.names.forEach((name, at) => {
       const column = this.columns.get(name), factor = this.factor.get(name) ?? 1;
       for (let lost = 0; lost < hole; lost++) column.push(null);
-      for (let one = 0; one < count; one++) {
-        const value = values[at * count + one];
+      for (let bucket = 0; bucket < count; bucket++) {
+        const value = values[at * count + bucket];
         column.push(Number.isNaN(value) ? null : value * factor);
       }
     });
@@ -54,20 +54,20 @@ class Store {
     while (this.log.events.length && this.log.events[0].t_s < least) this.log.events.shift();
   }
 
-  /** Carry the stretches of one row on. */
+  /** Extend the stretches of one row. */
   band(row, first, count, values) {
     const at = this.names.indexOf(row.column) * count;
-    for (let one = 0; one < count; one++) {
-      const number = values[at + one];
+    for (let bucket = 0; bucket < count; bucket++) {
+      const number = values[at + bucket];
       if (Number.isNaN(number)) continue;
-      const word = this.words.get(`${row.column} ${number}`) ?? String(number), to = this.timeOf(first + one), from = to - this.step_s;
+      const word = this.words.get(`${row.column} ${number}`) ?? String(number), to = this.timeOf(first + bucket), from = to - this.step_s;
       const last = row.stretches.at(-1);
       if (last && last[2] === word && from - last[1] < 1.5 * this.step_s) last[1] = to;
       else row.stretches.push([from, to, word]);
     }
   }
 
-  /** A slip is where the controller's count rises; it is marked at the top of the force before it. */
+  /** A slip is where the controller's count rises; mark it at the peak of the force before it. */
   slips(count, values) {
     const counted = this.columns.get("slips"), force = this.columns.get("drive_force_N.most");
     for (let at = Math.max(1, counted.length - count); at < counted.length; at++) {
@@ -95,7 +95,7 @@ class Store {
   }
 }
 
-/** A frame of the server: what its JSON says, and the numbers behind it. */
+/** Split a frame of the server into its JSON and the numbers after it. */
 function unframed(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
   const told = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));

@@ -1,4 +1,4 @@
-"""Messages of one topic as one array, as they came within some hundredths of a second."""
+"""A batch of messages of one topic (some 0.05 s of them) as one array."""
 
 import contextlib
 from collections.abc import Sequence
@@ -12,11 +12,11 @@ from bridge.wire.messages import CHANNELS, Layout, Records, sensor_block
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import SENSORS
 
-_MOST_SAMPLES = 400  # of a channel in a block
+_MOST_SAMPLES = 400  # per channel and block
 
 
 def table_of(layout: Layout, payloads: Sequence[bytes], topic: str) -> Records:
-    """The messages, [messages]; those that cannot be read are left out."""
+    """The messages, [messages], without unreadable ones."""
     if all(len(payload) == layout.size for payload in payloads):
         joined = np.frombuffer(b"".join(payloads), np.uint8).reshape(len(payloads), layout.size)
         if layout.all_canonical(joined):
@@ -29,13 +29,13 @@ def table_of(layout: Layout, payloads: Sequence[bytes], topic: str) -> Records:
 
 
 class SensorTables:
-    """Blocks of one rig, whose number of samples is that of a block that can be read, until none has that number."""
+    """Reads the blocks of one rig. Keeps the block length of the first readable block until no block has it."""
 
     def __init__(self) -> None:
         self._layout: Layout | None = None
 
     def of(self, payloads: Sequence[bytes]) -> Records | None:
-        """The blocks of one number of samples, [blocks]; None where none can be read."""
+        """Blocks of one length, [blocks]; None if none is readable."""
         for layout in (self._layout, None):
             known = layout or next((sensor_block(samples) for samples in map(_samples, payloads) if samples), None)
             table = table_of(known, payloads, SENSORS.name) if known is not None else None
@@ -46,7 +46,7 @@ class SensorTables:
 
 
 def _samples(payload: bytes) -> int:
-    """Samples of each channel in a block; 0 where it is none."""
+    """Samples per channel in a block; 0 if it is unreadable."""
     with contextlib.suppress(Fault):
         block: Any = parsed(wire.SensorBlock, payload, SENSORS.name)
         lengths = {len(getattr(block, channel)) for channel in CHANNELS}

@@ -1,4 +1,4 @@
-"""The word that lets a person arm a rig from the page: who can read this user's files, or the terminal, has it."""
+"""Secret that permits arming from the page: readable on the terminal and in a file of this user only."""
 
 import contextlib
 import os
@@ -10,26 +10,26 @@ from pathlib import Path
 from bridge.faults import Fault
 from bridge.wire.loopback_users import folders, is_private_folder
 
-_BYTES = 18  # of chance; 24 letters
+_BYTES = 18  # random; 24 letters in base64
 
 
 @contextlib.contextmanager
 def kept_token(port: int) -> Generator[tuple[str, Path]]:
-    """A new word and the file that holds it, mode 0600, for as long as the server of this port runs.
+    """A new token and its file, mode 0600, deleted at the end of the context.
 
-    Raises Fault NOT_SECURE where no folder can hold it so that others cannot read it.
+    Raises Fault NOT_SECURE without a folder that other users cannot read.
     """
-    word = secrets.token_urlsafe(_BYTES)
-    path = _written(f"page-{port}.token", word)
+    token = secrets.token_urlsafe(_BYTES)
+    path = _written(f"page-{port}.token", token)
     try:
-        yield word, path
+        yield token, path
     finally:
         with contextlib.suppress(OSError):
-            if path.read_text() == word:  # not that of a server that took the port meanwhile
+            if path.read_text() == token:  # unless a later server of this port has replaced it
                 path.unlink()
 
 
-def _written(name: str, word: str) -> Path:
+def _written(name: str, token: str) -> Path:
     for folder in folders():
         with contextlib.suppress(OSError):
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -37,9 +37,9 @@ def _written(name: str, word: str) -> Path:
                 continue
             handle, part = tempfile.mkstemp(dir=folder)  # mode 0600
             with os.fdopen(handle, "w") as file:
-                file.write(word)
+                file.write(token)
             os.replace(part, folder / name)
             return folder / name
     places = ", ".join(str(folder) for folder in folders())
-    line = f"the page's token cannot be kept where others cannot read it: {places} must be this user's, mode 0700"
+    line = f"no private folder for the page's token: {places} must belong to this user, mode 0700"
     raise Fault("NOT_SECURE", f"{line}; set XDG_RUNTIME_DIR to such a folder")

@@ -1,4 +1,4 @@
-"""A scope: samples at full rate from before to after a slip, or of the moment at which a person asked."""
+"""Scope: samples at full rate around a slip, or around a manual trigger."""
 
 from typing import NamedTuple
 
@@ -7,8 +7,8 @@ import numpy.typing as npt
 
 from bridge.wire.messages import CHANNELS, Records
 
-BEFORE_S, AFTER_S = 0.1, 0.1  # a slip of a machine's axis takes some ms, its stick before some tenths of a second
-_AGAIN_S = 0.5  # between two captures: more than a person can look at is not sent
+BEFORE_S, AFTER_S = 0.1, 0.1  # a slip takes a few ms, the stick before it a few 0.1 s
+_AGAIN_S = 0.5  # least distance of two captures; an operator reads no more
 BY_HAND = "by hand"
 BY_SLIP = "a slip"
 
@@ -18,18 +18,18 @@ class Capture(NamedTuple):
 
     number: int  # of the captures of this run, from 1
     cause: str  # BY_SLIP or BY_HAND
-    t_s: float  # of the run, at the end of the block in which it was triggered
-    before_s: float  # from the first sample to then
+    t_s: float  # time of the run at the end of the triggering block
+    before_s: float  # from the first sample to t_s
     sample_s: float
     samples: npt.NDArray[np.float32]  # [channels, samples], SI units; nan where a block is missing
-    missing: int  # blocks
+    missing: int  # missing blocks
 
 
 class Scope:
-    """Waits for slips in one run.
+    """Triggers on the slips of one run.
 
     Args:
-        block_ns: length of a block.
+        block_ns: duration of a block.
 
     """
 
@@ -40,13 +40,13 @@ class Scope:
         self._again = max(1, round(_AGAIN_S * 1e9 / block_ns))
         self._blocks: list[Records] = []
         self._numbers = np.empty(0, np.int64)
-        self._slips: int | None = None  # counted by the controller up to now
+        self._slips: int | None = None  # latest count of the controller
         self._pending: tuple[int, str] | None = None
         self._last = -(2**62)  # block of the last capture
         self._made = 0
 
     def add_blocks(self, table: Records, numbers: npt.NDArray[np.int64]) -> None:
-        """Take blocks with their numbers, in order."""
+        """Add blocks with their numbers, in order."""
         self._blocks.append(table)
         self._numbers = np.append(self._numbers, numbers)
         most = 2 * (self._before + self._after)
@@ -54,7 +54,7 @@ class Scope:
             self._numbers = self._numbers[len(self._blocks.pop(0)) :]
 
     def add_slips(self, slips: npt.NDArray[np.int64], numbers: npt.NDArray[np.int64]) -> None:
-        """Take the controller's count of slips after each block."""
+        """Add the controller's count of slips after each block."""
         if not len(slips):
             return
         rises = np.flatnonzero(np.diff(slips, prepend=slips[0] if self._slips is None else self._slips) > 0)
@@ -72,7 +72,7 @@ class Scope:
             self._pending, self._last = (block, cause), block
 
     def ready(self) -> Capture | None:
-        """A capture whose last block is there; None before."""
+        """The capture, once its last block has arrived; otherwise None."""
         if self._pending is None or not len(self._numbers) or self._numbers[-1] < self._pending[0] + self._after:
             return None
         (block, cause), self._pending = self._pending, None

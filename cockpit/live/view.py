@@ -1,4 +1,4 @@
-"""What a person is shown of a rig now: new buckets, events and captures, and the words and figures of this instant."""
+"""State of a rig for display: new buckets, events and captures, with the current words and figures."""
 
 import collections
 import contextlib
@@ -27,64 +27,63 @@ from cockpit.live.tables import SensorTables, table_of
 from cockpit.live.tally import Tally
 from cockpit.live.trigger import Capture, Scope
 
-SILENT_S = 0.5  # without a message from which its values are old; longer: what is past is shown as what is
-_AT_ONCE = 1 << 13  # messages of one step; more than may wait
-_FAR = 12_000  # buckets without a block, a minute, after which it is another run: nobody wants to see so long a hole
+SILENT_S = 0.5  # without a message before its values are hidden. Longer: old values are shown as current
+_AT_ONCE = 1 << 13  # messages per step; more than the queue holds
+_FAR = 12_000  # buckets without a block (one minute) after which a new run is assumed
 _EVENTS_KEPT = 200
-_EVENTS_AT_ONCE = 50  # of one step; who says more is counted
+_EVENTS_AT_ONCE = 50  # per step; further ones are only counted
 _LONGEST_TEXT = 500
-_SLIPS_S = 10.0  # over which the slips of late are counted
-# how the state is: in words for a person, in colours for a page
+_SLIPS_S = 10.0  # window for the count of recent slips
 WAITING, LIVE, SILENT, LEFT, ENDED = "waiting", "live", "silent", "left", "ended"
 
 
 class Source(Protocol):
-    """Where messages come from: `cockpit.live.listener`, or a test."""
+    """Source of messages: `cockpit.live.listener`, or a test."""
 
     @property
     def inbox(self) -> Inbox:
-        """Of the messages that came."""
+        """Received messages."""
         ...
 
     @property
     def presence(self) -> Presence:
-        """Who is there."""
+        """Participants on the bus."""
         ...
 
     @property
     def headers(self) -> Mapping[str, Any]:
-        """The configurations of rig and controller, by role."""
+        """Configurations of rig and controller by role."""
         ...
 
 
-class Said(NamedTuple):
-    """One event, as it is shown."""
+class EventRow(NamedTuple):
+    """One event for display."""
 
-    t_s: float  # of the run
-    at: str  # time of day here
+    t_s: float  # time of the run
+    at: str  # local time of day
     source: str
     code: str
-    letter: str  # of NAMUR NE 107; empty for news
-    weight: str  # what the letter means
+    letter: str  # NAMUR NE 107; empty for plain news
+    weight: str  # meaning of the letter
     text: str
     help: str
 
 
-class Step(NamedTuple):
-    """What is new since the last step."""
+class ViewUpdate(NamedTuple):
+    """News since the last step."""
 
-    anew: bool  # another run began: what was shown is of an earlier one
+    anew: bool  # a new run began: discard the display of the earlier one
     buckets: Buckets | None
     capture: Capture | None
-    events: list[Said]
-    tables: Mapping[str, Records]  # messages by topic: sensors, trace, applied; none where nothing came
+    events: list[EventRow]
+    tables: Mapping[str, Records]  # new messages by topic: sensors, trace, applied; topics without any are absent
 
 
 class _Run:
-    """All that begins anew with a run."""
+    """State that starts with each run."""
 
     def __init__(self, block_ns: int, dtype: np.dtype[Any]) -> None:
-        self.dtype = dtype  # of its blocks
+        self.dtype = dtype  # layout of its blocks
         self.buckets = Bucketing(block_ns)
         self.scope = Scope(block_ns)
         self.tally = Tally()
@@ -96,43 +95,43 @@ class View:
     """Follows a source, step by step.
 
     Args:
-        source: of the messages.
-        where: its endpoint, for words.
-        clock: the time [s].
+        source: delivers the messages.
+        where: its endpoint, for texts.
+        clock: time [s].
 
     """
 
     def __init__(self, source: Source, where: str, clock: Callable[[], float] = time.monotonic) -> None:
         self._source, self._where, self._clock = source, where, clock
-        self.unreadable = 0  # messages that are none, or of a stranger
-        self.pauses = 0  # of the machine, as the recorder tells them: many, and no news
+        self.unreadable = 0  # malformed messages, or of unauthenticated clients
+        self.pauses = 0  # stalls of the computer reported by the recorder; counted, not listed as events
         self.run: _Run | None = None
-        self.events: collections.deque[Said] = collections.deque(maxlen=_EVENTS_KEPT)
+        self.events: collections.deque[EventRow] = collections.deque(maxlen=_EVENTS_KEPT)
         self.capture: Capture | None = None
         self._sensors = SensorTables()
         self._screen = Screen(Complaints(self._note_strange, clock))
         self._heard_s: dict[str, float] = {}
         self._newest: dict[str, Records] = {}
         self._taken: dict[str, Records] = {}  # in this step
-        self._ended_at_s: float | None = None  # time of the run of the rig's END
+        self._ended_at_s: float | None = None  # time of the run at the rig's END
         self._began_s = clock()
 
     def _note_strange(self, _code: str, _text: str) -> None:
         self.unreadable += 1
 
-    def step(self) -> Step:
-        """Take all that waits."""
+    def step(self) -> ViewUpdate:
+        """Process all queued messages."""
         waiting: dict[str, list[bytes]] = {"sensors": [], "trace": [], "applied": []}
-        said: list[Received] = []
+        events: list[Received] = []
         for _ in range(_AT_ONCE):
             received = self._source.inbox.get_nowait()
             if received is None:
                 break
-            for one in self._screen.passed(received):
-                if one.topic.name in waiting:
-                    waiting[one.topic.name].append(one.payload)
+            for message in self._screen.passed(received):
+                if message.topic.name in waiting:
+                    waiting[message.topic.name].append(message.payload)
                 else:
-                    said.append(one)
+                    events.append(message)
         self._taken = {}
         anew = self._take_blocks(waiting["sensors"])
         self._take("trace", waiting["trace"])
@@ -141,7 +140,7 @@ class View:
         capture = run.scope.ready() if run is not None else None
         self.capture = capture or (None if anew else self.capture)
         buckets = run.buckets.ready() if run is not None else None
-        return Step(anew, buckets, capture, self._take_events(said), self._taken)
+        return ViewUpdate(anew, buckets, capture, self._take_events(events), self._taken)
 
     def take_now(self) -> None:
         """Trigger the scope by hand."""
@@ -149,7 +148,7 @@ class View:
             self.run.scope.take_now()
 
     def _take_blocks(self, payloads: list[bytes]) -> bool:
-        """Take blocks; whether they begin another run."""
+        """Add blocks; True if they start a new run."""
         table = self._sensors.of(payloads)
         if table is None:
             return False
@@ -190,7 +189,7 @@ class View:
             return
         numbers = block_numbers(topic, table)
         before = np.maximum.accumulate(np.append(self.run.newest[topic], numbers))
-        # a block far ahead is none of this run
+        # a block far ahead belongs to another run
         keep = (numbers >= before[:-1]) & (numbers <= self.run.newest["sensors"] + self.run.buckets.blocks * 200)
         table, numbers = table[keep], numbers[keep]
         if not len(table):
@@ -210,31 +209,31 @@ class View:
         while self.run.slips[0][0] < self._clock() - _SLIPS_S:
             self.run.slips.popleft()
 
-    def _take_events(self, received: list[Received]) -> list[Said]:
-        found: list[Said] = []
-        for one in received[:_EVENTS_AT_ONCE]:
+    def _take_events(self, received: list[Received]) -> list[EventRow]:
+        fresh: list[EventRow] = []
+        for message in received[:_EVENTS_AT_ONCE]:
             with contextlib.suppress(Fault):
-                event = parsed(wire.Event, one.payload, one.topic.name)
+                event = parsed(wire.Event, message.payload, message.topic.name)
                 if event.code in (PAUSE, CORE_PAUSE):
                     self.pauses += 1
                 else:
-                    found.append(self._said(event, one.topic.sender))
+                    fresh.append(self._event_of(event, message.topic.sender))
         if len(received) > _EVENTS_AT_ONCE:
-            text = f"{len(received) - _EVENTS_AT_ONCE} more events came at once; the log has them"
-            found.append(self._event(0.0, "page", "FLOOD", text))
-        self.events.extend(found)
-        return found
+            text = f"{len(received) - _EVENTS_AT_ONCE} more events in one step; the log contains them"
+            fresh.append(self._event(0.0, "page", "FLOOD", text))
+        self.events.extend(fresh)
+        return fresh
 
-    def _said(self, event: wire.Event, sender: str) -> Said:
+    def _event_of(self, event: wire.Event, sender: str) -> EventRow:
         t_s = event.t_ns * 1e-9
         if event.code == "END" and sender == "plant":
             self._ended_at_s = t_s
         return self._event(t_s, sender, event.code, event.text)
 
-    def _event(self, t_s: float, source: str, code: str, text: str) -> Said:
+    def _event(self, t_s: float, source: str, code: str, text: str) -> EventRow:
         known = EVENTS.get(code)
         letter = known.letter if known is not None else ""
-        return Said(
+        return EventRow(
             t_s=round(t_s, 3),
             at=time.strftime("%H:%M:%S"),
             source=source,
@@ -246,24 +245,24 @@ class View:
         )
 
     def _of(self, topic: str) -> Any:
-        """The newest message of a topic; None where it is too old to be true."""
+        """Newest message of a topic; None if older than SILENT_S."""
         if self._clock() - self._heard_s.get(topic, -1e9) > SILENT_S:
             return None
         return self._newest[topic][0]
 
     def phase(self) -> str:
-        """Whether data come, or why not."""
+        """Phase of the connection: LIVE, or why no data arrive."""
         presence = self._source.presence
         if self._of("sensors") is not None:
             return LIVE
-        if "plant" in presence.roles:  # after an END it is another one: the first withdraws its token with its END
+        if "plant" in presence.roles:  # after an END this is another rig: the first withdrew its token with its END
             return SILENT if self.run is not None and self._ended_at_s is None else WAITING
         if self.run is None:
             return WAITING
         return ENDED if self._ended_at_s is not None else LEFT
 
     def now(self) -> dict[str, Any]:
-        """All figures and words of this instant; what is not known now is null."""
+        """All current figures and words; None if unknown."""
         presence, run, phase = self._source.presence, self.run, self.phase()
         figures = self._figures() if phase == LIVE else {}
         late = self._slips_of_late()
@@ -273,7 +272,7 @@ class View:
             "answer": self.answer(phase, figures)._asdict(),
             "rig": plain(str(_inside(self._source.headers, "plant", "rig", "name") or "")[:80]),
             "roles": sorted(presence.roles),
-            "limits": [{"words": said, "value": value} for said, value in stroke_limits(self._source.headers)],
+            "limits": [{"words": label, "value": value} for label, value in stroke_limits(self._source.headers)],
             "slips_of_late": late[0] if "slips" in figures else None,
             "slips_over_s": late[1] if "slips" in figures else None,
             "lost": run.tally.lost(self._source.inbox.dropped)._asdict() if run is not None else None,
@@ -323,7 +322,7 @@ class View:
         return figures
 
     def answer(self, phase: str, figures: Mapping[str, Any]) -> Answer:
-        """The state in one sentence, with what to do."""
+        """State in one sentence, with the remedy."""
         silent_s = self._clock() - self._heard_s.get("sensors", self._began_s)
         presence = self._source.presence
         if presence.trouble:
@@ -331,20 +330,20 @@ class View:
         if phase == WAITING:
             if "plant" in presence.roles:
                 others = " and ".join(role for role in ("controller", "recorder") if role not in presence.roles)
-                more = f": {others} {'is' if 'and' not in others else 'are'} not there" if others else ""
-                return Answer(OFF, f"waiting: a rig is there, and sent no block yet{more}")
+                more = f": {others} {'is' if 'and' not in others else 'are'} missing" if others else ""
+                return Answer(OFF, f"waiting: a rig is connected but has sent no block yet{more}")
             return Answer(OFF, f"waiting for a rig at {self._where}")
         if phase == SILENT:
-            why = "the rig is on the bus, and sends nothing" if presence.linked else "the link to the rig is cut"
+            why = "the rig is on the bus but sends nothing" if presence.linked else "the link to the rig is down"
             return Answer(BAD, f"no data for {silent_s:.0f} s: {why}")
         if phase == ENDED:
             return Answer(OFF, f"the run ended {silent_s:.0f} s ago, at {self._ended_at_s:.1f} s; waiting for the next")
         if phase == LEFT:
-            return Answer(BAD, f"the rig left {silent_s:.0f} s ago, without an END; waiting for it")
+            return Answer(BAD, f"the rig left {silent_s:.0f} s ago without an END; waiting for it")
         return of_a_live_rig(figures, *self._slips_of_late())
 
     def _slips_of_late(self) -> tuple[int, float]:
-        """Slips, and over how long [s]: less than usual where it has not listened for so long."""
+        """Recent slips and their window [s], shorter than usual shortly after the start."""
         slips = self.run.slips if self.run is not None else ()
         return (slips[-1][1] - slips[0][1], round(self._clock() - slips[0][0], 1)) if slips else (0, 0.0)
 
@@ -355,7 +354,7 @@ def _word(column: str, record: Any, field: str = "") -> str:
 
 
 def _number(value: Any) -> float | None:
-    """A number for JSON; None for what is none."""
+    """A number for JSON; None if not finite."""
     return float(value) if np.isfinite(value) else None
 
 
@@ -366,7 +365,7 @@ def _inside(table: Any, *keys: str) -> Any:
 
 
 def _block_ns(table: Records, numbers: Any) -> int | None:
-    """The length of a block from two of them; None where there are none, or it is none."""
+    """Duration of a block, from two blocks; None with fewer, or if implausible."""
     if len(numbers) < 2 or numbers[-1] <= numbers[0]:
         return None
     length_ns = (int(table["t_ns"][-1]) - int(table["t_ns"][0])) / (int(numbers[-1]) - int(numbers[0]))

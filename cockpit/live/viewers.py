@@ -1,4 +1,4 @@
-"""Browsers that are connected: each has a short queue of frames, and one that does not empty it is dropped."""
+"""Connected browsers: each has a short queue of frames, and a browser whose queue overflows is dropped."""
 
 import asyncio
 import contextlib
@@ -6,35 +6,35 @@ import contextlib
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
 
-MOST_VIEWERS = 12  # who comes later may still say a word to the rig, and sees nothing
-_QUEUED = 60  # frames, 3 s. Larger: who is slow sees what is past; smaller: a browser that draws for long is dropped
+MOST_VIEWERS = 12  # later pages may still send commands to the rig, but receive no data
+_QUEUED = 60  # frames, 3 s. Larger: a slow browser shows older data. Smaller: a browser that draws slowly is dropped
 _TOO_SLOW = 1013  # "try again later"
 
 
 class Viewers:
-    """All of them."""
+    """All connected browsers."""
 
     def __init__(self) -> None:
-        self.dropped = 0  # that were too slow
+        self.dropped = 0  # too slow browsers
         self._queues: dict[ServerConnection, asyncio.Queue[bytes]] = {}
 
     def __len__(self) -> int:
         return len(self._queues)
 
     def tell(self, frame: bytes) -> None:
-        """Queue a frame for everybody; who has too many waiting is dropped."""
+        """Queue a frame for all; drop a browser whose queue is full."""
         for socket, queue in [*self._queues.items()]:
             try:
                 queue.put_nowait(frame)
             except asyncio.QueueFull:
                 self.dropped += 1
                 del self._queues[socket]
-                # not `close`, which waits for a reader that does not read
+                # `close` would wait for the stalled reader
                 socket.transport.abort()
 
     @contextlib.asynccontextmanager
     async def added(self, socket: ServerConnection, first: list[bytes]):
-        """A browser that gets `first`, and then each frame, until the end of the block."""
+        """Send a browser `first`, then each frame, until the end of the context."""
         queue: asyncio.Queue[bytes] = asyncio.Queue(_QUEUED)
         for frame in first:
             queue.put_nowait(frame)

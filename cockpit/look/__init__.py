@@ -1,11 +1,12 @@
 """`stickslip look`: a measured file at a glance.
 
-source   the file and what is known, as one record; what was assumed as a map
-quantity a number with its unit, as people write it
-evidence the record as an evidence folder
-tare     the force of a stretch at the beginning in which nothing moves
-hints    numbers of a rig that do not go with what is seen
+source   reads the file and the given facts into one record; writes the assumptions as a map
+tare     zero of the force sensor, from a stretch of rest at the beginning
+hints    rig numbers that contradict the record
 page     one offline page
-plots    its pictures, and figures of their own
+plots    its pictures, also as separate figures
 cycles   the slips as a table
+findings  findings about omitted rows
+quantity a number with its unit on the command line
+evidence the record as an evidence folder
 """

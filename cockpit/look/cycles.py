@@ -8,7 +8,7 @@ from pathlib import Path
 from bridge.faults import Fault
 from bridge.files import not_ours, refuse_to_replace_text, replacing
 from bridge.provenance import provenance
-from diagnosis.look.look import Look
+from diagnosis.look.look import LookResult
 from diagnosis.look.sticks import Cycle
 
 _FIRST_LINE = ",".join(Cycle._fields) + "\n"
@@ -16,7 +16,7 @@ _AUTHOR = "stickslip look"
 
 
 def refuse_to_replace_sheet(out: Path, place: str) -> None:
-    """Raise Fault CONFIG where `out`, .csv or .xlsx, is there and was not written by `write_cycles`."""
+    """Raise Fault CONFIG if `out`, .csv or .xlsx, exists and was not written by `write_cycles`."""
     if out.suffix.lower() == ".csv":
         refuse_to_replace_text(out, _FIRST_LINE, place)
     elif out.is_file() and out.stat().st_size and not _is_our_book(out):
@@ -27,13 +27,13 @@ def _is_our_book(path: Path) -> bool:
     try:
         with zipfile.ZipFile(path) as book, book.open("docProps/core.xml") as about:
             return f"<dc:creator>{_AUTHOR}</dc:creator>".encode() in about.read(1 << 16)
-    # what `zipfile` raises of a file that is no archive, of a damaged, an encrypted one, or one packed in another way
+    # raised by `zipfile` for no archive, a damaged or an encrypted one, or an unknown compression
     except (OSError, zipfile.BadZipFile, KeyError, NotImplementedError, RuntimeError, EOFError, zlib.error):
         return False
 
 
-def write_cycles(seen: Look, out: Path, source: Path) -> None:
-    """Write one row a slip, .csv or .xlsx. A value that the record does not show is empty."""
+def write_cycles(seen: LookResult, out: Path, source: Path) -> None:
+    """Write one row per slip, .csv or .xlsx; unknown values are empty."""
     names = Cycle._fields
     rows = [[None if not math.isfinite(value) else value for value in cycle] for cycle in seen.cycles]
     with replacing(out) as file:
@@ -53,6 +53,6 @@ def write_cycles(seen: Look, out: Path, source: Path) -> None:
             numbers.write_row(0, 0, ["name", "value", "low 90 %", "high 90 %", "unit"])
             for i, (name, number) in enumerate(seen.numbers.items(), 1):
                 numbers.write_row(
-                    i, 0, [name, *(one if math.isfinite(one) else None for one in number[:3]), number.unit]
+                    i, 0, [name, *(value if math.isfinite(value) else None for value in number[:3]), number.unit]
                 )
             book.add_worksheet("source").write_row(0, 0, [provenance([source]).in_words()])

@@ -1,4 +1,4 @@
-"""A record as evidence: the rig's numbers filled in from what is seen, with the tolerance that their scatter gives."""
+"""A record as evidence: rig numbers estimated from the record, with tolerances from their scatter."""
 
 from pathlib import Path
 
@@ -9,38 +9,38 @@ import pyarrow.parquet as pq
 from bridge.config import validate
 from bridge.faults import Fault
 from bridge.files import replacing
-from cockpit.look.source import Record
+from cockpit.look.source import MeasuredRecord
 from diagnosis.evidence.assumed import with_assumed
 from diagnosis.evidence.manifest import MANIFEST, RigTable, RunTable
 from diagnosis.evidence.manifest_text import manifest_text
-from diagnosis.look.look import Look
+from diagnosis.look.look import LookResult
 
-_LEAST_TOLERANCE = 0.01  # relative, of a number that scatters less: sensors are calibrated to a per cent
-_FRICTION_TOLERANCE = 0.05  # of F_s and F_k: what a slip shows is friction under the load of that slip
-_STRIBECK_TOLERANCE = 0.5  # of a velocity that one speed of the drive does not show
-_OF_90 = 1.645  # standard deviations in half an interval of 90 %
+_LEAST_TOLERANCE = 0.01  # relative, for numbers with less scatter: sensors are calibrated to 1 %
+_FRICTION_TOLERANCE = 0.05  # of F_s and F_k: friction differs with the load of each slip
+_STRIBECK_TOLERANCE = 0.5  # one drive speed does not determine the Stribeck velocity
+_OF_90 = 1.645  # standard deviations in half a 90 % interval
 _GUESSED_MPS = 5e-4  # Stribeck velocity of the paper's pairs
 
 
-def rig_of(seen: Look, file: str) -> tuple[RigTable, list[str]]:
-    """A rig with the numbers of a record, and the names of those that are assumed.
+def rig_of(seen: LookResult, file: str) -> tuple[RigTable, list[str]]:
+    """A rig with the numbers of a record, and the names of its assumed numbers.
 
-    Raises Fault CONFIG with a line to copy where a number can be neither seen nor assumed.
+    Raises Fault CONFIG, with an option to copy, for a number that can be neither estimated nor assumed.
     """
     numbers = seen.numbers
     if seen.known.coefficient:
         raise Fault(
-            "CONFIG", f"{file}: holds a friction coefficient and no load, so no force is known; add --load 94.5N"
+            "CONFIG", f"{file}: has a friction coefficient but no load, so the force is unknown; add --load 94.5N"
         )
     if "kinetic_force_N" not in numbers or "static_force_N" not in numbers:
         raise Fault(
-            "CONFIG", f"{file}: shows no slip, so it fills in no rig number; import it with a map that has [rig]"
+            "CONFIG", f"{file}: shows no slip, so no rig number can be estimated; import it with a map that has [rig]"
         )
     if "stiffness_N_per_m" not in numbers:
-        raise Fault("CONFIG", f"{file}: the speed of the drive is not known; add --speed 0.5mm/s")
+        raise Fault("CONFIG", f"{file}: the speed of the drive is unknown; add --speed 0.5mm/s")
     mass = numbers.get("mass_kg")
     if seen.known.mass_kg is None and (mass is None or not np.isfinite(mass.low) or mass.low <= 0.0):
-        raise Fault("CONFIG", f"{file}: its slips are too quick to show the mass of the slide; add --mass 1.5kg")
+        raise Fault("CONFIG", f"{file}: its slips are too short to estimate the mass of the slide; add --mass 1.5kg")
     table = {
         "drive": "torsion" if seen.known.torsion else "spring",
         "tolerance": {},
@@ -67,8 +67,8 @@ def rig_of(seen: Look, file: str) -> tuple[RigTable, list[str]]:
     return validate(RigTable, filled, file), [*assumed, "stribeck_velocity_mps"]
 
 
-def full_map(record: Record, seen: Look) -> str:
-    """The map of a record with its rig, as `log import` reads it. Raises Fault as `rig_of`."""
+def full_map(record: MeasuredRecord, seen: LookResult) -> str:
+    """Map of a record with its rig, for `log import`. Raises Fault as `rig_of`."""
     rig, assumed = rig_of(seen, record.path.name)
     lines = [f'drive = "{rig.drive}"']
     for name, value in rig.values().items():
@@ -78,8 +78,8 @@ def full_map(record: Record, seen: Look) -> str:
     return "\n".join([record.map_text.rstrip(), "", "[rig]", *lines, "", "[rig.tolerance]", *tolerance]) + "\n"
 
 
-def write_evidence(record: Record, seen: Look, folder: Path) -> tuple[RigTable, list[str]]:
-    """Make `folder` an evidence folder of this record alone; its rig and what is assumed of it. Raises Fault, OSError."""
+def write_evidence(record: MeasuredRecord, seen: LookResult, folder: Path) -> tuple[RigTable, list[str]]:
+    """Make `folder` an evidence folder of this record; returns its rig and the assumed numbers. Raises Fault, OSError."""
     rig, assumed = rig_of(seen, record.path.name)
     columns = {"t_s": record.t_s, "drive_force_N": record.force_N}
     if record.position_m is not None:

@@ -8,11 +8,11 @@ from bridge.files import write_whole
 from bridge.log.finding import Finding
 from bridge.provenance import provenance
 from cockpit.look.plots import as_svg, pictures
-from diagnosis.look.look import Look
+from diagnosis.look.look import LookResult
 from diagnosis.look.words import TITLES, cannot_tell, headline, with_interval
 
 
-def write_page(seen: Look, source: Path, findings: list[Finding], out: Path) -> None:
+def write_page(seen: LookResult, source: Path, findings: list[Finding], out: Path) -> None:
     """Write the page. Raises OSError."""
     template = Path(__file__).with_name("page.html.j2").read_text(encoding="utf-8")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)

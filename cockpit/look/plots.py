@@ -1,23 +1,23 @@
-"""The pictures of a look: the whole force with its slips, all cycles over each other, histograms, friction over speed."""
+"""Pictures of a look: the force with its slips, overlaid cycles, histograms, friction over speed."""
 
 import io
 from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
-from diagnosis.look.look import Look
+from diagnosis.look.look import LookResult
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _INK, _RED, _BLUE, _PALE = "#1f2d3a", "#b5402a", "#2a6fb5", "#9fb3c8"
-_COLUMNS = 2000  # of an envelope: more than a screen or a page has
-_MOST_LAID = 200  # cycles that are drawn over each other
+_COLUMNS = 2000  # of an envelope: more than the pixels of a screen
+_MOST_LAID = 200  # overlaid cycles
 
 
-def pictures(seen: Look) -> list[tuple[str, str, "Figure"]]:
-    """Title, caption and figure of each picture that the record allows."""
-    found = [
+def pictures(seen: LookResult) -> list[tuple[str, str, "Figure"]]:
+    """Title, caption and figure of each picture for the record."""
+    figures = [
         (
             "The force",
             "The whole record: breakaways red, re-sticks blue. Long records are drawn as envelopes.",
@@ -25,21 +25,21 @@ def pictures(seen: Look) -> list[tuple[str, str, "Figure"]]:
         )
     ]
     if seen.sticks and len(seen.cycles) > 1:
-        found.append(("Cycles over each other", "Each stick and slip, counted from its breakaway.", laid_over(seen)))
-        found.append(("Slips", "How the breakaway forces and the stick times are spread.", histograms(seen)))
+        figures.append(("Overlaid cycles", "Each stick and slip; time counts from its breakaway.", laid_over(seen)))
+        figures.append(("Slips", "Distribution of the breakaway forces and the stick times.", histograms(seen)))
     if seen.at_speeds:
-        found.append(
+        figures.append(
             (
                 "Friction over speed",
-                "Mean force and breakaway force at each speed of the drive, 90 %.",
+                "Mean force and breakaway force at each drive speed, with 90 % intervals.",
                 over_speed(seen),
             )
         )
-    return found
+    return figures
 
 
-def whole(seen: Look, size_in: tuple[float, float] = (9.0, 3.2)) -> "Figure":
-    """The force over time with its slips."""
+def whole(seen: LookResult, size_in: tuple[float, float] = (9.0, 3.2)) -> "Figure":
+    """Force over time with its slips."""
     figure, axes = _figure(size_in)
     for part in seen.parts:
         _draw(axes, part.t_s, part.sign * part.force_N)
@@ -55,18 +55,18 @@ def whole(seen: Look, size_in: tuple[float, float] = (9.0, 3.2)) -> "Figure":
     return figure
 
 
-def laid_over(seen: Look) -> "Figure":
-    """The cycles, each from its re-stick before to its own."""
+def laid_over(seen: LookResult) -> "Figure":
+    """Cycles, each from the re-stick before it to its own."""
     figure, axes = _figure((9.0, 3.2))
     cycles = seen.cycles[:: max(len(seen.cycles) // _MOST_LAID, 1)]
     for cycle in cycles:
-        part = next((one for one in seen.parts if one.t_s[0] <= cycle.breakaway_t_s <= one.t_s[-1]), None)
+        part = next((piece for piece in seen.parts if piece.t_s[0] <= cycle.breakaway_t_s <= piece.t_s[-1]), None)
         if part is None or not np.isfinite(cycle.dwell_s) or not np.isfinite(cycle.restick_t_s):
             continue
         slip_s = cycle.restick_t_s - cycle.breakaway_t_s
         ends_s = cycle.breakaway_t_s - cycle.dwell_s, cycle.restick_t_s + slip_s
-        own = slice(*np.searchsorted(part.t_s, ends_s).tolist())
-        _draw(axes, part.t_s[own] - cycle.breakaway_t_s, part.force_N[own], alpha=max(0.08, 1.0 / len(cycles) ** 0.5))
+        span = slice(*np.searchsorted(part.t_s, ends_s).tolist())
+        _draw(axes, part.t_s[span] - cycle.breakaway_t_s, part.force_N[span], alpha=max(0.08, 1.0 / len(cycles) ** 0.5))
     axes.set_xlabel("time from breakaway [s]")
     axes.set_ylabel(
         "friction coefficient" if seen.known.coefficient else f"force along the motion [{seen.known.force_unit}]"
@@ -74,7 +74,7 @@ def laid_over(seen: Look) -> "Figure":
     return figure
 
 
-def histograms(seen: Look) -> "Figure":
+def histograms(seen: LookResult) -> "Figure":
     """Breakaway forces and stick times."""
     from matplotlib.figure import Figure
 
@@ -89,9 +89,7 @@ def histograms(seen: Look) -> "Figure":
         ),
         (right, dwells[np.isfinite(dwells)], "stick time [s]"),
     ):
-        spread = float(np.ptp(values)) > 1e-6 * abs(
-            float(values.mean())
-        )  # finer than a float can part, there are no bins
+        spread = float(np.ptp(values)) > 1e-6 * abs(float(values.mean()))  # one bin for values equal to float precision
         bins = min(max(int(len(values) ** 0.5) + 1, 5), 40) if spread else 1
         axes.hist(values, bins=bins, color=_PALE, edgecolor="white")
         axes.axvline(float(values.mean()), color=_RED, linewidth=1.2)
@@ -102,15 +100,15 @@ def histograms(seen: Look) -> "Figure":
     return figure
 
 
-def over_speed(seen: Look) -> "Figure":
-    """Friction at each speed; over the load where it is known."""
+def over_speed(seen: LookResult) -> "Figure":
+    """Friction at each speed; as a coefficient if the load is known."""
     figure, axes = _figure((9.0, 3.2))
     load = seen.known.load_N
     scale = 1.0 / load if load else 1.0
-    speeds = [1e3 * one.speed_mps for one in seen.at_speeds]
+    speeds = [1e3 * point.speed_mps for point in seen.at_speeds]
     for label, color, numbers in (
-        ("mean", _INK, [one.mean_N for one in seen.at_speeds]),
-        ("breakaway", _RED, [one.breakaway_N for one in seen.at_speeds]),
+        ("mean", _INK, [point.mean_N for point in seen.at_speeds]),
+        ("breakaway", _RED, [point.breakaway_N for point in seen.at_speeds]),
     ):
         rows = [(v, number) for v, number in zip(speeds, numbers, strict=True) if number is not None]
         if not rows:
@@ -128,7 +126,7 @@ def over_speed(seen: Look) -> "Figure":
 
 
 def save(figure: "Figure", file: IO[bytes], kind: str, dpi: int = 200, note: str = "") -> None:
-    """Write a figure; `kind` is svg, pdf or png, and `note` goes to its foot and its metadata."""
+    """Write a figure; `kind` is svg, pdf or png, and `note` is written at its foot and in its metadata."""
     from matplotlib import rc_context
 
     metadata = {"Title": note} if kind in ("svg", "pdf") else {"Description": note}
@@ -140,7 +138,7 @@ def save(figure: "Figure", file: IO[bytes], kind: str, dpi: int = 200, note: str
 
 
 def as_svg(figure: "Figure") -> str:
-    """A figure as SVG to stand in a page."""
+    """A figure as SVG for a page."""
     file = io.BytesIO()
     save(figure, file, "svg")
     text = file.getvalue().decode()
@@ -161,7 +159,7 @@ def _plain(axes: Any) -> None:
 
 
 def _draw(axes: Any, x: Any, y: Any, alpha: float = 1.0) -> None:
-    """A line; of many samples their envelope, in which no slip is lost."""
+    """Draw a line; for many samples their envelope, which keeps every slip."""
     if len(x) > 4 * _COLUMNS:
         width = len(x) // _COLUMNS
         whole_columns = len(x) // width * width

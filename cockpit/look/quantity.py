@@ -1,4 +1,4 @@
-"""A quantity of the command line: a number and its unit, as people write them."""
+"""A quantity of the command line: a number with its unit."""
 
 import math
 import re
@@ -7,28 +7,28 @@ from bridge.faults import Fault
 from bridge.tables.unit_words import known_unit, si_unit
 
 _EXAMPLES = {"velocity": "0.5mm/s", "force": "94.5N", "mass": "1.5kg", "frequency": "1kHz", "time": "30s"}
-_GRAMS = {"g": 1e-3, "mg": 1e-6}  # where a mass is asked for, g is no acceleration
-# of a rig that turns
+_GRAMS = {"g": 1e-3, "mg": 1e-6}  # for a mass, g means gram and not acceleration
+# equivalents for a turning rig
 _TURNING = {"velocity": "angular velocity", "mass": "inertia"}
 
 
 def turns(text: str) -> bool:
-    """Whether a quantity that `quantity` takes is one of a rig that turns: rad/s, rpm, kg m²."""
-    found = re.search(r"[^-+.\deE\s].*", text)
-    return found is not None and (known_unit(found[0]) or ("",))[0] in _TURNING.values()
+    """True for a quantity of a turning rig: rad/s, rpm, kg m²."""
+    unit = re.search(r"[^-+.\deE\s].*", text)
+    return unit is not None and (known_unit(unit[0]) or ("",))[0] in _TURNING.values()
 
 
 def quantity(option: str, text: str, what: str) -> float | None:
-    """The value in SI, above 0; None for an empty text. Raises Fault CONFIG for another quantity, or no number."""
+    """The value in SI units, above 0; None for an empty text. Raises Fault CONFIG for another quantity, or no number."""
     if not text:
         return None
-    found = re.fullmatch(r"\s*([-+.\d]+(?:[eE][-+]?\d+)?)\s*(.*?)\s*", text)
+    match = re.fullmatch(r"\s*([-+.\d]+(?:[eE][-+]?\d+)?)\s*(.*?)\s*", text)
     example = f"write for example {option} {_EXAMPLES[what]}"
     try:
-        value = float(found[1]) if found is not None else math.nan
+        value = float(match[1]) if match is not None else math.nan
     except ValueError:
         value = math.nan
-    unit = "" if found is None else found[2]
+    unit = "" if match is None else match[2]
     known = (what, _GRAMS[unit]) if what == "mass" and unit in _GRAMS else known_unit(unit)
     if not unit:
         raise Fault("CONFIG", f"{option} {text}: has no unit, and may be in {si_unit(what)} or not; {example}")

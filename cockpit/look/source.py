@@ -1,12 +1,12 @@
-"""A measured file and what a person knows of it, as one record; what was assumed, as findings and as a map to correct."""
+"""A measured file with the given facts as one record; the assumptions as findings and as a map to correct."""
 
 import json
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.config import read_toml, validate
 from bridge.faults import Fault
 from bridge.log.finding import Finding
@@ -14,22 +14,20 @@ from bridge.tables.kinds import kind_of
 from bridge.tables.readers import read_table
 from bridge.tables.table import Table
 from bridge.tables.unit_words import in_brackets, known_unit, weight_unit
+from cockpit.look.findings import of_time, of_values
 from cockpit.look.tare import tare_of
-from cockpit.look.told import of_time, of_values
 from diagnosis.evidence.import_table import ImportMap
 from diagnosis.evidence.manifest_keys import ChannelMap
 from diagnosis.evidence.mapped import calendar_unit_s, has_time, mapped
 from diagnosis.evidence.run_log import columns_of_log
 from diagnosis.look.guess import Guess, guess, no_time
-from diagnosis.look.look import Known
+from diagnosis.look.look import RecordFacts
+from diagnosis.look.position_owner import is_of_slide
 from diagnosis.look.record import FEWEST
-from diagnosis.look.whose_way import is_of_slide
-
-Floats = npt.NDArray[np.float64]
 
 
-class Asked(NamedTuple):
-    """What the command line says, SI units; None and empty: nothing."""
+class LookOptions(NamedTuple):
+    """Options of the command line, SI units; None or empty: not given."""
 
     speed_mps: float | None = None
     load_N: float | None = None
@@ -38,27 +36,27 @@ class Asked(NamedTuple):
     time: str = ""
     force: str = ""
     map: Path | None = None
-    speed_turns: bool | None = None  # the speed is that of an angle; None: no speed is given
+    speed_turns: bool | None = None  # the given speed is angular; None: no speed is given
 
 
-class Record(NamedTuple):
+class MeasuredRecord(NamedTuple):
     """A record, [samples] each, SI units."""
 
     path: Path
     t_s: Floats
     force_N: Floats
     position_m: Floats | None  # of the drive
-    known: Known
+    known: RecordFacts
     findings: list[Finding]
-    map_text: str  # a map that reads the file in the same way; empty where one was given, or for a run log
-    of_load: bool  # the force is the friction coefficient: it is told over the load
+    map_text: str  # map that reproduces this reading; empty if a map was given, or for a run log
+    of_load: bool  # the force is a friction coefficient, times the load if known
 
 
-def read_record(path: Path, asked: Asked) -> Record:
+def read_record(path: Path, asked: LookOptions) -> MeasuredRecord:
     """Read a table or a run log. Raises Fault BAD_TABLE, BAD_LOG, CONFIG."""
     if path.is_file() and kind_of(path) == "mcap" and _is_run_log(path):
         columns, findings = columns_of_log(path)
-        return _record(path, columns, Known(asked.speed_mps, asked.load_N, asked.mass_kg), findings, "")
+        return _record(path, columns, RecordFacts(asked.speed_mps, asked.load_N, asked.mass_kg), findings, "")
     if asked.map is not None:
         wanted = validate(ImportMap, read_toml(asked.map), asked.map.name)
         table = read_table(path, wanted.source.dialect, wanted.source.format)
@@ -71,35 +69,35 @@ def read_record(path: Path, asked: Asked) -> Record:
         ]
         if asked.speed_mps is not None:
             columns.pop("drive_position_m", None)
-        return _record(path, columns, Known(speed, asked.load_N, mass), findings, "")
+        return _record(path, columns, RecordFacts(speed, asked.load_N, mass), findings, "")
     table = read_table(path)
-    found = guess(table, {"time": asked.time, "force": asked.force})
-    channels = _channels(table, found)
+    guessed = guess(table, {"time": asked.time, "force": asked.force})
+    channels = _channels(table, guessed)
     if asked.rate_Hz is None and not has_time(table, channels):
         known = ", ".join(f'"{name}"' for name in table.columns)
-        line = f"{path.name}: no time: {no_time(table)}which column is it, or how many rows a second are there?"
+        line = f"{path.name}: no time: {no_time(table)}which column is the time, or how many rows per second are there?"
         raise Fault("CONFIG", f'{line} Add --time "NAME" or --rate 1kHz; columns here: {known}')
-    torsion = bool(found.force) and (known_unit(table.unit(found.force)) or ("",))[0] == "torque"
+    torsion = bool(guessed.force) and (known_unit(table.unit(guessed.force)) or ("",))[0] == "torque"
     if asked.speed_turns not in (None, torsion):
         what, example = ("torque", "10mrad/s or 5rpm") if torsion else ("force", "0.5mm/s")
-        raise Fault("CONFIG", f"--speed: {found.force!r} is a {what}: must be a speed such as {example}")
-    if torsion and found.position and (known_unit(table.unit(found.position)) or ("",))[0] == "length":
-        del channels["drive_position_m"]  # a way along the axis
-        found = found._replace(position="")
+        raise Fault("CONFIG", f"--speed: {guessed.force!r} is a {what}: must be a speed such as {example}")
+    if torsion and guessed.position and (known_unit(table.unit(guessed.position)) or ("",))[0] == "length":
+        del channels["drive_position_m"]  # a displacement along the axis
+        guessed = guessed._replace(position="")
     columns, findings = mapped(table, channels, asked.rate_Hz)
-    findings = [Finding("assumed", path.name, "; ".join(found.reasons)), *findings, *_unitless(table, channels)]
+    findings = [Finding("assumed", path.name, "; ".join(guessed.reasons)), *findings, *_unitless(table, channels)]
     if torsion:
-        text = f"{found.force!r} is a torque: the rig turns, so ways are angles in rad"
+        text = f"{guessed.force!r} is a torque: the rig turns, so positions are angles in rad"
         findings.append(Finding("assumed", path.name, text))
-    load_N, of_load = asked.load_N, not found.force and bool(found.coefficient)
-    if load_N is None and found.load and not torsion:
-        loads_N = _si(table, found.load, "N", findings)
-        findings += of_values(table, {found.load: loads_N}, table.findings)
+    load_N, of_load = asked.load_N, not guessed.force and bool(guessed.coefficient)
+    if load_N is None and guessed.load and not torsion:
+        loads_N = _si(table, guessed.load, "N", findings)
+        findings += of_values(table, {guessed.load: loads_N}, table.findings)
         load_N = float(np.nanmean(np.abs(loads_N))) or None
         text = (
-            f"load = mean of {found.load!r}, {load_N:.6g} N"
+            f"load = mean of {guessed.load!r}, {load_N:.6g} N"
             if load_N
-            else f"{found.load!r} is 0 throughout: no load; add --load 94.5N"
+            else f"{guessed.load!r} is 0 throughout: no load; add --load 94.5N"
         )
         findings.append(Finding("assumed", path.name, text))
     if of_load:
@@ -107,42 +105,46 @@ def read_record(path: Path, asked: Asked) -> Record:
         columns["drive_force_N"] = columns["drive_force_N"] * factor
         of_map = channels["drive_force_N"]
         channels["drive_force_N"] = of_map.model_copy(update={"scale": (of_map.scale or 1.0) * factor})
-        text = f"force = {found.coefficient!r} times a load of {factor:g} N"
+        text = f"force = {guessed.coefficient!r} times a load of {factor:g} N"
         if load_N is None:
-            text = f"{found.coefficient!r} is told as a coefficient: the load is not known; add --load 94.5N"
+            text = f"{guessed.coefficient!r} is a coefficient: the load is unknown; add --load 94.5N"
         findings.append(Finding("assumed", path.name, text))
     findings += [
         *of_values(table, _as_read(channels, columns), findings),
         *of_time(columns["t_s"], f"{path.name}: t_s"),
     ]
-    zero_N, told = tare_of(columns["drive_force_N"], columns.get("drive_position_m"), f"{path.name}: drive_force_N")
-    findings += told
+    zero_N, tare_findings = tare_of(
+        columns["drive_force_N"], columns.get("drive_position_m"), f"{path.name}: drive_force_N"
+    )
+    findings += tare_findings
     if zero_N:
         columns["drive_force_N"] = columns["drive_force_N"] - zero_N
         channels["drive_force_N"] = channels["drive_force_N"].model_copy(update={"offset": -zero_N})
-    if found.position and asked.speed_mps is not None:
+    if guessed.position and asked.speed_mps is not None:
         del columns["drive_position_m"], channels["drive_position_m"]
-        findings.append(Finding("assumed", path.name, f"the speed is that of --speed: {found.position!r} is not used"))
-    elif found.position and is_of_slide(columns["t_s"], columns["drive_force_N"], columns["drive_position_m"]):
+        findings.append(
+            Finding("assumed", path.name, f"the speed is taken from --speed: {guessed.position!r} is not used")
+        )
+    elif guessed.position and is_of_slide(columns["t_s"], columns["drive_force_N"], columns["drive_position_m"]):
         del columns["drive_position_m"]
         channels["mass_position_m"] = channels.pop("drive_position_m")
-        text = f"{found.position!r} stands still in the sticks: it is the slide's, and tells no speed of the drive"
+        text = f"{guessed.position!r} is constant during the sticks: it belongs to the slide, and gives no drive speed"
         findings.append(Finding("assumed", path.name, f"{text}; add --speed 0.5mm/s"))
     if (
-        found.speed
-        and not found.position
+        guessed.speed
+        and not guessed.position
         and asked.speed_mps is None
-        and len(table.columns[found.speed]) == len(columns["t_s"])
+        and len(table.columns[guessed.speed]) == len(columns["t_s"])
     ):
         columns["drive_position_m"] = _way(
-            columns["t_s"], _si(table, found.speed, "rad/s" if torsion else "m/s", findings)
+            columns["t_s"], _si(table, guessed.speed, "rad/s" if torsion else "m/s", findings)
         )
-    known = Known(asked.speed_mps, load_N, asked.mass_kg, of_load and load_N is None, torsion)
+    known = RecordFacts(asked.speed_mps, load_N, asked.mass_kg, of_load and load_N is None, torsion)
     return _record(path, columns, known, findings, map_text(table, channels, asked), of_load)
 
 
 def _is_run_log(path: Path) -> bool:
-    """Whether a log in MCAP has the sensors of this project."""
+    """True if an MCAP log has the sensors of this project."""
     try:
         columns_of_log(path)
     except Fault as fault:
@@ -153,13 +155,18 @@ def _is_run_log(path: Path) -> bool:
 
 
 def _record(
-    path: Path, columns: dict[str, Floats], known: Known, findings: list[Finding], text: str, of_load: bool = False
-) -> Record:
+    path: Path,
+    columns: dict[str, Floats],
+    known: RecordFacts,
+    findings: list[Finding],
+    text: str,
+    of_load: bool = False,
+) -> MeasuredRecord:
     if "drive_force_N" not in columns:
-        raise Fault("BAD_TABLE", f"{path.name}: has no drive_force_N: a force is needed; map one in [channels]")
-    there, rows = int(np.count_nonzero(np.isfinite(columns["t_s"] + columns["drive_force_N"]))), len(columns["t_s"])
-    if there < min(FEWEST, rows):
-        text = f"{path.name}: {there} of {rows} rows have a time and a force: must be {FEWEST} at least"
+        raise Fault("BAD_TABLE", f"{path.name}: has no drive_force_N: a force is needed; map a force in [channels]")
+    complete, rows = int(np.count_nonzero(np.isfinite(columns["t_s"] + columns["drive_force_N"]))), len(columns["t_s"])
+    if complete < min(FEWEST, rows):
+        text = f"{path.name}: {complete} of {rows} rows have a time and a force: at least {FEWEST} are needed"
         raise Fault(
             "BAD_TABLE", f"{text}; name other columns, or let a spreadsheet program calculate and save its formulas"
         )
@@ -168,52 +175,52 @@ def _record(
         not np.isfinite(position).any() or float(np.nanmax(position) - np.nanmin(position)) == 0.0
     ):
         position = None
-    return Record(path, columns["t_s"], columns["drive_force_N"], position, known, findings, text, of_load)
+    return MeasuredRecord(path, columns["t_s"], columns["drive_force_N"], position, known, findings, text, of_load)
 
 
-def _channels(table: Table, found: Guess) -> dict[str, ChannelMap]:
+def _channels(table: Table, guessed: Guess) -> dict[str, ChannelMap]:
     channels: dict[str, ChannelMap] = {}
-    if found.time:
-        channels["t_s"] = ChannelMap(column=found.time)
-    if found.force:
-        channels["drive_force_N"] = ChannelMap(column=found.force)
+    if guessed.time:
+        channels["t_s"] = ChannelMap(column=guessed.time)
+    if guessed.force:
+        channels["drive_force_N"] = ChannelMap(column=guessed.force)
     else:
-        known = known_unit(table.unit(found.coefficient))
-        channels["drive_force_N"] = ChannelMap(column=found.coefficient, scale=known[1] if known else 1.0)
-    if found.position:
-        channels["drive_position_m"] = ChannelMap(column=found.position)
+        known = known_unit(table.unit(guessed.coefficient))
+        channels["drive_force_N"] = ChannelMap(column=guessed.coefficient, scale=known[1] if known else 1.0)
+    if guessed.position:
+        channels["drive_position_m"] = ChannelMap(column=guessed.position)
     return channels
 
 
 def _as_read(channels: dict[str, ChannelMap], columns: dict[str, Floats]) -> dict[str, Floats]:
-    """Columns by the names that find them in the table."""
+    """Columns by their names in the table."""
     return {str(channel.column): columns[name] for name, channel in channels.items()}
 
 
 def _si(table: Table, column: str, unit: str, findings: list[Finding]) -> Floats:
-    """A load or a speed in its SI unit, which it is taken to have where it states none; a finding then."""
+    """A load or a speed in SI units; without a stated unit it is taken as SI, with a finding."""
     known = (weight_unit if unit == "N" else known_unit)(table.unit(column))
     if known is None:
         add = "--load 94.5N" if unit == "N" else "--speed 0.5mm/s"
-        text = f"states no unit that is known here: taken as {unit}; add {add} if it is not"
+        text = f"states no known unit: taken as {unit}; add {add} if it is not"
         findings.append(Finding("assumed", f"{table.path.name}: {column}", text))
     return table.column(column) * (known[1] if known else 1.0)
 
 
 def _way(t_s: Floats, speed_mps: Floats) -> Floats:
-    """The way at a speed, [samples]."""
+    """Displacement from a speed, [samples]."""
     steps = 0.5 * (speed_mps[1:] + speed_mps[:-1]) * np.diff(t_s)
     return np.concatenate([[0.0], np.cumsum(np.where(np.isfinite(steps), steps, 0.0))])
 
 
 def _unitless(table: Table, channels: dict[str, ChannelMap]) -> list[Finding]:
-    """A finding for each channel whose unit nobody states."""
+    """A finding for each channel without a stated unit."""
     taken = {"t_s": "s", "drive_force_N": "N", "drive_position_m": "m"}
     return [
         Finding(
             "assumed",
             f"{table.path.name}: {channel.column}",
-            f"states no unit: taken as {taken[name]}; a map may say unit = ...",
+            f"states no unit: taken as {taken[name]}; set unit = ... in a map if it is not",
         )
         for name, channel in channels.items()
         if channel.scale is None
@@ -227,9 +234,9 @@ def _is_time(table: Table, channel: ChannelMap) -> bool:
     return counted_already or calendar_unit_s(times_s) is not None
 
 
-def map_text(table: Table, channels: dict[str, ChannelMap], asked: Asked) -> str:
-    """The map that reads the file as it was read: to be corrected, and given to `--map`."""
-    lines = [f"# how {table.path.name} was read; correct what is wrong and give this file to --map"]
+def map_text(table: Table, channels: dict[str, ChannelMap], asked: LookOptions) -> str:
+    """Map that reproduces the reading of the file, to correct and give to `--map`."""
+    lines = [f"# how {table.path.name} was read; correct mistakes and give this file to --map"]
     source: dict[str, Any] = dict(table.written)
     source.pop("columns", None)
     if "t_s" not in channels and (rate_Hz := asked.rate_Hz or table.sample_rate_Hz):

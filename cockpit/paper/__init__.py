@@ -1,5 +1,5 @@
 """The paper redone: its figures, tables and claims.
 
-runs     what is simulated            claims   each claim with its number and whether it holds
-plots    the figures                  page     all of it in one offline page (template: page.html.j2)
+runs     the simulated runs            claims   each claim with our number and the result
+plots    the figures                   page     all of it in one offline page (template: page.html.j2)
 """

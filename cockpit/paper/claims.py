@@ -1,4 +1,4 @@
-"""What the paper says and what its model gives, a row each: claim, our number, criterion, pass or fail."""
+"""Claims of the paper against its model, a row each: claim, our number, criterion, pass or fail."""
 
 import math
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ _AREA_MM2: Final = 1192.0
 _FRICTION_COEFFICIENT: Final = {"C45-C45": 0.193, "C45-GGG40": 0.176}  # Table 2
 
 # The same equations by the classic Runge-Kutta method in steps of 1 us: F_d max [N], F_d min [N], period [s];
-# where the stick-slip is gone, the force at which the slide settles.
+# without stick-slip, the settled force.
 REFERENCE: Final[dict[Key, tuple[float, float, float] | tuple[float]]] = {
     ("C45-C45 @ 0.063", 0): (17.38, 11.60, 1.028),
     ("C45-C45 @ 0.063", 1000): (16.90, 12.08, 1.015),
@@ -43,7 +43,7 @@ REFERENCE: Final[dict[Key, tuple[float, float, float] | tuple[float]]] = {
 
 
 class PaperRow(NamedTuple):
-    """One line of the report. `deviation_percent` is None where a claim is not a number."""
+    """One line of the report. `deviation_percent` is None for a claim without a number."""
 
     group: str
     claim: str
@@ -73,7 +73,7 @@ def paper_claims(runs: Mapping[Key, PairRun]) -> list[PaperRow]:
         rows.append(
             PaperRow(
                 PAPER_CLAIMS,
-                f"{pair}: no stick-slip without vibration (it follows from friction values that are assumed, see below)",
+                f"{pair}: no stick-slip without vibration (follows from assumed friction values, see below)",
                 f"{ours.mean.late_slips:.0f} slips; F_d {ours.mean.settled_force_N:.2f} N",
                 "no slip",
                 ours.mean.late_slips == 0,
@@ -124,19 +124,19 @@ def _claims_of_a_pair(pair: str, runs: Mapping[Key, PairRun]) -> list[PaperRow]:
 
 
 def _stick_row(pair: str, sticks_s: list[float]) -> PaperRow:
-    found = " → ".join(f"{stick_s:.3f}" for stick_s in sticks_s) + " s"
+    chain = " → ".join(f"{stick_s:.3f}" for stick_s in sticks_s) + " s"
     claim, criterion, passed = (
         f"{pair}: the stick phases shorten with f (re-stick to next breakaway at 0 → 1 → 2 → 3 kHz)",
         "shorter at each step",
         _falling(sticks_s),
     )
     if not pair.startswith("C45-C45"):
-        # the paper says it of steel on steel (Figures 3, 4); on cast iron one step of three is 0.2-0.5 %
+        # the paper claims it for steel on steel (Figures 3, 4); on cast iron one step of three is 0.2-0.5 %
         # longer
-        claim = f"{pair}: the stick phases are shorter at 3 kHz than at 0 (the paper says so of steel only)"
-        criterion = "shorter at 3 kHz than at 0; not asked of each step"
+        claim = f"{pair}: the stick phases are shorter at 3 kHz than at 0 (claimed by the paper for steel only)"
+        criterion = "shorter at 3 kHz than at 0; not required at each step"
         passed = sticks_s[3] < sticks_s[0]
-    return PaperRow(PAPER_CLAIMS, claim, found, criterion, passed)
+    return PaperRow(PAPER_CLAIMS, claim, chain, criterion, passed)
 
 
 def _falling(values: list[float]) -> bool:
@@ -144,7 +144,7 @@ def _falling(values: list[float]) -> bool:
 
 
 def reference_rows(runs: Mapping[Key, PairRun]) -> list[PaperRow]:
-    """Every number of the independent solution against ours."""
+    """All numbers of the independent solution against ours."""
     rows: list[PaperRow] = []
     group = "Numbers against an independent solution"
     for (pair, frequency_Hz), reference in REFERENCE.items():
@@ -181,7 +181,7 @@ def slip_rows(slip: Slip) -> list[PaperRow]:
 
 
 def parameter_rows() -> list[PaperRow]:
-    """Tables 1 and 2: do the printed values agree with the laws that the paper gives for them?"""
+    """Tables 1 and 2: the printed values against the laws in the paper."""
     rows: list[PaperRow] = []
     group = "Tables 1 and 2 agree with themselves"
     for pair in STEEL_PAIRS:

@@ -1,10 +1,13 @@
-"""`stickslip reproduce`: redo the paper's calculation and say, line by line, whether it holds."""
+"""`stickslip reproduce`: redo the paper's calculation and report line by line whether it holds."""
 
 import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from jinja2 import Environment, StrictUndefined  # here, so that it is missed before minutes of simulation
+from jinja2 import (
+    Environment,
+    StrictUndefined,
+)  # at the top, so that a missing package fails before minutes of simulation
 
 from bridge.files import write_whole
 from bridge.provenance import provenance
@@ -24,19 +27,19 @@ from cockpit.paper.runs import (
 
 
 class ReproduceResult(NamedTuple):
-    """Every check of the report in its order, and how long the whole took."""
+    """All checks of the report in order, and the total time."""
 
     rows: list[PaperRow]
     elapsed_s: float
 
     @property
     def passed(self) -> bool:
-        """Whether every check holds."""
+        """True if every check holds."""
         return all(row.passed for row in self.rows)
 
     @property
     def verdict(self) -> str:
-        """The one line to print."""
+        """The line to print."""
         held = sum(row.passed for row in self.rows)
         claims = [row for row in self.rows if row.group == PAPER_CLAIMS]
         claims_held = sum(row.passed for row in claims)
@@ -50,10 +53,10 @@ class ReproduceResult(NamedTuple):
 
 
 def reproduce(out: Path, progress: bool) -> ReproduceResult:
-    """Redo the paper and write the report to `out`, one HTML file that needs nothing else.
+    """Redo the paper and write the report to `out`, one self-contained HTML file.
 
-    The file is written whole, after everything has been computed; its folder must exist. `progress` shows a
-    bar on stderr, which stays away by itself when stderr is not a terminal.
+    The file is written at once, after all computations; its folder must exist. `progress` shows a bar on stderr, if stderr is
+    a terminal.
 
     Raises OSError when `out` cannot be written.
     """

@@ -57,7 +57,7 @@ def _sweep(runs: Mapping[Key, PairRun], number: str, pair: str) -> PageFigure:
     return PageFigure(
         f"Figure {number}: {pair} N/mm², 0 to 5 kHz",
         "The four seconds after the vibration comes on at t = 8 s, with the same seconds without it on the "
-        "left. The swing of F_d and the steps of x shrink from left to right; from 4 kHz on there are none.",
+        "left. The swing of F_d and the steps of x shrink from left to right; from 4 kHz on both vanish.",
         _png(figure),
     )
 
@@ -81,7 +81,7 @@ def _against_frequency(runs: Mapping[Key, PairRun], number: str, material: str) 
     f_kHz = np.array(FREQUENCIES_HZ) / 1000.0
     for axis, pressure in zip(axes[0], ("0.063", "0.104"), strict=True):
         at = [runs[f"{material} @ {pressure}", f].mean for f in FREQUENCIES_HZ]
-        # without slips the largest and the smallest force are the one at which the slide runs evenly
+        # without slips the largest and the smallest force are both the force of even sliding
         high_N = [m.settled_force_N if np.isnan(m.force_max_N) else m.force_max_N for m in at]
         low_N = [m.settled_force_N if np.isnan(m.force_min_N) else m.force_min_N for m in at]
         axis.plot(f_kHz, high_N, "o-", color=_SLIDE, label="F_d max")

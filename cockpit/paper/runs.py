@@ -1,4 +1,4 @@
-"""The paper's runs, redone: every pair, pressure and frequency, and what each of them measures."""
+"""The paper's runs, redone: every pair, pressure and frequency, and the measurements of each run."""
 
 import math
 from collections.abc import Callable
@@ -20,13 +20,13 @@ DRIVE_VELOCITY_MPS: Final = 0.0005
 VIBRATION_FROM_S: Final = 8.0
 DURATION_S: Final = 20.0
 CYCLES_FROM_S: Final = 10.5
-# A spring that is wound up when the vibration starts lets go at once; that slip (36 ms) is over by then.
+# A loaded spring releases one slip (36 ms) when the vibration starts; it is over by this time.
 RELEASED_S: Final = 8.1
 # At 5 kHz the force is still climbing by 0.1 N at 10.5 s; from 16 s on it moves by less than 0.03 N.
 SETTLED_FROM_S: Final = 16.0
 
-# Below 2 kHz one run is chaotic: where in its cycle the vibration finds the slide decides the next cycles,
-# and the mean period of one run scatters by 0.8 %. 16 starts spread over two seconds bring the mean to 0.2 %.
+# Below 2 kHz a run is chaotic: the phase at which the vibration starts decides the next cycles, and the mean period
+# of a run scatters by 0.8 %. 16 starts spread over two seconds bring the mean to 0.2 %.
 ENSEMBLE_BELOW_HZ: Final = 2000
 ENSEMBLE_STARTS_S: Final = tuple(VIBRATION_FROM_S + 0.131 * start for start in range(16))
 
@@ -34,7 +34,7 @@ Key = tuple[str, int]
 
 
 class Course(NamedTuple):
-    """Time courses for the figures, one point a millisecond: force [N], position of slide and drive [m]."""
+    """Time courses for the figures, one point per millisecond: force [N], position of slide and drive [m]."""
 
     t_s: Floats
     drive_force_N: Floats
@@ -43,9 +43,9 @@ class Course(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """What one run gives: cycle means over t = 10.5-20 s, and the level of the force over t = 16-20 s.
+    """Measurements of one run: cycle means over t = 10.5-20 s, and the level of the force over t = 16-20 s.
 
-    The first five are nan in a run without slips there. `late_slips` counts from the end of the release at
+    The first five are nan without slips in that time. `late_slips` counts from the end of the release at
     switch-on.
     """
 
@@ -89,12 +89,12 @@ def paper_rig(pair: str) -> RigConfig:
 
 
 def starts_s(frequency_Hz: int) -> tuple[float, ...]:
-    """When the vibration starts in the runs that are averaged."""
+    """Start times of the vibration in the averaged runs."""
     return ENSEMBLE_STARTS_S if 0 < frequency_Hz < ENSEMBLE_BELOW_HZ else (VIBRATION_FROM_S,)
 
 
 def plan() -> list[Key]:
-    """Every pair and frequency of the paper; PTFE, which does not stick, only without vibration."""
+    """All pairs and frequencies of the paper; PTFE, which does not stick, only without vibration."""
     return [(pair, f) for pair in STEEL_PAIRS for f in FREQUENCIES_HZ] + [(pair, 0) for pair in PTFE_PAIRS]
 
 

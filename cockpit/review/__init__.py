@@ -1,8 +1,8 @@
-"""A log, or two laid over each other, as one HTML file that needs nothing else.
+"""One log, or two overlaid, as one self-contained HTML file.
 
-panels        which curves stand together, and what there is to see in them
-bands         what the controller did, as stretches of time with a word each
-differences   parameters of two logs that are not the same
+panels        which curves share a panel, and the hint above it
+bands         modes and limits of the controller as intervals with a word each
+differences   parameters that differ between two logs
 data          all of it as JSON, curves as base64 of float32
-page          the file: page.html with page.css, the scripts and uPlot (vendor/, version 1.6.32, MIT) inside
+page          the file, assembled from page.html, page.css, the scripts and uPlot (vendor/, version 1.6.32, MIT)
 """

@@ -1,16 +1,16 @@
-"""What the controller and the rig's guard did, as stretches of time with a word each."""
+"""Modes and limits of the controller and the rig's guard, as time intervals with a word each."""
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from bridge.log.logfile import RunData
-from bridge.wire.words import Word, words
+from bridge.wire.words import ColumnWord, words
 from cockpit.figures.grid import Grid
 
 
-class Row(NamedTuple):
-    """One row of bands: what it tells, and from when until when which word held [s]."""
+class BandRow(NamedTuple):
+    """One row of bands: start [s], end [s] and word of each interval."""
 
     title: str
     column: str  # of `bridge.wire.words`
@@ -26,35 +26,35 @@ _ROWS = (
 )  # title, column of words, topic, field
 
 
-def bands_of(run: RunData, grid: Grid) -> list[Row]:
-    """The rows that a log holds; what is shorter than a step of the grid may be missing."""
-    rows: list[Row] = []
+def bands_of(run: RunData, grid: Grid) -> list[BandRow]:
+    """Rows for the topics in a log; an interval shorter than a grid step may be missing."""
+    rows: list[BandRow] = []
     for title, column, topic, field in _ROWS:
         table = getattr(run, topic)
         numbers = table[field] if len(table) else np.zeros(0)
         if len(numbers) and (title in {"mode", "contact", "reason"} or numbers.any()):
-            rows.append(Row(title, column, _stretches(table["t_ns"] * 1e-9, numbers, grid, _by_number(column))))
+            rows.append(BandRow(title, column, _stretches(table["t_ns"] * 1e-9, numbers, grid, _by_number(column))))
     return rows
 
 
 def title_of(column: str) -> str:
-    """The title of the row that shows a column of words."""
+    """Title of the row for a column of words."""
     return next(title for title, known, _, _ in _ROWS if known == column)
 
 
-def used_words(rows: list[Row]) -> list[Word]:
-    """What the words in these rows mean, each once, in the order of the rows."""
+def used_words(rows: list[BandRow]) -> list[ColumnWord]:
+    """The words used in the rows, each once, in the order of the rows."""
     used = {(row.column, word) for row in rows for _, _, word in row.stretches}
     order = [column for _, column, _, _ in _ROWS]
-    return sorted((one for one in words() if (one.column, one.word) in used), key=lambda one: order.index(one.column))
+    return sorted((row for row in words() if (row.column, row.word) in used), key=lambda row: order.index(row.column))
 
 
 def _by_number(column: str) -> dict[int, str]:
-    return {one.number: one.word for one in words() if one.column == column}
+    return {word.number: word.word for word in words() if word.column == column}
 
 
 def _stretches(t_s: Any, numbers: Any, grid: Grid, names: dict[int, str]) -> list[tuple[float, float, str]]:
-    """Runs of one number; a number holds from a step before its time on, as it is told at the end of a block."""
+    """Intervals of a constant number. Each starts one step early: numbers are reported at the end of a block."""
     at = np.rint((t_s - grid.start_s) / grid.step_s)
     last_of_bin = np.flatnonzero(np.diff(at, append=np.inf) != 0)
     at, numbers = at[last_of_bin], numbers[last_of_bin]

@@ -1,12 +1,12 @@
-// Curves: one plot of uPlot a panel, all with the same time axis, which zooms them together.
+// Curves: one uPlot plot per panel, all zoomed by the same time axis.
 "use strict";
 
-const LEFT = 64, RIGHT = 14; // pixels beside the plotting area, the same for every panel and the ribbon
+const LEFT = 64, RIGHT = 14; // margins of the plotting area in pixels, the same for all panels and the ribbon
 const EXCITING = "#e4f0e1", LIMIT = "#b5402a", MARK = "#b5402a", BEGIN = "#1f2d3a";
 
-/** Curves of the page, as JSON with base64 of little-endian float32, as arrays; null where there is no value. */
+/** Decode a curve (base64 of little-endian float32) to an array; null for missing values. */
 function unpacked(text) {
-  if (Array.isArray(text)) return text; // of a rig that is watched
+  if (Array.isArray(text)) return text; // live page
   const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   return Array.from(new Float32Array(bytes.buffer), (value) => (Number.isNaN(value) ? null : value));
 }
@@ -16,7 +16,7 @@ function faint(colour, alpha) {
   return colour + Math.round(255 * alpha).toString(16).padStart(2, "0");
 }
 
-/** A text with its symbols set as symbols: the d of F_d is an index. */
+/** A text with typeset symbols: the d of F_d becomes an index. */
 function rich(text) {
   return text.split(/\b([vFuskx])_([a-z0-9])\b/).map((part, at) => {
     if (at % 3 !== 2) return part;
@@ -26,7 +26,7 @@ function rich(text) {
   });
 }
 
-/** What is zoomed: the plots and whoever else shows a time axis. */
+/** The shared time axis; plots and the ribbon listen to it. */
 class TimeAxis {
   constructor(least, most) {
     this.least = least;
@@ -34,7 +34,7 @@ class TimeAxis {
     this.from = this.least;
     this.to = this.most;
     this.listeners = [];
-    const wanted = location.hash.match(/^#([0-9.]+)-([0-9.]+)$/); // a part of the run, as in page.html#2.9-3.1
+    const wanted = location.hash.match(/^#([0-9.]+)-([0-9.]+)$/); // part of the run, as in page.html#2.9-3.1
     if (wanted) this.show(Number(wanted[1]), Number(wanted[2]));
   }
 
@@ -50,7 +50,7 @@ class TimeAxis {
   }
 }
 
-/** The series of one curve: its mean as a line, and where there is a range its least and largest value as a band. */
+/** Series of one curve: its mean as a line, and its range, if any, as a band. */
 function seriesOf(curve, logs) {
   const second = curve.log > 0;
   const colour = second ? faint(curve.colour, 0.6) : curve.colour;
@@ -62,7 +62,7 @@ function seriesOf(curve, logs) {
   return "least" in curve ? [range, { ...range }, line] : [line];
 }
 
-/** Draw behind the curves: when it vibrated, and from when on the controller was in charge. */
+/** Draw behind the curves: times of vibration, and the start of control. */
 function drawBehind(plot, logs) {
   if (logs.length > 1) return;
   const { ctx, bbox } = plot;
@@ -89,7 +89,7 @@ function drawBehind(plot, logs) {
   ctx.restore();
 }
 
-/** Draw over the curves: limits as dashed lines with their words, slips as triangles. */
+/** Draw over the curves: limits as dashed, labelled lines; slips as triangles. */
 function drawOver(plot, panel, logs) {
   const { ctx, bbox } = plot;
   ctx.save();
@@ -127,7 +127,7 @@ function drawOver(plot, panel, logs) {
   ctx.restore();
 }
 
-/** The least and the largest of all that a panel shows in its whole height, with its limits, and room around it. */
+/** Vertical range of a panel: all curves and limits, with a margin. */
 function heightOf(panel) {
   return (plot, least, most) => {
     const limits = panel.limits.map((limit) => limit.value);
@@ -138,7 +138,7 @@ function heightOf(panel) {
   };
 }
 
-/** What a plot of a panel draws, in the order of its series: the first curve is drawn last, on top. */
+/** Columns of a panel in the order of its series: the first curve is drawn last, on top. */
 function columnsOf(panel, x) {
   const columns = [x];
   for (const curve of [...panel.curves].reverse()) {
@@ -148,7 +148,7 @@ function columnsOf(panel, x) {
   return columns;
 }
 
-/** One panel as a plot in `place`. */
+/** Plot a panel in `place`. */
 function plotOf(place, panel, x, logs, axis) {
   const series = [{ label: "time", value: (plot, value) => (value === null || value === undefined ? "-" : `${value.toFixed(3)} s`) }];
   const bands = [], hidden = [];

@@ -1,4 +1,4 @@
-"""What a page shows of one or two logs, as one JSON object; curves are base64 of little-endian float32 in an even time grid."""
+"""Content of a page for one or two logs as one JSON object; curves are base64 of little-endian float32 on an even time grid."""
 
 import base64
 import math
@@ -12,7 +12,7 @@ from bridge.log.logfile import RunData, block_period_ns, read_run
 from bridge.provenance import Provenance, shown_name
 from bridge.wire.event_codes import EVENTS, LETTERS
 from cockpit.figures.grid import Envelope, Grid, on_grid
-from cockpit.figures.signals import SIGNALS, Floats, Signal, holds, limits_of, samples_of
+from cockpit.figures.signals import SIGNALS, Floats, PlottedSignal, holds, limits_of, samples_of
 from cockpit.judge.judged import judge_tables
 from cockpit.judge.verdict import RunVerdict
 from cockpit.judge.verdict_words import headline, in_words
@@ -22,20 +22,20 @@ from cockpit.review.panels import PANELS
 from diagnosis.features.cycles import Cycles
 
 FORMAT = "stickslip-review/1"
-# of all logs together where a run is longer: 11 signals of three values are 3.5 MB then; two runs of 20 s are 4.5 MB
+# of all logs together, for longer runs: 11 signals of three values then take 3.5 MB; two runs of 20 s take 4.5 MB
 _MOST_BINS = 20_000
-_PER_DECADE = 20  # bars of the histogram of latency
-_MOST_EVENTS = 2000  # of one log that are listed
+_PER_DECADE = 20  # bins of the latency histogram
+_MOST_EVENTS = 2000  # listed per log
 
 
 def review_data(paths: Sequence[Path], made: Provenance) -> tuple[dict[str, Any], list[RunVerdict]]:
-    """The page's data and what came of each log. Raises Fault BAD_LOG."""
+    """Data of the page, and the verdict of each log. Raises Fault BAD_LOG."""
     runs = [read_run(path) for path in paths]
     grid = _grid(runs)
     judged = [judge_tables(run) for run in runs]
     verdicts = [verdict for verdict, _ in judged]
     labels = [chr(ord("A") + number) for number in range(len(runs))]
-    shown = [_log(run, *one, label, grid) for run, one, label in zip(runs, judged, labels, strict=True)]
+    shown = [_log(run, *judgement, label, grid) for run, judgement, label in zip(runs, judged, labels, strict=True)]
     parameters = [parameters_of(run) for run in runs]
     rows = [row for run in runs for row in bands_of(run, grid)]
     data = {
@@ -44,23 +44,23 @@ def review_data(paths: Sequence[Path], made: Provenance) -> tuple[dict[str, Any]
         "grid": {"start_s": grid.start_s, "step_s": grid.step_s, "bins": grid.bins},
         "logs": shown,
         "figures": _figures(verdicts),
-        "panels": [one for one in (_panel(panel, runs, grid) for panel in PANELS) if one["curves"]],
+        "panels": [panel for panel in (_panel(panel, runs, grid) for panel in PANELS) if panel["curves"]],
         "words": [
-            {"row": title_of(one.column), "word": _said(one.word), "help": one.help.replace("`", "")}
-            for one in used_words(rows)
+            {"row": title_of(word.column), "word": _lower(word.word), "help": word.help.replace("`", "")}
+            for word in used_words(rows)
         ],
         "parameters": [{"key": key, "value": value} for key, value in sorted(parameters[0].items())],
-        "differences": [one._asdict() for one in differences([*parameters])] if len(runs) > 1 else [],
+        "differences": [difference._asdict() for difference in differences([*parameters])] if len(runs) > 1 else [],
     }
     return data, verdicts
 
 
 def _grid(runs: Sequence[RunData]) -> Grid:
-    """One grid for all logs: a bin a block, or wider ones where the run is long."""
+    """One grid for all logs: a bin per block, or wider bins for long runs."""
     t_s = [run.sensors["t_ns"] * 1e-9 for run in runs if len(run.sensors)]
     if not t_s:
         return Grid(0.0, 1e-3, 1)
-    start_s, end_s = min(float(one.min()) for one in t_s), max(float(one.max()) for one in t_s)
+    start_s, end_s = min(float(times.min()) for times in t_s), max(float(times.max()) for times in t_s)
     step_s = min(block_period_ns(run.sensors) for run in runs if len(run.sensors)) * 1e-9
     most = _MOST_BINS
     if (end_s - start_s) / step_s > most:
@@ -73,15 +73,13 @@ def _log(run: RunData, verdict: RunVerdict, cycles: Cycles | None, label: str, g
         "label": label,
         "name": shown_name(run.path.name),
         "answer": headline(verdict),
-        "good": None
-        if verdict.imported and verdict.good
-        else verdict.good,  # there is no controller that could be judged
+        "good": None if verdict.imported and verdict.good else verdict.good,  # an import has no controller to judge
         "in_charge_from_s": verdict.enabled_from_s if verdict.enabled_from_s > 0 and not verdict.imported else None,
         "slips": []
         if cycles is None
         else np.round(np.column_stack([cycles.breakaway_t_s, cycles.breakaway_force_N]), 6).tolist(),
         "bands": [
-            {"title": row.title, "stretches": [(start, end, _said(word)) for start, end, word in row.stretches]}
+            {"title": row.title, "stretches": [(start, end, _lower(word)) for start, end, word in row.stretches]}
             for row in bands_of(run, grid)
         ],
         "events": _events(run),
@@ -89,21 +87,21 @@ def _log(run: RunData, verdict: RunVerdict, cycles: Cycles | None, label: str, g
     }
 
 
-def _said(word: str) -> str:
+def _lower(word: str) -> str:
     return word.lower().replace("_", " ")
 
 
 def _figures(verdicts: Sequence[RunVerdict]) -> list[dict[str, Any]]:
-    """The lines of the verdicts side by side: a row for each thing that they tell, with the words of each log."""
-    told: list[dict[str, list[str]]] = []
+    """Lines of the verdicts side by side: a row per title, with the text of each log."""
+    tables: list[dict[str, list[str]]] = []
     for verdict in verdicts:
         lines: dict[str, list[str]] = {}
         for line in in_words(verdict, verbose=True)[1:]:
             what, _, words = line.partition(" ")
             lines.setdefault(what, []).append(words.strip())
-        told.append(lines)
-    names = list(dict.fromkeys(name for lines in told for name in lines if name != "log"))
-    return [{"what": name, "logs": [lines.get(name, []) for lines in told]} for name in names]
+        tables.append(lines)
+    names = list(dict.fromkeys(name for lines in tables for name in lines if name != "log"))
+    return [{"what": name, "logs": [lines.get(name, []) for lines in tables]} for name in names]
 
 
 def _panel(panel: Any, runs: Sequence[RunData], grid: Grid) -> dict[str, Any]:
@@ -117,8 +115,8 @@ def _panel(panel: Any, runs: Sequence[RunData], grid: Grid) -> dict[str, Any]:
     limits = [limits_of(run, signals[0].axis) for run in runs]
     named = [
         (words if len({*map(tuple, limits)}) == 1 else f"{words} ({chr(ord('A') + number)})", value)
-        for number, one in enumerate(limits)
-        for words, value in one
+        for number, of_log in enumerate(limits)
+        for words, value in of_log
     ]
     return {
         "title": panel.title,
@@ -126,14 +124,14 @@ def _panel(panel: Any, runs: Sequence[RunData], grid: Grid) -> dict[str, Any]:
         "unit": signals[0].unit,
         "axis": signals[0].axis,
         "open": panel.is_open,
-        "empty": not any(one["known"] for one in curves),
+        "empty": not any(curve["known"] for curve in curves),
         "slips": panel.signals[0] == "drive_force_N",
         "limits": [{"words": words, "value": value * signals[0].factor} for words, value in dict.fromkeys(named)],
         "curves": curves,
     }
 
 
-def _curve(run: RunData, number: int, signal: Signal, grid: Grid) -> dict[str, Any]:
+def _curve(run: RunData, number: int, signal: PlottedSignal, grid: Grid) -> dict[str, Any]:
     t_s, values = samples_of(run, signal)
     made = on_grid(t_s, values * signal.factor, grid)
     if signal.topic != "sensors" and len(t_s) > 1:
@@ -153,7 +151,7 @@ def _curve(run: RunData, number: int, signal: Signal, grid: Grid) -> dict[str, A
 
 
 def _held(made: Envelope, bins: int) -> Envelope:
-    """Values that come every so many bins hold until the next one comes."""
+    """Hold each value until the next, for values that arrive every `bins` bins."""
     if bins <= 1:
         return made
     known = np.flatnonzero(np.isfinite(made.mean))
@@ -170,24 +168,24 @@ def _packed(values: Floats) -> str:
 
 
 def _events(run: RunData) -> list[dict[str, Any]]:
-    # pauses of the computer may be many, and must not crowd out what matters
-    first = sorted(run.events, key=lambda one: (one.code.endswith("PAUSE"), one.t_ns))[:_MOST_EVENTS]
-    events = sorted(first, key=lambda one: one.t_ns)
+    # stalls of the computer may be many: they must not crowd out other events
+    first = sorted(run.events, key=lambda event: (event.code.endswith("PAUSE"), event.t_ns))[:_MOST_EVENTS]
+    events = sorted(first, key=lambda event: event.t_ns)
     return [
         {
-            "t_s": round(one.t_ns * 1e-9, 6),
-            "source": one.source,
-            "code": one.code,
-            "text": one.text,
-            "help": EVENTS[one.code].help.replace("`", "") if one.code in EVENTS else "",
-            "weight": LETTERS[EVENTS[one.code].letter] if one.code in EVENTS else "",
+            "t_s": round(event.t_ns * 1e-9, 6),
+            "source": event.source,
+            "code": event.code,
+            "text": event.text,
+            "help": EVENTS[event.code].help.replace("`", "") if event.code in EVENTS else "",
+            "weight": LETTERS[EVENTS[event.code].letter] if event.code in EVENTS else "",
         }
-        for one in events
+        for event in events
     ]
 
 
 def _latency(run: RunData) -> dict[str, Any] | None:
-    """How often a command took how long, from the block out to its command in; None in lockstep and without commands."""
+    """Histogram of the latency from a block to its command; None in lockstep and without commands."""
     round_trip_us = run.applied["round_trip_ns"][run.applied["round_trip_ns"] > 0] * 1e-3
     if not len(round_trip_us):
         return None
@@ -195,4 +193,4 @@ def _latency(run: RunData) -> dict[str, Any] | None:
     highest = math.floor(math.log10(float(round_trip_us.max())) * _PER_DECADE) + 1
     edges_us = 10.0 ** (np.arange(lowest, highest + 1) / _PER_DECADE)
     counts = np.histogram(round_trip_us, edges_us)[0]
-    return {"edges_us": [round(float(one), 3) for one in edges_us], "counts": counts.tolist()}
+    return {"edges_us": [round(float(edge), 3) for edge in edges_us], "counts": counts.tolist()}

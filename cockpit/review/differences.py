@@ -1,4 +1,4 @@
-"""Parameters of logs by their keys, and those of two logs that are not the same."""
+"""Parameters of logs by key, and the differences between logs."""
 
 import json
 from collections.abc import Mapping
@@ -8,32 +8,32 @@ from bridge.log.logfile import RunData
 from cockpit.judge.verdict_words import VERDICT
 
 
-class Difference(NamedTuple):
-    """A parameter with its value in each log; empty where a log has none."""
+class ParameterDifference(NamedTuple):
+    """A parameter with its value in each log; empty if a log lacks it."""
 
     key: str
     values: list[str]
 
 
 def parameters_of(run: RunData) -> dict[str, str]:
-    """Every number and word that a log holds of its processes, by a key such as `controller.limits.v_ratio`."""
-    found: dict[str, str] = {}
+    """All settings of the processes in a log, by keys such as `controller.limits.v_ratio`."""
+    parameters: dict[str, str] = {}
     for role, table in run.headers.items():
-        if role == VERDICT:  # what came of the run is no parameter of it
+        if role == VERDICT:  # a result, not a parameter
             continue
         for name, text in table.items():
             try:
                 value = json.loads(text)
-            except ValueError:  # a text as it is
+            except ValueError:  # plain text, not JSON
                 value = text
-            _flatten(f"{role}.{name}".replace(".configuration", ""), value, found)
-    return found
+            _flatten(f"{role}.{name}".replace(".configuration", ""), value, parameters)
+    return parameters
 
 
-def differences(tables: list[Mapping[str, str]]) -> list[Difference]:
-    """The keys whose values are not the same in all tables, in the order of their names."""
+def differences(tables: list[Mapping[str, str]]) -> list[ParameterDifference]:
+    """Keys whose values differ between the tables, in alphabetical order."""
     keys = sorted({key for table in tables for key in table})
-    rows = [Difference(key, [table.get(key, "") for table in tables]) for key in keys]
+    rows = [ParameterDifference(key, [table.get(key, "") for table in tables]) for key in keys]
     return [row for row in rows if len({*row.values}) > 1]
 
 

@@ -1,4 +1,4 @@
-// The page: the answer first, then figures, differences, curves, latency, events and words. Texts are set as texts, never as HTML.
+// The page: answer, figures, differences, curves, latency, events and words. Texts are inserted as text, never as HTML.
 "use strict";
 
 const data = JSON.parse(document.getElementById("data").textContent);
@@ -13,8 +13,8 @@ function answers() {
   if (logs.length < 2) return;
   const first = data.differences.slice(0, 4).map((row) => `${row.key} ${row.values.map((value) => value || "(none)").join(" \u2192 ")}`);
   const more = data.differences.length - first.length;
-  const told = first.length ? `From A to B: ${first.join("; ")}${more > 0 ? `; and ${more} more below` : ""}.` : "A and B have the same parameters.";
-  into("answers", made("p", told));
+  const summary = first.length ? `From A to B: ${first.join("; ")}${more > 0 ? `; and ${more} more below` : ""}.` : "A and B have the same parameters.";
+  into("answers", made("p", summary));
 }
 
 function figures() {
@@ -22,14 +22,14 @@ function figures() {
     const cells = row.logs.map((lines) => made("td", lines.length ? lines.flatMap((line, at) => (at ? [made("br", ""), line] : [line])) : "\u2013"));
     return made("tr", [made("td", row.what, { className: "key" }), ...cells], { className: row.what === "warning" ? "warning" : "" });
   });
-  into("figures", made("h2", "What came of it"), table(["", ...logs.map((log) => (logs.length > 1 ? `${log.label}: ${log.name}` : log.name))], rows));
+  into("figures", made("h2", "Results"), table(["", ...logs.map((log) => (logs.length > 1 ? `${log.label}: ${log.name}` : log.name))], rows));
 }
 
 function differences() {
   if (logs.length < 2) return;
   const rows = data.differences.map((row) => made("tr", [made("td", row.key), ...row.values.map((value) => made("td", value || "(none)"))]));
   into("differences", made("h2", "Parameters that differ"));
-  into("differences", rows.length ? table(["parameter", ...logs.map((log) => log.label)], rows) : made("p", "None: both logs hold the same."));
+  into("differences", rows.length ? table(["parameter", ...logs.map((log) => log.label)], rows) : made("p", "None: both logs have the same parameters."));
 }
 
 function curves() {
@@ -39,7 +39,7 @@ function curves() {
   document.getElementById("step").textContent = `${Number(step_ms.toPrecision(3))} ms`;
   for (const panel of data.panels) {
     const place = made("div", []);
-    const hint = made("p", panel.empty ? `${panel.hint} There is none in this run.` : panel.hint, { className: "small" });
+    const hint = made("p", panel.empty ? `${panel.hint} No data in this run.` : panel.hint, { className: "small" });
     if (panel.empty) {
       into("curves", made("h3", panel.title), hint);
       continue;
@@ -84,12 +84,12 @@ function zoom() {
 
 function latency() {
   const with_ = logs.filter((log) => log.latency);
-  into("latency", made("h2", "From a block to its command"));
+  into("latency", made("h2", "Latency: block to command"));
   if (!with_.length) {
     into("latency", made("p", "Not measured: the run was in lockstep, in one process, or without a controller.", { className: "small" }));
     return;
   }
-  into("latency", made("p", "How many commands took how long; both axes are logarithmic. What is right of 1 ms came too late for its block.", { className: "small" }));
+  into("latency", made("p", "Latency of the commands; both axes are logarithmic. Commands right of 1 ms were too late for their block.", { className: "small" }));
   into("latency", histogram(with_));
   if (with_.length > 1) into("latency", made("p", "Filled: A. Outlined: B.", { className: "small" }));
 }
@@ -106,27 +106,27 @@ function events() {
     });
     return line;
   };
-  const head = ["time [s]", ...(logs.length > 1 ? ["log"] : []), "who", "event", "its words", "what it means"];
+  const head = ["time [s]", ...(logs.length > 1 ? ["log"] : []), "source", "event", "text", "meaning"];
   into("events", made("h2", "Events"), table(head, all.filter((event) => !isPause(event)).map(row)));
   const pauses = all.filter(isPause);
-  if (pauses.length) into("events", made("details", [made("summary", `${pauses.length} pauses of the machine`), table(head, pauses.map(row))]));
+  if (pauses.length) into("events", made("details", [made("summary", `${pauses.length} stalls of the computer`), table(head, pauses.map(row))]));
 }
 
 function words() {
   if (!data.words.length) return;
-  const rows = data.words.map((one) => made("tr", [made("td", one.row), made("td", one.word), made("td", one.help)]));
-  into("words", made("h2", "Words of the rows above the curves"), table(["row", "word", "what it means"], rows));
+  const rows = data.words.map(({ row, word, help }) => made("tr", [made("td", row), made("td", word), made("td", help)]));
+  into("words", made("h2", "Words in the rows above the curves"), table(["row", "word", "meaning"], rows));
 }
 
 function parameters() {
-  const rows = data.parameters.map((one) => made("tr", [made("td", one.key), made("td", one.value)]));
+  const rows = data.parameters.map(({ key, value }) => made("tr", [made("td", key), made("td", value)]));
   into("parameters", made("h2", "Parameters"), made("details", [made("summary", `all ${rows.length} of ${logs[0].name}`), table(["parameter", "value"], rows)]));
 }
 
 answers();
 figures();
 differences();
-ribbon(document.getElementById("ribbon"), logs, axis, new Map(data.words.map((one) => [one.word, one.help])));
+ribbon(document.getElementById("ribbon"), logs, axis, new Map(data.words.map(({ word, help }) => [word, help])));
 curves();
 zoom();
 latency();

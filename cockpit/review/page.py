@@ -1,4 +1,4 @@
-"""A log, or two laid over each other, as one HTML file that loads nothing."""
+"""One log, or two overlaid, as one HTML file that loads nothing."""
 
 import html
 import json
@@ -12,16 +12,16 @@ from cockpit.judge.verdict_words import headline
 from cockpit.review.data import review_data
 
 _FOLDER = Path(__file__).parent
-SHARED_SCRIPTS = ("parts.js", "curves.js", "ribbon.js")  # of the page of a log and of that of a rig
+SHARED_SCRIPTS = ("parts.js", "curves.js", "ribbon.js")  # shared by the page of a log and the page of a running rig
 _STYLES = ("vendor/uPlot.min.css", "page.css")
 _SCRIPTS = (*SHARED_SCRIPTS, "page.js")
 _UPLOT = ("vendor/LICENSE", "vendor/uPlot.iife.min.js")
 
 
 def write_review(logs: Sequence[Path], out: Path) -> list[RunVerdict]:
-    """Write the page of one log, or of two; what came of each.
+    """Write the page of one log, or of two; returns the verdict of each.
 
-    Raises Fault BAD_LOG, LOG_WRITE, and OSError where it cannot be written.
+    Raises Fault BAD_LOG, LOG_WRITE, and OSError if it cannot be written.
     """
     data, verdicts = review_data(logs, provenance(logs))
     names = " and ".join(shown_name(path.name) for path in logs)
@@ -29,7 +29,7 @@ def write_review(logs: Sequence[Path], out: Path) -> list[RunVerdict]:
     parts = {
         "TITLE": html.escape(title),
         "STYLE": "\n".join(map(text_of, _STYLES)),
-        # `</script>` in a text would end the element, and `<!--` change how it is read
+        # `</script>` in a text would end the element, and `<!--` would change the parsing
         "DATA": json.dumps(strict_json(data), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
         "UPLOT": uplot(),
         "SCRIPT": "\n".join(map(text_of, _SCRIPTS)),
@@ -39,17 +39,17 @@ def write_review(logs: Sequence[Path], out: Path) -> list[RunVerdict]:
 
 
 def text_of(name: str) -> str:
-    """A file of this folder."""
+    """Text of a file in this folder."""
     return (_FOLDER / name).read_text(encoding="utf-8")
 
 
 def uplot() -> str:
-    """The script that draws, below its licence."""
+    """The plotting script, below its licence."""
     licence, script = (text_of(name) for name in _UPLOT)
     return f"/*\n{licence}*/\n{script}"
 
 
 def filled(template: str, parts: Mapping[str, str]) -> str:
-    """A page whose places `@NAME@` are filled; there is no other `@` in the template."""
+    """Fill the places `@NAME@` of a template, which contains no other `@`."""
     pieces = template.split("@")  # text and names in turn
-    return "".join(parts[one] if number % 2 else one for number, one in enumerate(pieces))
+    return "".join(parts[piece] if number % 2 else piece for number, piece in enumerate(pieces))

@@ -1,4 +1,4 @@
-"""Which curves of a page stand together, and what there is to see in them."""
+"""Which curves share a panel, and the hint above each panel."""
 
 from typing import NamedTuple
 
@@ -7,15 +7,15 @@ class Panel(NamedTuple):
     """Curves with one axis."""
 
     title: str
-    hint: str  # what to look at
+    hint: str  # text above the curves
     signals: tuple[str, ...]  # names of `cockpit.figures.signals`
-    is_open: bool = True  # shown at once; the others on a click
+    is_open: bool = True  # unfolded at first
 
 
 PANELS = (
     Panel(
         "Drive force",
-        "Rises while the slide sticks and falls when it slips: a red triangle is a slip. Smooth sliding is a level line.",
+        "Rises while the slide sticks and falls when it slips (red triangle). Smooth sliding is a level line.",
         ("drive_force_N",),
     ),
     Panel(
@@ -25,23 +25,23 @@ PANELS = (
     ),
     Panel(
         "Amplitude of the base against its stroke",
-        "How far the exciter moves the base, zero to peak. Dashed: the most that it may. A curve at the line has nothing left.",
+        "Amplitude of the base, zero to peak. Dashed: its limit. A curve at the limit has no reserve.",
         ("amplitude_m", "wanted_amplitude_m"),
     ),
     Panel(
         "Predicted time to the next slip",
-        "While a stick is seen: how long the controller expects it to last. No curve: no slip is expected.",
+        "Expected rest of a detected stick. No curve: the controller expects no slip.",
         ("time_to_slip_s",),
     ),
     Panel(
         "Positions",
-        "The slide stands in a stick and jumps in a slip.",
+        "The slide rests in a stick and jumps in a slip.",
         ("mass_position_m", "drive_position_m"),
         is_open=False,
     ),
     Panel(
         "Accelerations",
-        "The base's is the vibration; the slide's shows a peak at each slip.",
+        "The base shows the vibration; the slide shows a peak at each slip.",
         ("base_accel_mps2", "mass_accel_mps2"),
         is_open=False,
     ),

@@ -1,10 +1,10 @@
-// Elements that pages of runs have in common. Texts are set as texts, never as HTML.
+// Elements shared by the pages of runs. Texts are inserted as text, never as HTML.
 "use strict";
 
-/** An element with a text or with children; `more` are its properties. */
+/** An element with a text or children; `more`: its properties. */
 function made(tag, content, more = {}) {
   const element = Object.assign(document.createElement(tag), more);
-  element.append(...(Array.isArray(content) ? content : [content]).flatMap((one) => (typeof one === "string" ? rich(one) : [one])));
+  element.append(...(Array.isArray(content) ? content : [content]).flatMap((part) => (typeof part === "string" ? rich(part) : [part])));
   return element;
 }
 
@@ -17,7 +17,7 @@ function table(head, rows) {
   return made("div", [made("table", [heads, ...rows])], { className: "wide" });
 }
 
-/** The histogram of latency as SVG: a bar for each stretch of time, its height the logarithm of how many. */
+/** Latency histogram as SVG: a bar per interval, its height the logarithm of the count. */
 function histogram(logs) {
   const w = 900, h = 200, left = 60, bottom = 40, top = 26;
   const least = Math.min(...logs.map((log) => log.latency.edges_us[0])), most = Math.max(1500, ...logs.map((log) => log.latency.edges_us.at(-1)));
@@ -40,9 +40,9 @@ function histogram(logs) {
   }
   picture.append(svg("line", { x1: px(1000), x2: px(1000), y1: 5, y2: h - bottom, stroke: "#b5402a", "stroke-dasharray": "6 4" }));
   const ticks = [1, 10, 100, 1e3, 1e4, 1e5, 1e6].flatMap((us) => [us, 2 * us, 5 * us]);
-  for (const us of ticks.filter((one) => one >= least && one <= most)) picture.append(svg("text", { x: px(us), y: h - bottom + 16, "text-anchor": "middle" }, us < 1000 ? `${us} µs` : `${us / 1000} ms`));
+  for (const us of ticks.filter((tick) => tick >= least && tick <= most)) picture.append(svg("text", { x: px(us), y: h - bottom + 16, "text-anchor": "middle" }, us < 1000 ? `${us} µs` : `${us / 1000} ms`));
   for (let count = 1; count <= highest; count *= 10) picture.append(svg("text", { x: left - 6, y: py(count) + 4, "text-anchor": "end" }, String(count)));
-  picture.append(svg("text", { x: (left + w) / 2, y: h - 6, "text-anchor": "middle" }, "from the block out to its command in"));
+  picture.append(svg("text", { x: (left + w) / 2, y: h - 6, "text-anchor": "middle" }, "time from the block to its command"));
   picture.append(svg("line", { x1: left, x2: w - 10, y1: h - bottom, y2: h - bottom, stroke: "#808b96" }));
   picture.append(svg("text", { x: 0, y: 14 }, "commands"));
   return picture;

@@ -1,10 +1,10 @@
-// The ribbon: what the controller and the guard did, a row each, and the events, over the same time axis as the curves.
+// The ribbon: modes and limits of controller and guard, a row each, and the events, over the time axis of the curves.
 "use strict";
 
 const ROW = 20; // pixels of height
 const COLOURS = ["#d5e3f0", "#e8daef", "#d6eaea", "#fdebd0", "#e3e7c8", "#dfe3f5"];
 
-/** Colours of words in the order in which they come; what is quiet is grey. */
+/** Assign colours to words in the order of first use; quiet words are grey. */
 function colouring() {
   const known = new Map([["excite", "#bfe0b8"], ["watch", "#e5e7e9"], ["disabled", "#eef0f1"], ["stick", "#f2d694"], ["slip", "#e6a394"],
     ["smooth", "#dcebd8"], ["standstill", "#e5e7e9"], ["unknown", "#eef0f1"], ["fault", "#e6a394"], ["stopped", "#e6a394"], ["no limit", "#eef0f1"]]);
@@ -14,7 +14,7 @@ function colouring() {
   };
 }
 
-/** Build the ribbon in `place`; a click on a word zooms to its stretch, one on an event to its time. */
+/** Build the ribbon in `place`; a click on a word zooms to its interval, on an event to its time. */
 function ribbon(place, logs, axis, helps) {
   const rows = [];
   for (const log of logs) {
@@ -73,7 +73,7 @@ function ribbon(place, logs, axis, helps) {
     rows.forEach((row, number) => drawRow(ctx, row, number * ROW));
   }
 
-  /** What is under the mouse: a stretch or an event with its words. */
+  /** The interval or event under the mouse, with its text. */
   function under(mouse) {
     const row = rows[Math.floor(mouse.offsetY / ROW)];
     if (!row) return null;

@@ -1,12 +1,16 @@
 """A run and its replay.
 
-scenario, scenario_file     what a run is made of; its files as tables
+scenario, scenario_file     the model of a run; its files as tables
+sensor_needs                sensors that a scenario needs, checked before the run
 run                         one run, from its scenario to its verdict
 in_process, closed_loop     in one process, without a bus; plant and controller in turns, compiled
-processes, child_process    as several processes: started, watched, ended; how each behaves
-progress, operator, status  the progress line; a person's stop or reset on its way; what goes on at a rig
-replay, log_to_bus          a log through today's controller; a log back on the bus
+simulated/                  in one process, with faults of bus and processes, in simulated time
+processes, child_process    as several processes: start, supervision, end; signals and faults of each
+progress, operator, status  the progress line; operator commands to a rig; the state of a rig
+lifecycle_lines                     lines on the terminal of a process that was started alone
+replay, log_to_bus          a log through this version's controller; a log published on the bus
+soak                        a run of hours, with memory and latency
 authority                   the certificates of the roles
-without                     the same run without its controller
-writable                    files that a command writes at its end
+open_loop_twin                     the same run without its controller
+writable                    checks of the files that a command writes at its end
 """

@@ -1,4 +1,4 @@
-"""A small certificate authority for the bus of one rig: a certificate for each role, told apart by their common names."""
+"""A small certificate authority for the bus of one rig: one certificate per role, with the role as common name."""
 
 import datetime
 import ipaddress
@@ -18,36 +18,38 @@ from bridge.wire.loopback_users import ROLES
 from cockpit.run.writable import writing
 
 _AUTHORITY_DAYS = 3650
-_ROLE_DAYS = 825  # what browsers allow a certificate; longer: a key that was lost is good for longer
-_EARLIER = datetime.timedelta(minutes=5)  # valid from so long ago: clocks of two computers differ
+_ROLE_DAYS = (
+    825  # the longest that browsers accept. Longer: a lost key stays valid longer. Shorter: renewed more often.
+)
+_EARLIER = datetime.timedelta(minutes=5)  # certificates are valid from this time before now: clocks of computers differ
 
 
 class Made(NamedTuple):
-    """What was made."""
+    """Result of `stickslip certs`."""
 
     folder: str
-    hosts: list[str]  # names and addresses at which the rig may be dialled
+    hosts: list[str]  # names and addresses in the rig's certificate, under which clients may connect
     files: list[str]
     until: str  # last day of the roles' certificates
 
 
 def make_certificates(folder: Path, hosts: list[str]) -> Made:
-    """Make the certificates of all roles, by the authority that is in the folder, or a new one.
+    """Make the certificates of all roles, signed by the authority in the folder, or by a new one.
 
     Args:
-        folder: where they go; made where it is not there. Keys have mode 0600.
+        folder: for the certificates; created if missing. Keys have mode 0600.
         hosts: further names and addresses of the rig's computer.
 
-    Raises Fault CONFIG for a name that is none, LOG_WRITE where the folder does not allow it, NOT_SECURE where a certificate is
-    there already: who made a key anew would lock out whoever has the old one.
+    Raises Fault CONFIG for an invalid host name, LOG_WRITE if the folder is not writable, NOT_SECURE if a certificate exists
+    already: a new key would lock out every client with the old one.
 
     """
     names = list(dict.fromkeys(["localhost", "127.0.0.1", "::1", socket.gethostname(), *hosts]))
     alternatives = [_alternative(name) for name in names]
     roles = (RIG, *ROLES, CLUSTER)
-    there = [path for role in roles for path in files_of(role, folder)[1:] if path.exists()]
-    if there:
-        line = f"{there[0]}: is there already, and would be lost"
+    existing = [path for role in roles for path in files_of(role, folder)[1:] if path.exists()]
+    if existing:
+        line = f"{existing[0]}: exists already and would be lost"
         raise Fault(
             "NOT_SECURE", f"{line}; choose another folder, or remove the certificates of the roles that get new ones"
         )
@@ -68,11 +70,13 @@ def _alternative(name: str) -> x509.GeneralName:
     try:
         return x509.DNSName(name)
     except ValueError:
-        raise Fault("CONFIG", f"--host {name}: must be a name in ASCII or an address; give that of the rig") from None
+        raise Fault(
+            "CONFIG", f"--host {name}: must be an ASCII name or an address; give a name of the rig's computer"
+        ) from None
 
 
 def _authority(folder: Path) -> tuple[x509.Certificate, ec.EllipticCurvePrivateKey]:
-    """The authority of a folder; made where there is none."""
+    """The authority of a folder; created if missing."""
     certificate_path, key_path = folder / f"{AUTHORITY}.pem", folder / f"{AUTHORITY}.key"
     if certificate_path.exists() or key_path.exists():
         try:
@@ -81,10 +85,10 @@ def _authority(folder: Path) -> tuple[x509.Certificate, ec.EllipticCurvePrivateK
         except (OSError, ValueError, TypeError) as error:
             line = f"{folder}: its authority cannot be read ({error})"
             raise Fault(
-                "NOT_SECURE", f"{line}; put {AUTHORITY}.pem and {AUTHORITY}.key there, or choose another"
+                "NOT_SECURE", f"{line}; put {AUTHORITY}.pem and {AUTHORITY}.key there, or choose another folder"
             ) from None
         if not isinstance(key, ec.EllipticCurvePrivateKey):
-            raise Fault("NOT_SECURE", f"{key_path}: is not a key that `stickslip certs` made; choose another folder")
+            raise Fault("NOT_SECURE", f"{key_path}: is not a key made by `stickslip certs`; choose another folder")
         return certificate, key
     key = ec.generate_private_key(ec.SECP256R1())
     name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "stickslip authority")])
@@ -111,7 +115,7 @@ def _make_role(
     authority_key: ec.EllipticCurvePrivateKey,
     alternatives: list[x509.GeneralName],
 ) -> None:
-    """Only the rig can be a server under a name of its computer, so that no other role can pass for the rig."""
+    """Make key and certificate of a role. Only the rig's names its computer as a server: no other role can pose as the rig."""
     key = ec.generate_private_key(ec.SECP256R1())
     name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, role)])
     server, client = ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH
@@ -155,6 +159,6 @@ def _pem(key: ec.EllipticCurvePrivateKey) -> bytes:
 
 
 def _write(path: Path, data: bytes, mode: int) -> None:
-    """Write a new file that nobody can read before it has its mode; one that is there, or a link, is an error."""
+    """Create a file with this mode from the start, so that a key is never readable by others; an existing file is an error."""
     with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as file:
         file.write(data)

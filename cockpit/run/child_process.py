@@ -1,4 +1,4 @@
-"""Running as one process among several: signals, a dying parent, one clear line for every fault."""
+"""Behaviour of each process: signals, the death of the parent, one line for every fault."""
 
 import contextlib
 import errno
@@ -18,11 +18,13 @@ from bridge.plain import say
 from bridge.wire import realtime
 
 _PARENT_CHECK_S = 0.25
-_LONG_S = 2.0  # of work that nobody waits for without a word; shorter: a busy computer tells of every run of seconds
-# a full disk, a size limit, a quota, a terminal that went away, a file that was closed
+# Work that takes longer prints a line. Larger: the operator waits without a message. Smaller: on a busy computer short runs
+# print it too.
+_LONG_S = 2.0
+# full disk, size limit, quota, closed terminal, closed file
 _STDOUT_REFUSED = frozenset({errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO, errno.EBADF})
-_LONGEST_NAME = 255  # of a file; what is longer holds a name
-# what `stickslip[all]` brings and a plain installation lacks
+_LONGEST_NAME = 255  # characters of a file name; a longer text only contains the name
+# modules of `stickslip[all]` that a plain installation lacks
 EXTRA_MODULES = frozenset(
     {
         "clevercsv", "h5py", "jinja2", "joblib", "mcap_ros2", "nptdms", "pyarrow", "python_calamine", "threadpoolctl",
@@ -32,11 +34,10 @@ EXTRA_MODULES = frozenset(
 
 
 def stop_event(parent: int = 0) -> threading.Event:
-    """An event that Ctrl-C, SIGTERM and SIGHUP set, and for a child the death of its parent: no orphan keeps a rig running.
+    """An event that Ctrl-C, SIGTERM and SIGHUP set. The death of the parent sets it too, so that no orphan runs a rig.
 
     Args:
-        parent: the process that started this one; asked for only here, it could be dead and another in its place. 0: nobody
-            watches.
+        parent: process id of the parent, passed by it: os.getppid() here would miss a parent that has already died. 0: none.
 
     """
     stop = threading.Event()
@@ -56,35 +57,35 @@ def stop_event(parent: int = 0) -> threading.Event:
     return stop
 
 
-def _like_ctrl_c() -> list[signal.Signals]:
-    """SIGTERM, and SIGHUP of a terminal that closes, but for a command that was started with nohup, which ignores it."""
+def _ending_signals() -> list[signal.Signals]:
+    """SIGTERM, and SIGHUP of a closing terminal unless nohup has set it to be ignored."""
     hangs_up = signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN
     return [signal.SIGTERM, signal.SIGHUP] if hangs_up else [signal.SIGTERM]
 
 
 def handle_endings(handler: Callable[[int, Any], Any]) -> dict[signal.Signals, Any]:
-    """Let Ctrl-C, SIGTERM and SIGHUP do the same; the handlers before, by signal."""
-    return {number: signal.signal(number, handler) for number in (signal.SIGINT, *_like_ctrl_c())}
+    """Handle Ctrl-C, SIGTERM and SIGHUP alike; return the earlier handlers by signal."""
+    return {number: signal.signal(number, handler) for number in (signal.SIGINT, *_ending_signals())}
 
 
 def end_like_ctrl_c() -> None:
-    """Let SIGTERM and SIGHUP end the command as Ctrl-C does: it stops its workers, keeps whole files, and says INTERRUPTED."""
+    """Let SIGTERM and SIGHUP end the command like Ctrl-C: it stops its workers, keeps whole files, reports INTERRUPTED."""
 
     def on_signal(number: int, _frame: Any) -> None:
         raise KeyboardInterrupt(signal.Signals(number).name)
 
-    for number in _like_ctrl_c():
+    for number in _ending_signals():
         signal.signal(number, on_signal)
 
 
 @contextlib.contextmanager
 def stopped_once() -> Generator[None]:
-    """Ctrl-C, SIGTERM or SIGHUP raises KeyboardInterrupt in what is done here, once: what then stops and judges goes on."""
-    came = threading.Event()
+    """The first Ctrl-C, SIGTERM or SIGHUP raises KeyboardInterrupt in the body; later ones do not disturb its cleanup."""
+    stopped = threading.Event()
 
     def on_signal(number: int, _frame: Any) -> None:
-        if not came.is_set():
-            came.set()
+        if not stopped.is_set():
+            stopped.set()
             raise KeyboardInterrupt("" if number == signal.SIGINT else signal.Signals(number).name)
 
     before = handle_endings(on_signal)
@@ -92,34 +93,34 @@ def stopped_once() -> Generator[None]:
         yield
     finally:
         for number, handler in before.items():
-            # after one the command ends, and until then another would end it without its status
-            signal.signal(number, signal.SIG_IGN if came.is_set() else handler)
+            # after a signal the command is about to end; a second signal would end it without its exit status
+            signal.signal(number, signal.SIG_IGN if stopped.is_set() else handler)
 
 
 @contextlib.contextmanager
 def left_on_ctrl_c(line: str, left: str, again: bool) -> Generator[None]:
-    """Work that Ctrl-C, SIGTERM or SIGHUP ends with Fault INTERRUPTED; a line on stderr says so where it takes long.
+    """Work that Ctrl-C, SIGTERM or SIGHUP ends with Fault INTERRUPTED; after 2 s a line on stderr announces this.
 
     Args:
-        line: what is done, and that Ctrl-C leaves it.
-        left: what the fault says.
-        again: Ctrl-C was pressed before. Until the line came, another is that of a person who presses it twice: it does nothing.
+        line: names the work, and that Ctrl-C ends it.
+        left: text of the fault.
+        again: Ctrl-C was pressed before. Another one before the line is a double press, and is ignored.
 
     """
-    heeded = threading.Event()
+    enabled = threading.Event()
     if not again:
-        heeded.set()
+        enabled.set()
 
-    def tell() -> None:
-        heeded.set()
+    def announce() -> None:
+        enabled.set()
         say(line)
 
     def on_signal(_number: int, _frame: Any) -> None:
-        if heeded.is_set():
+        if enabled.is_set():
             raise KeyboardInterrupt
 
     before = handle_endings(on_signal)
-    timer = threading.Timer(_LONG_S, tell)
+    timer = threading.Timer(_LONG_S, announce)
     timer.daemon = True
     timer.start()
     try:
@@ -134,11 +135,10 @@ def left_on_ctrl_c(line: str, left: str, again: bool) -> Generator[None]:
 
 @contextlib.contextmanager
 def _ended_at_once(as_json: bool) -> Generator[None]:
-    """Ctrl-C, SIGTERM or SIGHUP ends the process here and now, with status and line of INTERRUPTED.
+    """Ctrl-C, SIGTERM or SIGHUP ends the process at once, with status and line of INTERRUPTED.
 
-    A handler in Python has to wait for the compiler, seconds at a time, and an exception from it ends one function of
-    hundreds. So a thread reads the signal's number from a pipe, into which the interpreter writes it at once. No kernel is kept
-    half.
+    A handler in Python waits for the compiler, for seconds, and its exception would end only one of hundreds of functions. So
+    a thread reads the signal's number from a pipe, into which the interpreter writes it at once. No incomplete kernel is cached.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -168,13 +168,13 @@ def _ended_at_once(as_json: bool) -> Generator[None]:
 
 
 def warn_without_priority() -> None:
-    """Say on stderr where a process that keeps time would get no real-time priority."""
+    """Warn on stderr if this process will get no real-time priority."""
     if not realtime.may_claim():
         print(f"stickslip: warning: {realtime.NORMAL}: {realtime.NOT_GUARANTEED}", file=sys.stderr)
 
 
 def report(fault: Fault, as_json: bool) -> int:
-    """Print a fault, one line on stderr or a JSON object on stdout; its exit status."""
+    """Print a fault, as one line on stderr or a JSON object on stdout; return its exit status."""
     if as_json:
         print(json.dumps({"fault": fault.kind.code, "line": fault.line, "exit_status": fault.kind.exit_status}))
     else:
@@ -183,11 +183,11 @@ def report(fault: Fault, as_json: bool) -> int:
 
 
 def guarded(work: Callable[[], int | None], as_json: bool = False) -> int:
-    """Run a command's work; its exit status, faults and Ctrl-C included."""
+    """Run a command's work; return its exit status, also for faults and Ctrl-C."""
     compiling.guard = functools.partial(_ended_at_once, as_json)
     try:
         status = _status(work, as_json)
-        sys.stdout.flush()  # here, where a closed pipe or a full disk can still be told
+        sys.stdout.flush()  # a closed pipe or a full disk can still be reported here
     except BrokenPipeError:
         _stdout_to_nowhere()
         return 128 + signal.SIGPIPE
@@ -201,16 +201,16 @@ def guarded(work: Callable[[], int | None], as_json: bool = False) -> int:
 
 
 def prepare_stdout() -> None:
-    """Let stdout escape what its encoding does not have, and refuse what is written where the caller closed it."""
+    """Let stdout escape characters that its encoding lacks. If the caller closed stdout, let every write to it fail."""
     if sys.stdout is None:  # pyright: ignore[reportUnnecessaryComparison]
-        # not closed, or the next file that is opened would be stdout; not to be written, or a result would be lost unsaid
+        # Open, so that the next opened file does not become stdout; read-only, so that a lost result is reported.
         sys.stdout = os.fdopen(os.open(os.devnull, os.O_RDONLY), "w", encoding="utf-8")
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
 
 
 def _stdout_to_nowhere() -> None:
-    """Let what is left in the buffer of stdout go nowhere: else the interpreter fails at its end as well."""
+    """Discard the buffer of stdout, which would otherwise fail again at the end of the interpreter."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
@@ -223,16 +223,18 @@ def _status(work: Callable[[], int | None], as_json: bool) -> int:
         return report(Fault("INTERRUPTED", f"stopped by {str(ended) or 'Ctrl-C'}"), as_json)
     except MemoryError:
         files = ", ".join(word for word in sys.argv[1:] if os.access(word, os.F_OK)) or "the command"
-        line = f"{files}: needs more memory than there is; end other programs, or use a machine with more or a smaller file"
+        line = (
+            f"{files}: needs more memory than is free; end other programs, or use a larger computer or a smaller file"
+        )
         return report(Fault("NO_MEMORY", line), as_json)
-    except UnicodeEncodeError as error:  # of a library that takes only UTF-8; stdout escapes what it cannot show
+    except UnicodeEncodeError as error:  # from a library that accepts only UTF-8 names; stdout itself escapes them
         name = error.object if len(error.object) <= _LONGEST_NAME else error.object[error.start : error.end]
         shown = name.encode(errors="backslashreplace").decode()
-        line = f"{shown}: is not UTF-8, which is needed here; rename it"
+        line = f"{shown}: must be UTF-8; rename it"
         return report(Fault("CONFIG", line), as_json)
     except ModuleNotFoundError as error:
         module = (error.name or "").partition(".")[0]
-        if module not in EXTRA_MODULES and module != "foxglove":  # which is large, and of one option: no part of [all]
+        if module not in EXTRA_MODULES and module != "foxglove":  # not in [all]: large, and used by one option only
             raise
         extra = "foxglove" if module == "foxglove" else "all"
         line = f"this command needs {module}, which is not installed; pip install 'stickslip[{extra}]'"

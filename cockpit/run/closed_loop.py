@@ -1,4 +1,4 @@
-"""Plant and controller in turns, many blocks in one call of compiled code: a run in one process waits for no interpreter."""
+"""Plant and controller in turns, many blocks per call of compiled code: the interpreter does not slow a run down."""
 
 import math
 from typing import Any, NamedTuple
@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.guard.core import accept
-from bridge.guard.senses import expect_drive
-from bridge.guard.states import obey
+from bridge.guard.estimates import expect_drive
+from bridge.guard.states import apply_order
 from bridge.kernel import unlocked_kernel
 from bridge.kernel_cache import compile_once
 from bridge.wire.messages import APPLIED, CHANNELS, COMMAND, TRACE, Records, sensor_block
@@ -53,35 +53,35 @@ def advance_both(
     Args:
         plant_params, plant_state, guard_params, guard_state, controller_params, controller_state: one record each.
         velocity_mps: of the drive, [blocks].
-        delay_blocks: that the command takes to the exciter besides, [blocks].
+        delay_blocks: additional delay of the command on its way to the exciter, [blocks].
         noise: standard normal numbers, [blocks, 5, samples].
         operator_events: bits STOP and RESET of `controller.codes`, for the first block.
-        announcements: that the rig makes before it sends its samples, [blocks].
+        announcements: number of announcements that the rig makes before each block's samples, [blocks].
         announce: these announcements in order, message records.
-        answered: 1 where `commands[0]` answers the block before the first, 0 at the start of a run.
+        answered: 1 if `commands[0]` answers the block before the first, 0 at the start of a run.
         analogue, truth: [5, samples] and [6, samples], overwritten by every block.
         sensors, applied, traces: message records [blocks], filled.
-        commands: message records [blocks + 1]; the first is what the rig hears first, the others are filled.
+        commands: message records [blocks + 1]; the rig receives the first with the first block, the others are filled.
 
-    Fewer blocks than asked are done where the slide's velocity becomes NaN or infinite.
+    Stops early, before a block in which the slide's velocity becomes NaN or infinite.
 
     """
-    last, said = truth.shape[1] - 1, 0
+    last, announced = truth.shape[1] - 1, 0
     for i in range(velocity_mps.shape[0]):
-        came = answered if i == 0 else 1
-        if came == 1 and not accept(guard_params[0], guard_state[0], commands[i]):
-            came = 0
-        first, said = said, said + announcements[i]
-        for row in range(first, said):
+        received = answered if i == 0 else 1
+        if received == 1 and not accept(guard_params[0], guard_state[0], commands[i]):
+            received = 0
+        first, announced = announced, announced + announcements[i]
+        for row in range(first, announced):
             expect_drive(guard_state[0], announce[row].drive_velocity_mps)
         plant_step(
-            plant_params, plant_state, guard_params, guard_state, velocity_mps[i], commands[i : i + 1], came,
+            plant_params, plant_state, guard_params, guard_state, velocity_mps[i], commands[i : i + 1], received,
             delay_blocks[i], noise[i], 0, 0, 0, analogue, truth, sensors[i : i + 1], applied[i : i + 1],
         )  # fmt: skip
         if not math.isfinite(truth[_VELOCITY, last]):
             return i
         events = BLOCK | operator_events if i == 0 else BLOCK
-        for row in range(first, said):
+        for row in range(first, announced):
             take_announcement(controller_state[0], announce[row].holds_from_ns, announce[row].drive_velocity_mps)
             events |= ANNOUNCED
         controller_step(
@@ -91,14 +91,14 @@ def advance_both(
     return velocity_mps.shape[0]
 
 
-class Blocks(NamedTuple):
+class StretchMessages(NamedTuple):
     """Messages of one stretch of a run, [blocks] each."""
 
     sensors: Records
     applied: Records
     command: Records
     trace: Records
-    announce: Records  # as many as were made
+    announce: Records  # [announcements]
 
 
 class ClosedLoop:
@@ -134,14 +134,14 @@ class ClosedLoop:
         """Continue with another configuration of the controller and its present memory."""
         self._controller_params, _ = controller_records(config)
 
-    def obey(self, word: int) -> None:
-        """The rig takes a person's word, of `wire.Operator.Action`, before its next block."""
-        obey(self._guard_state[0], word)
+    def apply_order(self, word: int) -> None:
+        """The rig receives an operator command, a `wire.Operator.Action`, before its next block."""
+        apply_order(self._guard_state[0], word)
 
-    def advance(self, blocks: int, operator_events: int = 0) -> Blocks:
-        """Advance by `blocks`; the controller obeys `operator_events` in the first one.
+    def advance(self, blocks: int, operator_events: int = 0) -> StretchMessages:
+        """Advance by `blocks`; the controller receives `operator_events` in the first block.
 
-        Fewer blocks come back where the rig's state became NaN or infinite in the one after them.
+        Returns fewer blocks if the rig's state became NaN or infinite in the block after them.
         """
         velocity_mps, noise, delay_blocks, announcements, announce = self._inputs.draw(blocks)
         commands = COMMAND.blank(blocks + 1)
@@ -154,5 +154,5 @@ class ClosedLoop:
         )  # fmt: skip
         self.block += done
         self._last_command = commands[done : done + 1]
-        said = announce[: int(announcements[:done].sum())]
-        return Blocks(sensors[:done], applied[:done], commands[1 : done + 1], trace[:done], said)
+        announced = announce[: int(announcements[:done].sum())]
+        return StretchMessages(sensors[:done], applied[:done], commands[1 : done + 1], trace[:done], announced)

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy.typing as npt
 
 from bridge.guard.config import wider
-from bridge.guard.tell import Teller, changes
+from bridge.guard.events import GuardEvents, changes
 from bridge.log.runlog import RunLog
-from bridge.log.storage.chain import Chain
+from bridge.log.storage.chain import HashChain
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import seal_all
 from bridge.wire.topics import (
@@ -25,24 +25,24 @@ from bridge.wire.topics import (
     STATE,
     TRACE,
 )
-from cockpit.run.closed_loop import Blocks, ClosedLoop
+from cockpit.run.closed_loop import ClosedLoop, StretchMessages
 from cockpit.run.scenario import Scenario, header
 from controller.node import obeyed
 from controller.replay import Change
 from controller.telemetry import SNAPSHOT_EVERY, STATE_EVERY, plotted, snapshot
-from controller.trips import tell as trips
+from controller.trips import trip_events as trips
 from plant.node import no_number
 
 if TYPE_CHECKING:
     from cockpit.judge.run_judge import RunJudge
 
-# Blocks that are stepped in one call and make one chunk of the log, 1 MB: a stretch ends with the controller's snapshot. A kill
-# loses one, 7 ms of work.
+# Blocks per call of compiled code and per chunk of the log, 1 MB: a stretch ends with the controller's snapshot. A kill loses at
+# most one stretch, 7 ms of work.
 _STRETCH_BLOCKS = SNAPSHOT_EVERY
 
 
-class Word(NamedTuple):
-    """An operator's word, of `wire.Operator.Action`, that rig and controller are to obey at `t_ns`."""
+class TimedAction(NamedTuple):
+    """An operator command, a `wire.Operator.Action`, that rig and controller receive at `t_ns`."""
 
     t_ns: int
     action: int
@@ -54,20 +54,20 @@ def run_onboard(
     about: dict[str, Any],
     progress: Callable[[float], None] | None = None,
     changes: Sequence[Change] = (),
-    words: Sequence[Word] = (),
+    words: Sequence[TimedAction] = (),
     stopped: Callable[[], bool] = lambda: False,
     judge: "RunJudge | None" = None,
-) -> Chain:
-    """Run a scenario without faults and write its log, with a duration of 0 until it is stopped. Raises Fault LOG_WRITE.
+) -> HashChain:
+    """Run a scenario without faults and write its log; a duration of 0 lasts until `stopped`. Raises Fault LOG_WRITE.
 
     Returns the hash chain of the log.
 
     Args:
-        progress: called now and then with the simulated time [s].
-        changes: of the controller's configuration during the run, in order of time.
-        words: of an operator during the run, in order of time.
-        stopped: asked before every stretch of blocks; the run then ends as it does at its full duration.
-        judge: takes every message when it is written; the log is not read back.
+        progress: called after every stretch of blocks with the simulated time [s].
+        changes: changes of the controller's configuration during the run, in order of time.
+        words: operator commands during the run, in order of time.
+        stopped: called before every stretch of blocks; True ends the run as at its full duration.
+        judge: receives every message when it is written; the log is not read back.
 
     """
     loop = ClosedLoop(scenario.rig, scenario.seed, scenario.controller, scenario.arm)
@@ -91,9 +91,9 @@ def run_onboard(
                 events = 0
                 while to_say and _first_step(loop, to_say[0].t_ns) <= loop.block:
                     action = to_say.pop(0).action
-                    loop.obey(action)
+                    loop.apply_order(action)
                     events = obeyed(events, action)
-                # what changes the controller ends a stretch, too
+                # a change of the configuration or an operator command also ends a stretch
                 ends = [blocks, (loop.block // _STRETCH_BLOCKS + 1) * _STRETCH_BLOCKS]
                 ends += [_first_step(loop, part[0].t_ns) for part in (ahead, to_say) if part]
                 made = loop.advance(min(ends) - loop.block, events)
@@ -121,7 +121,7 @@ def _end(say: "_Events", loop: ClosedLoop) -> None:
 
 
 def log_of(scenario: Scenario, path: Path, about: dict[str, Any]) -> RunLog:
-    """A new log of a run in one process, with what it begins with."""
+    """A new log of a run in one process, with its metadata and headers."""
     log = RunLog(path, lockstep=True, rotation=scenario.log.rotation)
     log.add_metadata("run", about)
     for role in ("controller", "plant"):
@@ -135,46 +135,46 @@ def _first_step(loop: ClosedLoop, t_ns: int) -> int:
 
 
 class _Events:
-    """The events of rig and controller, as their processes publish them."""
+    """Writes the events of rig and controller as their processes publish them."""
 
     def __init__(self, log: RunLog, judge: "RunJudge | None") -> None:
         self._log, self.judge = log, judge
-        self._said = {"plant": 0, "controller": 0}
-        self._guard, self._trips = Teller(), trips.TripTeller()
+        self._sequence = {"plant": 0, "controller": 0}
+        self._guard, self._trips = GuardEvents(), trips.TripEvents()
 
     def __call__(self, source: str, t_ns: int, code: str, text: str) -> None:
         topic = PLANT_EVENT if source == "plant" else CONTROLLER_EVENT
-        event = wire.Event(sequence=self._said[source], t_ns=t_ns, source=source, code=code, text=text)
+        event = wire.Event(sequence=self._sequence[source], t_ns=t_ns, source=source, code=code, text=text)
         payload = event.SerializeToString()
         self._log.write(topic, payload)
         if self.judge is not None:
             self.judge.add_others(topic.name, [payload])
-        self._said[source] += 1
+        self._sequence[source] += 1
 
-    def of(self, made: Blocks) -> dict[int, list[tuple[str, str, str]]]:
-        """What guard and controller have to say of a stretch: source, code and text, by the number of the block before."""
-        found: dict[int, list[tuple[str, str, str]]] = {}
+    def of(self, made: StretchMessages) -> dict[int, list[tuple[str, str, str]]]:
+        """Events of guard and controller in a stretch: source, code and text, by the number of the block before."""
+        events: dict[int, list[tuple[str, str, str]]] = {}
         for row in changes(made.applied):
             block = int(made.applied["sequence"][row])
-            found.setdefault(block, []).extend(("plant", *one) for one in self._guard.news(made.applied[row]))
+            events.setdefault(block, []).extend(("plant", *event) for event in self._guard.news(made.applied[row]))
         for row in trips.changes(made.trace):
             block = int(made.applied["sequence"][row])
-            found.setdefault(block, []).extend(("controller", *one) for one in self._trips.news(made.trace[row]))
-        return {block: news for block, news in found.items() if news}
+            events.setdefault(block, []).extend(("controller", *event) for event in self._trips.news(made.trace[row]))
+        return {block: news for block, news in events.items() if news}
 
 
-def _write(log: RunLog, say: _Events, end: int, block_ns: int, made: Blocks, memory: npt.NDArray[Any]) -> None:
-    """Write the messages of a stretch that ends before block `end`, with the state and the snapshot where they are due."""
+def _write(log: RunLog, say: _Events, end: int, block_ns: int, made: StretchMessages, memory: npt.NDArray[Any]) -> None:
+    """Write the messages of a stretch that ends before block `end`, with the state and snapshot messages that are due."""
     begin = end - len(made.trace)
     for row in range(len(made.announce)):
         log.write(ANNOUNCE, made.announce[row : row + 1].tobytes())
     seal_all(made.sensors)
     news = say.of(made)
     tables = {SENSORS: made.sensors, APPLIED: made.applied, COMMAND: made.command, TRACE: made.trace}
-    # a stretch that was cut short begins and ends with blocks that have no whole period of the state message
+    # a stretch that was cut short begins or ends with an incomplete period of the state message
     whole = min(begin + -begin % STATE_EVERY, end), max(end - end % STATE_EVERY, begin)
     cuts = {begin, *whole, end}
-    for block in news:  # an event stands where it came, and the parts beside it have whole periods or none
+    for block in news:  # an event is written after its block; the parts around it hold whole periods or none
         period = block - block % STATE_EVERY
         cuts |= {max(period, begin), block + 1, min(period + STATE_EVERY, end)}
     for first, last in pairwise(sorted(cuts)):

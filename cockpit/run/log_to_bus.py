@@ -1,4 +1,4 @@
-"""A log back on the bus, paced: for viewers, and for a controller on the bench that shall hear a rig's record."""
+"""Publish a log on the bus in real time: for viewers, or to feed a rig's record to a controller on the bench."""
 
 import contextlib
 import select
@@ -37,14 +37,14 @@ def publish_log(
     wait_for: list[str],
     stop: threading.Event,
 ) -> None:
-    """Publish a log as if the rig were there, in the place of the plant, until its end or `stop`.
+    """Publish a log in the role of the plant, until its end or `stop`.
 
-    The space bar, or SIGUSR1, pauses and goes on.
+    The space bar, or SIGUSR1, pauses and resumes.
 
     Args:
-        speed: times real time.
-        from_s: start here.
-        everything: the controller's topics as well; otherwise a live controller may answer.
+        speed: multiple of real time.
+        from_s: time of the first message that is published.
+        everything: also publish the controller's topics; otherwise a live controller may answer.
         wait_for: roles that must be on the bus first.
 
     Raises Fault BAD_LOG, ENDPOINT_BUSY, NO_PEER.
@@ -61,7 +61,7 @@ def publish_log(
         pause.clear() if pause.is_set() else pause.set()
 
     signal.signal(signal.SIGUSR1, toggle)
-    # as in lockstep nothing is dropped: a record can wait, a rig cannot
+    # lockstep, so that no message is dropped: unlike a rig, a record can wait
     with Bus(bus_config, "plant", lockstep=True) as bus, _keys(toggle, stop):
         for role in ("plant", "controller") if everything else ("plant",):
             if role in run.headers:
@@ -97,7 +97,7 @@ def _play(
     pause: threading.Event,
     stop: threading.Event,
 ) -> int:
-    """Send what is due, until the end or `stop`; how many blocks were sent."""
+    """Send each message when it is due, until the end or `stop`; return the number of blocks sent."""
     blocks = 0
     if not schedule:
         return blocks
@@ -137,7 +137,7 @@ def _header(run: RunData, role: str) -> wire.Header:
             versions=fields["versions"],
         )
     except (KeyError, ValueError):
-        line = f"{run.path}: the {role} does not say its schema_version, configuration and versions"
+        line = f"{run.path}: the header of the {role} lacks schema_version, configuration or versions"
         raise Fault("BAD_LOG", f"{line}; take another copy of the log") from None
 
 
@@ -148,7 +148,7 @@ def _event(code: str, text: str) -> bytes:
 
 @contextlib.contextmanager
 def _keys(toggle: Any, stop: threading.Event) -> Generator[None]:
-    """Listen for the space bar while the body runs, on a terminal; give the terminal back as it was."""
+    """Listen for the space bar while the body runs, on a terminal; restore the terminal afterwards."""
     if not sys.stdin.isatty():
         yield
         return

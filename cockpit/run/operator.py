@@ -1,4 +1,4 @@
-"""An operator's word to a rig, and the truth of what came of it: read from what the rig applies."""
+"""Send an operator command to a rig, and confirm its effect from the `applied` messages of the rig."""
 
 import contextlib
 import os
@@ -14,47 +14,48 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import APPLIED, OPERATOR, PLANT_EVENT
 from bridge.wire.words import words
-from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received, stands_still
+from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received, is_frozen
 
-_DIAL_S = 2.0  # a rig is there at once or not at all
-# Longest wait since the rig last did something for a word. A ramp takes 0.1 s; while a loop check goes on, of 1.7 s of the rig's
-# time, every block of it counts. Shorter: `arm` fails on a busy computer though the rig arms. Longer: the advice to stop by hand
-# comes later.
+# Timeout of the connection. Longer: the advice to cut the amplifier comes later. Shorter: fails on a busy computer.
+_DIAL_S = 2.0
+# Timeout since the rig's last progress on a command. A ramp takes 0.1 s; a loop check takes 1.7 s of the rig's time, and each of
+# its blocks counts as progress. Shorter: `arm` fails on a busy computer though the rig arms. Longer: the advice to cut the
+# amplifier comes later.
 _ANSWER_S = 5.0
-_HEARS_S = 0.05  # in which a word that is done is noticed
-_AGAIN_S = 0.5  # with twice as many busy processes as cores one word in 300 did not arrive
-_SILENT_S = 1.0  # after which what a rig said last is no longer what it does; it says a thousand things a second
-_NOTHING_M = 1e-12  # what is left of a ramp by rounding
-_KEPT_S = 0.1  # in which a rig says that it cannot keep a stop over its restart
-_REFUSED_S = 1.0  # for which a rig stays in FAULT after the word ARM
+_POLL_S = 0.05  # longest wait for a message, after which timeouts are checked
+_AGAIN_S = 0.5  # interval of repetitions: with twice as many busy processes as cores 1 command in 300 did not arrive
+_SILENT_S = 1.0  # the last state is outdated after this silence; a rig sends a thousand messages per second
+_NOTHING_M = 1e-12  # rounding at the end of a ramp
+_KEPT_S = 0.1  # wait after a stop for the rig's event that it cannot keep the stop over a restart
+_REFUSED_S = 1.0  # a rig that is in FAULT for this long after ARM refuses it
 _ARMS = (wire.Operator.ARM, wire.Operator.ACCEPT_GAIN)
-_QUIETENS = (wire.Operator.STOP, wire.Operator.DISARM)
+_QUIETING = (wire.Operator.STOP, wire.Operator.DISARM)
 _START_ONE = "start one, or give its --endpoint"
-_BY_HAND = "take it that it goes on as before: stop the exciter's amplifier by hand, at its own interlock"
+_CUT_AMPLIFIER = "assume that the exciter still vibrates: cut its amplifier by hand now"
 
 
-class Obeyed(NamedTuple):
-    """What a rig made of a word."""
+class CommandOutcome(NamedTuple):
+    """Effect of an operator command on a rig."""
 
     endpoint: str
     word: str
     done: bool
     state: str  # of the rig's guard
     cause: str
-    help: str  # of the cause
+    help: str  # meaning of the cause
     amplitude_m: float  # of the exciter
-    seconds: float  # from the first word to this
-    not_kept: str  # why a stop does not outlast a restart of the rig; empty: it does, or is none
-    taken: bool  # the rig said that it took this word
+    seconds: float  # from the first command to the end of the exchange
+    not_kept: str  # why a stop does not outlast a restart of the rig; empty if it does, or for another command
+    taken: bool  # the rig confirmed this command
     alone: bool  # armed without a controller on the bus
 
     def in_words(self) -> list[str]:
-        """Lines for a person."""
+        """Lines for the operator."""
         if self.state == "NO_GUARD" and self.word in ("ARM", "ACCEPT_GAIN") and not self.alone:
-            return ["arm      this rig has no guard: nothing to arm; the controller vibrates already"]
+            return ["arm      this rig has no guard, so it needs no arming: its controller may vibrate it already"]
         if self.state == "NO_GUARD" and self.word == "DISARM":
             return [
-                "disarm   NOT DONE: this rig has no guard: nothing to disarm; `stickslip stop` stops its controller"
+                "disarm   NOT DONE: this rig has no guard, so it cannot be disarmed; `stickslip stop` stops its controller"
             ]
         done = "done" if self.done else "NOT DONE"
         lines = [
@@ -66,21 +67,21 @@ class Obeyed(NamedTuple):
             lines.append(f"warning  {self.not_kept}")
         if self.alone:
             lines.append(
-                "warning  no controller is on the bus: nothing vibrates until one comes, `stickslip controller`"
+                "warning  no controller is on the bus: the rig does not vibrate until you start `stickslip controller`"
             )
         if not self.done and self.state == "READY":
             lines.append(
-                "next     `stickslip arm --accept-gain` where the new gain is right, else mend it, then `stickslip arm`"
+                "next     if the new gain is right `stickslip arm --accept-gain`; otherwise repair, then `stickslip arm`"
             )
         if not self.done and self.state == "FAULT":
             lines.append("next     `stickslip reset` when the cause is gone, then `stickslip arm`")
         return lines
 
 
-def tell(bus_config: BusConfig, name: str) -> Obeyed:
-    """Say a word until the rig has done it or refuses.
+def tell(bus_config: BusConfig, name: str) -> CommandOutcome:
+    """Send a command until the rig has carried it out or refuses it.
 
-    Raises Fault NO_PEER where no rig answers, or it falls silent, does not confirm the word, or goes on as before.
+    Raises Fault NO_PEER if no rig answers, or if the rig falls silent, does not confirm the command, or vibrates after STOP.
     """
     where = bus_config.endpoint
     action = wire.Operator.Action.Value(name)
@@ -89,12 +90,13 @@ def tell(bus_config: BusConfig, name: str) -> Obeyed:
     except Fault as fault:
         if fault.kind.code != "NO_PEER":
             raise
-        if stands_still(bus_config):
-            line = f"{where}: what listens there stands still (frozen or overloaded), and hears no {name}"
-            raise Fault("NO_PEER", f"{line}: must run; {_BY_HAND}") from None
-        line = f"{where}: no rig answers there within {_DIAL_S:g} s: {bus_config.must_be} of the run"
-        by_hand = f"if something vibrates, {_BY_HAND}"
-        raise Fault("NO_PEER", f"{line}; {by_hand if action in _QUIETENS else _START_ONE}") from None
+        undelivered = f"{name} NOT DELIVERED: "
+        if is_frozen(bus_config):
+            line = f"{undelivered}the rig at {where} accepts connections but does not answer (frozen or overloaded)"
+            raise Fault("NO_PEER", f"{line}: must run; {_CUT_AMPLIFIER}") from None
+        line = f"{undelivered}no rig answered at {where} within {_DIAL_S:g} s: {bus_config.must_be} of the run"
+        by_hand = "if the exciter vibrates, cut its amplifier by hand now; otherwise check --endpoint"
+        raise Fault("NO_PEER", f"{line}; {by_hand if action in _QUIETING else _START_ONE}") from None
     with bus:
         exchange = _Exchange(name)
         bus.listen(APPLIED, exchange.inbox.push)
@@ -105,17 +107,17 @@ def tell(bus_config: BusConfig, name: str) -> Obeyed:
         alone = action in _ARMS and bool(bus.wait_for(["controller"], _KEPT_S))
     last = exchange.applied
     if last is None:
-        line = f"{where}: no rig says what it applies: --prefix must be that of the run"
-        raise Fault("NO_PEER", f"{line}; {_BY_HAND if action in _QUIETENS else 'give the --prefix of the run'}")
+        line = f"{where}: no rig publishes `applied` messages: --prefix must equal the prefix of the run"
+        raise Fault("NO_PEER", f"{line}; {_CUT_AMPLIFIER if action in _QUIETING else 'give the --prefix of the run'}")
     before = f"{wire.GuardState.Name(last.guard_state)} with {_vibration(last.amplitude_m)}"
     if exchange.silent_s > _SILENT_S:
         line = (
-            f"{where}: the rig has said nothing for {exchange.silent_s:.1f} s, before that {before}: must answer {name}"
+            f"{where}: the rig has been silent for {exchange.silent_s:.1f} s, before that {before}: must answer {name}"
         )
-        raise Fault("NO_PEER", f"{line}; look at its process and the network; {_BY_HAND}")
-    named = {(one.column, one.number): one for one in words()}
+        raise Fault("NO_PEER", f"{line}; {_CUT_AMPLIFIER}; then check its process and the network")
+    named = {(row.column, row.number): row for row in words()}
     cause = named[("cause", last.cause)]
-    obeyed = Obeyed(
+    outcome = CommandOutcome(
         endpoint=where,
         word=name,
         done=exchange.done,
@@ -128,19 +130,19 @@ def tell(bus_config: BusConfig, name: str) -> Obeyed:
         taken=exchange.taken,
         alone=alone,
     )
-    if not (obeyed.done or obeyed.taken) and last.guard_state != wire.NO_GUARD:
-        line = f"{where}: the rig did not confirm {name} within {_ANSWER_S:g} s, and is {before}: must take it"
-        raise Fault("NO_PEER", f"{line}; {_BY_HAND if action in _QUIETENS else 'send it again'}")
-    if action == wire.Operator.STOP and not obeyed.done:
-        raise Fault("NO_PEER", f"{where}: the rig is {before} after a stop: must be at rest; {_BY_HAND}")
-    return obeyed
+    if not (outcome.done or outcome.taken) and last.guard_state != wire.NO_GUARD:
+        line = f"{where}: the rig did not confirm {name} within {_ANSWER_S:g} s and is {before}: must confirm it"
+        raise Fault("NO_PEER", f"{line}; {_CUT_AMPLIFIER if action in _QUIETING else 'send it again'}")
+    if action == wire.Operator.STOP and not outcome.done:
+        raise Fault("NO_PEER", f"{where}: the rig is {before} after a stop: must be at rest; {_CUT_AMPLIFIER}")
+    return outcome
 
 
 class _Exchange:
-    """One word, and what the rig says meanwhile.
+    """One command and the rig's messages until it is carried out.
 
-    The rig answers a word by an event that repeats whose word it was, and what the exciter does after that event is what came of
-    it: before it, the rig may be in the state that the word asks for by somebody else's word.
+    The rig confirms a command by an event that repeats its sender. Only `applied` messages after that event show the effect:
+    before it, the rig may be in the wanted state because of another client's command.
     """
 
     def __init__(self, name: str) -> None:
@@ -149,25 +151,25 @@ class _Exchange:
         self.taken = False
         self.not_kept = ""
         self.seconds = 0.0
-        self.silent_s = 0.0  # for how long the rig had said nothing of what it applies, at the end
+        self.silent_s = 0.0  # time since the last `applied` message, at the end
         self._action = wire.Operator.Action.Value(name)
-        # whose word was taken must be told apart, also of two words of one process
+        # unique, so that the confirmation of each command is recognised, also of two commands from one process
         who = f"{os.environ.get('USER') or 'somebody'} (process {os.getpid()}, word {uuid.uuid4().hex[:8]})"
         self._word = wire.Operator(action=name, who=who).SerializeToString()
         self._answer = f"{name} by {who}"
-        self._after = False  # whether `applied` is of after the answer
-        self._checked = False  # whether a loop check ran since
-        self._came_s = self._until_s = 0.0
+        self._after = False  # whether `applied` is newer than the confirmation
+        self._checked = False  # whether a loop check has run since the confirmation
+        self._applied_at_s = self._until_s = 0.0
 
     @property
     def done(self) -> bool:
-        """Whether the rig does what the word asks for, because of it."""
+        """Whether the rig is in the wanted state because of this command."""
         applied = self.applied
         if applied is None:
             return False
         state, at_rest = applied.guard_state, applied.amplitude_m == 0.0
-        if self._action == wire.Operator.STOP:  # a stopped rig is stopped, whoever's word it took
-            # a rig without a guard hangs on its controller, which takes the word too
+        if self._action == wire.Operator.STOP:  # another client's stop is as good
+            # a rig without a guard only follows its controller, which receives the command too
             return at_rest and (state == wire.NO_GUARD or applied.cause == wire.STOP_BY_PERSON)
         if not (self._after or state == wire.NO_GUARD):
             return False
@@ -180,49 +182,51 @@ class _Exchange:
         return state in (wire.ARMED, wire.ACTIVE) and applied.cause != wire.ARMED_BY_SCENARIO
 
     def until_done(self, send: Callable[[bytes], None]) -> None:
-        """Say the word until the rig takes it, and listen until it has done it, refuses it, or does nothing for it any more."""
-        began_s = again_s = heard_s = time.monotonic()
+        """Send the command until the rig confirms it; listen until it is carried out, refused, or makes no more progress."""
+        began_s = again_s = polled_s = time.monotonic()
         self._until_s = began_s + _ANSWER_S
         while True:
             now_s = time.monotonic()
-            if realtime.was_paused(heard_s, heard_s + _HEARS_S):  # messages of the rig wait to be read
+            if realtime.was_paused(
+                polled_s, polled_s + _POLL_S
+            ):  # this computer stalled; messages of the rig wait unread
                 self._until_s = now_s + _ANSWER_S
             if now_s >= self._until_s:
                 break
-            heard_s = now_s
+            polled_s = now_s
             if now_s >= again_s and not self._after:
                 send(self._word)
                 again_s = now_s + _AGAIN_S
-            self._hear(_HEARS_S)
+            self._receive(_POLL_S)
             refused = self._after and self._action in _ARMS and self._is_in(wire.FAULT)
             other_gain = self._checked and self._action == wire.Operator.ARM and self._is_in(wire.READY)
             no_guard = self._action == wire.Operator.DISARM and self._is_in(wire.NO_GUARD)
             if self.done or other_gain or no_guard or (refused and now_s > began_s + _REFUSED_S):
                 break
         now_s = time.monotonic()
-        self.seconds, self.silent_s = now_s - began_s, now_s - self._came_s
+        self.seconds, self.silent_s = now_s - began_s, now_s - self._applied_at_s
 
     def hear_for(self, seconds: float) -> None:
-        """Listen for so long, or until the rig says that a stop does not outlast its restart."""
+        """Listen for this time, or until the rig reports that it cannot keep a stop over its restart."""
         until_s = time.monotonic() + seconds
         while not self.not_kept and (left_s := until_s - time.monotonic()) > 0.0:
-            self._hear(left_s)
+            self._receive(left_s)
 
     def _is_in(self, state: int) -> bool:
         return self.applied is not None and self.applied.guard_state == state
 
-    def _hear(self, timeout_s: float) -> None:
+    def _receive(self, timeout_s: float) -> None:
         received = self.inbox.get(timeout_s)
-        with contextlib.suppress(Fault):  # rubbish of another client is no answer
+        with contextlib.suppress(Fault):  # skip malformed messages of other clients
             if received is not None:
                 self._take(received)
 
     def _take(self, received: Received) -> None:
         if received.topic is APPLIED:
             self.applied = parsed(wire.Applied, received.payload, APPLIED.name)
-            self._came_s, self._after = time.monotonic(), self.taken
+            self._applied_at_s, self._after = time.monotonic(), self.taken
             if self._after and self._is_in(wire.CHECKING):
-                self._until_s = self._came_s + _ANSWER_S
+                self._until_s = self._applied_at_s + _ANSWER_S
             self._checked = self._after and (self._checked or self._is_in(wire.CHECKING))
             return
         event = parsed(wire.Event, received.payload, PLANT_EVENT.name)

@@ -1,4 +1,4 @@
-"""A run of several processes: starts plant, controller and recorder, watches them, ends them, leaves nobody behind."""
+"""A run of several processes: starts plant, controller and recorder, supervises them, and ends them all."""
 
 import contextlib
 import os
@@ -17,25 +17,25 @@ from bridge.faults import FAULTS, Fault
 from bridge.plain import ANOTHER_COMPILES, LOADED, say
 from cockpit.run.child_process import handle_endings
 
-_GRACE_S = 6.0  # to fade out, say goodbye on the bus and close the log
+_GRACE_S = 6.0  # time for a child to fade out, leave the bus and close the log, before it is killed
 _LOOK_S = 0.05
-_TOLD_S = 30.0  # between two words about a run that has not begun
-_FOREVER_S = 1e6  # for a child: who has started it sees how the others are, and ends it
-_WARNING = "stickslip: warning: "  # how a line of a child begins that a person must see at once
-# how far a child is, as a person is told
+_REPORT_S = 30.0  # between two lines about a run that has not begun
+_FOREVER_S = 1e6  # for a child: its parent supervises the others, and ends it
+_WARNING = "stickslip: warning: "  # prefix of a child's line that is passed on to the operator at once
+# progress of a child, as printed
 STARTS, COMPILES, READY = "starts", "compiles", ""
-# in this order they are asked to stop: the plant fades the vibration out and tells the others
+# in this order they are asked to stop: the plant fades the vibration out and sends END to the others
 _ROLES = ("plant", "controller", "recorder")
 
 
 class Child:
-    """One process of the run; what it says on stderr is kept for the fault line."""
+    """One process of the run; its lines on stderr are kept for the fault line."""
 
     def __init__(self, role: str, arguments: list[str]) -> None:
         self.role = role
-        # a session of its own: Ctrl-C reaches the parent alone, which ends the children in order
+        # in a new session: Ctrl-C reaches only the parent, which ends the children in order
         self.process = subprocess.Popen(
-            # -P: else the folder of the person who calls is searched first, with a plant.py of that person's own
+            # -P: otherwise Python would import a plant.py from the current folder first
             [sys.executable, "-P", "-m", "cockpit", role, *arguments, "--child", str(os.getpid())],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
@@ -67,16 +67,16 @@ class Child:
                         say(line.rstrip())
 
     def last_words(self) -> str:
-        """What it said last on stderr."""
+        """The last line on stderr."""
         self._reader.join(1.0)
         return next((line for line in reversed(self._lines) if line.strip()), "")
 
 
 def _check_free(endpoint: str) -> None:
-    """Raise Fault ENDPOINT_BUSY where the plant could not listen.
+    """Raise Fault ENDPOINT_BUSY if the plant could not listen.
 
-    Asked before anything starts: recorder and controller would meet whoever listens there already, overwrite the log of
-    that run and command its rig.
+    Checked before anything starts: recorder and controller would connect to the run that listens there already, overwrite its
+    log and command its rig.
     """
     host, _, port = endpoint.partition("/")[2].rpartition(":")
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
@@ -98,12 +98,12 @@ def run_processes(
     """Run a scenario to its end and close its log.
 
     Args:
-        arguments: the command line that makes the same scenario in a child.
-        endpoint: where they meet; nobody may listen there yet.
-        watch: follows the run on the bus until its event is set; runs in a thread of its own.
-        wait_s: longest time until the log begins; None: as long as the processes need, which are told every half minute.
+        arguments: command line of a child that gives the same scenario.
+        endpoint: address of the bus; it must be free.
+        watch: follows the run on the bus until its event is set; runs in a separate thread.
+        wait_s: longest time until the log begins; None: no limit, with a line every 30 s.
 
-    Raises Fault ENDPOINT_BUSY, NO_PEER after `wait_s`, the Fault of the child that failed first, PEER_DIED when one was killed,
+    Raises Fault ENDPOINT_BUSY, NO_PEER after `wait_s`, the Fault of the child that failed first, PEER_DIED if a child was killed,
     KeyboardInterrupt after Ctrl-C.
 
     """
@@ -119,7 +119,7 @@ def run_processes(
                 wait_for = ["--wait-for", "controller,recorder"] if role == "plant" else []
                 children.append(Child(role, [*arguments, *more, *extra, *wait_for]))
         watcher.start()
-        _until_the_end(children, Beginning(children, log, wait_s))
+        _until_the_end(children, StartWatch(children, log, wait_s))
     except KeyboardInterrupt:
         _stop(children)
         raise
@@ -132,11 +132,11 @@ def run_processes(
 
 @contextlib.contextmanager
 def _ctrl_c_afterwards() -> Generator[None]:
-    """Ctrl-C, SIGTERM and SIGHUP wait for the end of the block: a child that is not noted yet would be left behind."""
-    came: list[int] = []
+    """Delay Ctrl-C, SIGTERM and SIGHUP to the end of the block: a child that is not yet in the list would never be ended."""
+    signals: list[int] = []
 
     def note(number: int, _frame: Any) -> None:
-        came.append(number)
+        signals.append(number)
 
     before = handle_endings(note)
     try:
@@ -144,14 +144,14 @@ def _ctrl_c_afterwards() -> Generator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-    if came:
-        signal.raise_signal(came[0])
+    if signals:
+        signal.raise_signal(signals[0])
 
 
-class Beginning:
-    """Until the log begins: who compiles or is not there yet is told now and then.
+class StartWatch:
+    """Until the log begins: reports every 30 s which processes still start or compile.
 
-    A first start compiles for up to a minute, and on a busy or small computer for several: no time is too long for it.
+    A first start compiles for up to a minute, on a busy or small computer for several minutes. So no time limit is set.
     """
 
     def __init__(self, children: list[Child], log: Path, wait_s: float | None) -> None:
@@ -159,7 +159,7 @@ class Beginning:
         self._log = log
         self._before = self._stamp()
         self._since_s = time.monotonic()
-        self._due_s = self._since_s + _TOLD_S
+        self._due_s = self._since_s + _REPORT_S
         self._wait_s = wait_s
         self._begun = False
         self._progress = Progress()
@@ -171,7 +171,7 @@ class Beginning:
         return now.st_mtime_ns, now.st_size
 
     def look(self) -> None:
-        """Tell what is waited for where it is due. Raises Fault NO_PEER after the longest time."""
+        """Report the missing processes when a line is due. Raises Fault NO_PEER after the longest time."""
         self._progress.show(*(sum(counts) for counts in zip(*(child.left for child in self._children), strict=True)))
         now_s = time.monotonic()
         late = self._wait_s is not None and now_s > self._since_s + self._wait_s
@@ -181,32 +181,30 @@ class Beginning:
         if self._begun:
             return
         waited_s = now_s - self._since_s
-        what = self._what_is_missing()
+        missing = self._missing()
         if late:
-            raise Fault(
-                "NO_PEER", f"{what} after {waited_s:.0f} s; give the start longer: --wait S, or no --wait at all"
-            )
-        if not any(child.still == COMPILES for child in self._children):  # which the progress shows
-            say(f"waiting  {what}, since {waited_s:.0f} s; Ctrl-C ends it")
-        self._due_s = now_s + _TOLD_S
+            raise Fault("NO_PEER", f"{missing} after {waited_s:.0f} s; allow more time with --wait S, or omit --wait")
+        if not any(child.still == COMPILES for child in self._children):  # the progress shows compilation
+            say(f"waiting  {missing}, since {waited_s:.0f} s; Ctrl-C ends it")
+        self._due_s = now_s + _REPORT_S
 
-    def _what_is_missing(self) -> str:
-        who: list[str] = []
+    def _missing(self) -> str:
+        parts: list[str] = []
         for still in (COMPILES, STARTS):
             roles = [child.role for child in self._children if child.still == still]
             if roles:
-                who.append(f"the {' and the '.join(roles)} still {still if len(roles) == 1 else still[:-1]}")
-        return ", ".join(who) or "plant, controller and recorder have not found each other"
+                parts.append(f"the {' and the '.join(roles)} still {still if len(roles) == 1 else still[:-1]}")
+        return ", ".join(parts) or "plant, controller and recorder have not connected to each other"
 
 
-def _until_the_end(children: list[Child], beginning: Beginning) -> None:
-    """Wait for all to end well; raise for the first that does not."""
+def _until_the_end(children: list[Child], beginning: StartWatch) -> None:
+    """Wait until all have ended with status 0; raise the fault of the first that has not."""
     while True:
         beginning.look()
         ended = [child for child in children if child.process.poll() is not None]
         failed = [child for child in ended if child.process.returncode != 0]
         if failed:
-            # the others fail in the wake of the first: the one that was killed, or that names a cause, is the news
+            # the first failure makes the others fail; a killed child, or a child that names a cause, is reported
             time.sleep(_LOOK_S)
             failed = [child for child in children if child.process.poll() not in {None, 0}]
             raise _fault(failed)
@@ -232,7 +230,7 @@ def _fault(failed: list[Child]) -> Fault:
 
 
 def _stop(children: list[Child]) -> None:
-    """Ask all to stop, in order, and end those that do not."""
+    """Ask all to stop, in order, and kill those that do not."""
     for child in children:
         if child.process.poll() is None:
             child.process.terminate()

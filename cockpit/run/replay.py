@@ -1,4 +1,4 @@
-"""`stickslip replay`: is it the same, what if, and a log back on the bus."""
+"""`stickslip replay`: compare a log with this version's controller, or simulate its run with other settings."""
 
 import contextlib
 import math
@@ -19,10 +19,10 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.payloads import parsed
 from controller.codes import RESET, STOP
 from controller.config import ControllerConfig
-from controller.replay import Change, Difference, OutOfOrder, Replay, Replayer, replay
+from controller.replay import Change, OutOfOrder, Replay, ReplayDifference, Replayer, replay
 
 if TYPE_CHECKING:
-    from cockpit.run.in_process import Word
+    from cockpit.run.in_process import TimedAction
 
 Headers = dict[str, dict[str, str]]
 
@@ -37,20 +37,20 @@ def time_s(option: str, text: str, example: str) -> float:
     except ValueError:
         t_s = math.nan
     if not 0.0 <= t_s <= _LATEST_S:
-        line = f"{option}: {text!r} is no time; must be from 0 to {_LATEST_S:g} s; write for example {example}"
+        line = f"{option}: {text!r} is not a time; must be from 0 to {_LATEST_S:g} s; write for example {example}"
         raise Fault("CONFIG", line)
     return t_s
 
 
 def changes_of(run: RunData, settings: list[str]) -> list[Change]:
-    """The log's own configuration, then every `key=value[@TIMEs]` setting from its time on. Raises Fault CONFIG."""
+    """The recorded configuration, then every `key=value[@TIMEs]` setting from its time on. Raises Fault CONFIG."""
     return _changes_of(run.headers, run.path, settings, int(run.trace["t_ns"].max(initial=0)))
 
 
 def _changes_of(headers: Headers, path: Path, settings: list[str], end_ns: int | None) -> list[Change]:
-    """The same, of a log that ends at `end_ns`; None where this is not known yet."""
+    """`changes_of` for a log that ends at `end_ns`; None if the end is not known yet."""
     recorded = table = configuration_of(headers, "controller", path)
-    validate(ControllerConfig, recorded, path.name)  # by itself: no setting is to blame
+    validate(ControllerConfig, recorded, path.name)  # without settings, so that a fault names the log
     source = f"{path.name} with --set" if settings else path.name
     timed: dict[int, list[str]] = {0: []}
     for setting in [*_timed_then(headers, path), *settings]:
@@ -59,7 +59,7 @@ def _changes_of(headers: Headers, path: Path, settings: list[str], end_ns: int |
         if plain:
             t_ns = round(time_s(f"--set {setting}", time, "key=value@20s") * 1e9)
             if end_ns is not None and t_ns > end_ns:
-                line = f"--set {setting}: the log ends at {1e-9 * end_ns:g} s: must be a time before"
+                line = f"--set {setting}: the log ends at {1e-9 * end_ns:g} s: must be a time before; change the time"
                 raise Fault("CONFIG", line)
         timed.setdefault(t_ns, []).append((plain or setting).removeprefix("controller."))
     changes: list[Change] = []
@@ -74,47 +74,51 @@ def _changes_of(headers: Headers, path: Path, settings: list[str], end_ns: int |
 
 
 def _timed_then(headers: Headers, path: Path) -> list[str]:
-    """What `--closed-loop` had set from a time on when it made this log; what it set from the start is in the header."""
+    """Settings `key=value@TIME` of the `--closed-loop` run that wrote this log; settings from the start are in the header."""
     return [setting for setting in texts_of(headers, "run", "settings", path) if "@" in setting]
 
 
-def _words_of(run: RunData) -> "list[Word]":
-    """What persons said to controller and rig, and when."""
-    from cockpit.run.in_process import Word
+def _words_of(run: RunData) -> "list[TimedAction]":
+    """Operator commands to controller and rig, with their times."""
+    from cockpit.run.in_process import TimedAction
 
     bits = ((STOP, wire.Operator.STOP), (RESET, wire.Operator.RESET))
-    found = [Word(int(row["t_ns"]), action) for row in run.trace for bit, action in bits if int(row["events"]) & bit]
+    commands = [
+        TimedAction(int(row["t_ns"]), action) for row in run.trace for bit, action in bits if int(row["events"]) & bit
+    ]
     causes: dict[int, int] = {
         wire.ARMED_BY_PERSON: wire.Operator.ARM,
         wire.DISARMED_BY_PERSON: wire.Operator.DISARM,
     }
     began = run.applied[np.flatnonzero(np.diff(run.applied["cause"], prepend=0))]
-    found += [Word(int(row["t_ns"]), causes[int(row["cause"])]) for row in began if int(row["cause"]) in causes]
-    return sorted(found)
+    commands += [
+        TimedAction(int(row["t_ns"]), causes[int(row["cause"])]) for row in began if int(row["cause"]) in causes
+    ]
+    return sorted(commands)
 
 
 class Replayed(NamedTuple):
-    """What today's controller makes of one log."""
+    """Result of feeding one log to this version's controller."""
 
     log: str
     identical: bool
     compared_steps: int
-    skipped_steps: int  # they could not be rebuilt
-    difference: Difference | None
+    skipped_steps: int  # could not be rebuilt
+    difference: ReplayDifference | None
     likely_reason: str
     changed: bool  # by a setting
-    damage: list[str]  # of the log: what is in the damaged part was not replayed
+    damage: list[str]  # of the log; the damaged part was not replayed
 
     def in_words(self) -> list[str]:
-        """The answer in lines for a person."""
+        """Lines for the operator."""
         skipped = (
-            f"; {counted(self.skipped_steps, 'step')} could not be rebuilt: a block or the memory before it is not in the log"
+            f"; {counted(self.skipped_steps, 'step')} could not be rebuilt: the log lacks a block or the memory before it"
             if self.skipped_steps
             else ""
         )
         damage = [f"  warning: {text}" for text in self.damage]
         if self.difference is None:
-            same = f"identical, {counted(self.compared_steps, 'step')}, every command and trace in it bit for bit"
+            same = f"identical, {counted(self.compared_steps, 'step')}, every command and trace bit for bit"
             return [f"{self.log}: {same}{skipped}", *damage]
         d = self.difference
         lines = [
@@ -125,21 +129,21 @@ class Replayed(NamedTuple):
         ]
         if self.changed:
             lines.append(
-                "  the log's plant heard the old commands: with these it would have answered differently from there on; "
-                "--closed-loop simulates that"
+                "  the recorded plant received the old commands; with the new ones it would have moved differently from then on: "
+                "--closed-loop simulates this"
             )
         return lines
 
 
 def replay_log(path: Path, from_s: float, settings: list[str]) -> Replayed:
-    """Replay one log from a time on; whether today's controller does the same. Raises Fault BAD_LOG and CONFIG."""
+    """Replay one log from a time on, and compare it with this version's controller. Raises Fault BAD_LOG and CONFIG."""
     check_log_file(path)
     reader = LogReader(path)
     steps, end_ns, held, result = _one_pass(reader, from_s, settings)
     if not steps:
-        raise Fault("BAD_LOG", f"{path}: holds no trace: no controller was recorded, so nothing can be replayed")
+        raise Fault("BAD_LOG", f"{path}: holds no trace: no controller was recorded; replay another log")
     changes = _changes_of(reader.metadata, path, settings, end_ns)
-    if result is None or held != changes:  # a message or a configuration came late
+    if result is None or held != changes:  # messages out of order, or a late configuration
         result = replay(read_run(path), changes, from_s)
     if result.compared == 0:
         line = f"{path}: no step from {from_s:g} s on can be rebuilt: the log ends before, or holds no usable snapshot"
@@ -159,10 +163,10 @@ def replay_log(path: Path, from_s: float, settings: list[str]) -> Replayed:
 def _one_pass(
     reader: LogReader, from_s: float, settings: list[str]
 ) -> tuple[int, int, list[Change] | None, Replay | None]:
-    """Replay a log as it is read, in memory that does not grow with it, by the configuration before its first step.
+    """Replay a log while it is read, in constant memory, with the configuration before its first step.
 
-    Its steps, the time of the last one, the configurations, and the answer; None where messages are out of order, or where the
-    configuration comes late.
+    Returns the number of steps, the time of the last step, the configurations, and the result; the result is None if messages
+    are out of order, or if the configuration is late.
     """
     steps = end_ns = 0
     changes, replayer = None, None
@@ -180,10 +184,10 @@ def _one_pass(
                 changes = _changes_of(reader.metadata, reader.path, settings, None)
                 replayer = Replayer(changes, from_s)
             if replayer is not None:
-                for one in waiting:
-                    _add(replayer, one)
+                for earlier in waiting:
+                    _add(replayer, earlier)
                 waiting = []
-        except (OutOfOrder, Fault):  # a fault of the configuration may be no more one when all of it was read
+        except (OutOfOrder, Fault):  # an incomplete configuration may become valid once the whole log is read
             out_of_order, replayer, waiting = True, None, []
     with contextlib.suppress(OutOfOrder):
         return steps, end_ns, changes, replayer.result() if replayer is not None else None
@@ -199,7 +203,7 @@ def _add(replayer: Replayer, piece: Piece) -> None:
 
 
 def likely_reason(headers: Headers, path: Path, settings: list[str]) -> str:
-    """Why a replay would differ, in words."""
+    """The likely reason of a difference, in words."""
     from cockpit.run.scenario import versions
 
     if settings:
@@ -209,22 +213,22 @@ def likely_reason(headers: Headers, path: Path, settings: list[str]) -> str:
     if changed:
         made, made_by = was.get("stickslip"), now["stickslip"]
         return f"other versions: {'; '.join(changed)}" + (f"; {_installed(str(made))}" if made != made_by else "")
-    return "same versions and configuration: the controller's code was changed since, or the log was"
+    return "same versions and configuration: the controller's code or the log was changed since"
 
 
 def _installed(version: str) -> str:
-    """How to get the version that made a log."""
+    """Instruction to install the version that wrote a log."""
     if not re.fullmatch(r"[\w.+-]+", version, re.ASCII):
-        return "the log does not say which one made it"
+        return "the log does not name the version that wrote it"
     wheel = f"stickslip-{version}-py3-none-any.whl"
     return (
-        f"`pip install '{wheel}[all]'`, or `pip install '.[all]'` in a checkout of v{version}, repeats it bit for bit; "
-        "what-if runs (`--set`, `--closed-loop`) work with this one"
+        f"after `pip install '{wheel}[all]'`, or `pip install '.[all]'` in a checkout of v{version}, it is repeated bit for bit; "
+        "what-if runs (`--set`, `--closed-loop`) work with this version"
     )
 
 
 class RunFigures(NamedTuple):
-    """What a run came to, for comparing two."""
+    """Figures of a run, for the comparison of two runs."""
 
     slips: int
     swing_N: float
@@ -242,20 +246,20 @@ def outcome(run: RunData) -> RunFigures:
     trace = run.trace
     block_s = float(run.configuration("controller")["block_s"])
     power_W = trace["drive_force_N"] * trace["drive_velocity_mps"]
-    work_J = float(power_W[np.isfinite(power_W)].sum()) * block_s  # the verdict counts the blocks that are no number
+    work_J = float(power_W[np.isfinite(power_W)].sum()) * block_s  # the verdict reports blocks with NaN or infinity
     dose = float((trace["vibration_velocity_mps"] ** 2).sum()) * block_s * 1e6
     return RunFigures(int(trace["slips"][-1]), swing_N, verdict.velocity_ratio_min, work_J, dose)
 
 
 class Compared(NamedTuple):
-    """A run as it was recorded, and simulated again with the changed controller."""
+    """A recorded run, and the same run simulated with the changed controller."""
 
     was: RunFigures
     now: RunFigures
     log: str  # of the new run
 
     def in_words(self) -> list[str]:
-        """A table for a person."""
+        """A table for the operator."""
         rows = [
             f"{field:<28}{getattr(self.was, field):>14.4g}{getattr(self.now, field):>14.4g}"
             for field in RunFigures._fields
@@ -264,7 +268,7 @@ class Compared(NamedTuple):
 
 
 def closed_loop(path: Path, settings: list[str], log: Path) -> Compared:
-    """Simulate a log's run again, from its own plant and seed, with the changed controller, and compare both."""
+    """Simulate the run of a log again, with its plant and seed and the changed controller, and compare both."""
     from cockpit.run.in_process import run_onboard
     from cockpit.run.run import about_run
     from cockpit.run.scenario import Scenario
@@ -274,13 +278,15 @@ def closed_loop(path: Path, settings: list[str], log: Path) -> Compared:
     plant = run.configuration("plant")
     missing = [key for key in ("rig", "seed") if key not in plant]
     if missing:
-        line = f"{path}: its plant says nothing of {', '.join(missing)}: only the log of our own plant can be simulated again"
+        line = f"{path}: the header of its plant lacks {', '.join(missing)}: must be a log of the simulated rig; choose another"
         raise Fault("BAD_LOG", line)
     if not len(run.sensors) or not len(run.trace):
-        raise Fault("BAD_LOG", f"{path}: holds no block with what the controller did; there is nothing to compare with")
-    # what was recorded, not what was planned: a run may have been interrupted, or have had no end
+        raise Fault(
+            "BAD_LOG", f"{path}: holds no block with a trace of the controller to compare with; choose another log"
+        )
+    # the recorded duration, not the planned one: a run may have been interrupted, or have had no end
     table = {"rig": plant["rig"], "seed": plant["seed"], "duration_s": int(run.sensors["t_ns"][-1]) * 1e-9}
-    # a rig that told of no guard vibrated as it was told
+    # a rig without a guard counts as armed
     table["arm"] = int(run.sensors["guard_state"][0]) in {wire.NO_GUARD, wire.ARMED, wire.ACTIVE}
     table["controller"] = changes[0].config.model_dump(mode="json")
     scenario = validate(Scenario, table, path.name)

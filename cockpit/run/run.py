@@ -18,31 +18,31 @@ from cockpit.run.scenario import (
     load_scenario,
     refuse_faults_of_processes,
     refuse_faults_that_take_time,
-    refuse_what_takes_no_clock,
+    refuse_short_blocks,
 )
 from cockpit.run.writable import LOG, check_output
 
 if TYPE_CHECKING:
-    from bridge.log.storage.chain import Chain
+    from bridge.log.storage.chain import HashChain
     from cockpit.judge.margins import Margins
     from cockpit.judge.phases import Phase
     from cockpit.judge.run_judge import RunJudge
     from cockpit.judge.verdict import RunVerdict
 
 
-# Free on the disk of a log below which a run without an end in one process is over: it writes some 2 GB a minute. Smaller: the
-# judging of the log, and whoever else writes there, meet a full disk.
+# A run without an end in one process writes some 2 GB per minute and ends below this free space. Larger: it ends earlier.
+# Smaller: the judging of the log and other programs meet a full disk.
 _LEAST_FREE_BYTES = 1 << 30
-_LOOK_S = 0.5  # between two looks at the disk, in which 20 MB are written
+_LOOK_S = 0.5  # interval of the check of the disk; 20 MB are written in it
 
 
 def log_path(given: Path | None, name: str) -> Path:
-    """Where a log goes."""
+    """Path of the log: `given`, or runs/NAME.mcap."""
     return given if given is not None else Path("runs") / f"{name}.mcap"
 
 
 def keep_aside(path: Path) -> None:
-    """Give a log that is there already a name of its own, after the time it was written at. Raises Fault LOG_WRITE."""
+    """Rename an existing log after the time at which it was written. Raises Fault LOG_WRITE."""
     if not path.is_file() or not path.stat().st_size:
         return
     refuse_a_live_log(path, "--log")
@@ -56,11 +56,11 @@ def keep_aside(path: Path) -> None:
             part.rename(aside.with_stem(aside.stem + part.stem.removeprefix(path.stem)))
     except OSError as error:
         raise Fault("LOG_WRITE", f"{path}: cannot be renamed: {error.strerror}; choose another --log") from None
-    say(f"kept     {aside}, which was {path.name} until now")
+    say(f"kept     {aside} (the earlier {path.name})")
 
 
 def about_run(scenario: Scenario, lockstep: bool) -> dict[str, object]:
-    """What a log says of its run besides the configurations."""
+    """Metadata of a log about its run, in addition to the configurations."""
     return {
         "scenario": scenario.name,
         "description": scenario.description,
@@ -71,7 +71,7 @@ def about_run(scenario: Scenario, lockstep: bool) -> dict[str, object]:
 
 
 def _stamp(path: Path) -> tuple[int, int] | None:
-    """Tells a file from what it was before; None where there is none."""
+    """Time and size of a file, to detect a change; None if it does not exist."""
     if not path.is_file():
         return None
     now = path.stat()
@@ -79,13 +79,13 @@ def _stamp(path: Path) -> tuple[int, int] | None:
 
 
 class RunOutcome(NamedTuple):
-    """What came of a run, and on which rig."""
+    """Verdict of a run, and its rig."""
 
     verdict: "RunVerdict"
     rig: str
     effects: list[str]  # of the rig
-    loop: "Margins | None"  # of a rig with effects, which is another than the one the loop was designed for
-    without: "Phase | None" = None  # the stretch `after` without the controller, where it was asked for
+    loop: "Margins | None"  # only for a rig with effects, for which the loop was not designed
+    without: "Phase | None" = None  # the stretch `after`, simulated without the controller, with `--without`
 
     def as_dict(self) -> dict[str, Any]:
         """For `--json`."""
@@ -119,14 +119,14 @@ def run_scenario(
     wait_s: float | None = None,
     without: bool = False,
 ) -> RunOutcome:
-    """Run a scenario and judge it. A run without an end is over with Ctrl-C, SIGTERM or SIGHUP, and judged like any other.
+    """Run a scenario and judge it. Ctrl-C, SIGTERM or SIGHUP ends a run without an end, which is then judged like any other.
 
     Args:
-        wait_s: longest time until the log of a run of several processes begins; None: as long as they need.
-        without: simulate the same run without the controller as well, once it is judged.
+        wait_s: longest time until the log of a run of several processes begins; None: no limit.
+        without: also simulate the same run without the controller, after the verdict.
 
-    Raises Fault INTERRUPTED where a run with an end was stopped before, and the fault that ended a run in one process early; the
-    verdict on the recorded part is on stderr before.
+    Raises Fault INTERRUPTED if a run with an end was stopped before its end, and the fault that ended a run in one process early.
+    In both cases the verdict on the recorded part is printed on stderr first.
 
     """
     scenario = load_scenario(name, settings)
@@ -135,22 +135,22 @@ def run_scenario(
     before = _stamp(path)
     endless = scenario.duration_s == 0.0
     if not (lockstep or in_process):
-        refuse_what_takes_no_clock(scenario)
+        refuse_short_blocks(scenario)
         refuse_faults_of_processes(scenario)
         warn_without_priority()
     if lockstep:
         refuse_faults_that_take_time(scenario)
     if not in_process:
-        rig_security(scenario.bus)  # here, where its warning is seen and its fault comes before anything starts
+        rig_security(scenario.bus)  # its warning is visible here, and its fault is raised before anything starts
     if endless and in_process:
         _refuse_little_room(path)
     if endless:
         say(f"{'simulating' if in_process else 'running'} until Ctrl-C; log {path}")
-    interrupted, by, came = False, "Ctrl-C", _Came(None, None, [], stopped=False)
+    interrupted, by, made = False, "Ctrl-C", _InProcessRun(None, None, [], stopped=False)
     try:
         if in_process:
-            came = _in_process(scenario, path)
-            interrupted = came.stopped
+            made = _in_process(scenario, path)
+            interrupted = made.stopped
         else:
             from cockpit.run.processes import run_processes
             from cockpit.run.progress import follower
@@ -170,20 +170,20 @@ def run_scenario(
     left = f"{closed} and not judged; `stickslip log info {path}` judges it"
     line = f"judging the log; Ctrl-C {'again ' if interrupted else ''}to leave it unjudged"
     with left_on_ctrl_c(line, left, again=interrupted):
-        return _judged(scenario, path, closed if interrupted else "", without, came)
+        return _judged(scenario, path, closed if interrupted else "", without, made)
 
 
-class _Came(NamedTuple):
-    """Results of a run in one process, besides its log."""
+class _InProcessRun(NamedTuple):
+    """Results of a run in one process, in addition to its log."""
 
-    judge: "RunJudge | None"  # that took every message; None where the log is to be read
-    chain: "Chain | None"
-    told: list[str]  # events that the log does not hold
+    judge: "RunJudge | None"  # has received every message; None if the log must be read
+    chain: "HashChain | None"
+    events: list[str]  # not in the log
     stopped: bool  # by Ctrl-C or a signal
 
 
 def _say_verdict(path: Path) -> None:
-    """Write the verdict on the recorded part to stderr; nothing where the log holds no block."""
+    """Write the verdict on the recorded part to stderr; nothing if the log holds no block."""
     from cockpit.judge.judged import judge
     from cockpit.judge.verdict_words import in_words
 
@@ -193,13 +193,13 @@ def _say_verdict(path: Path) -> None:
             say("\n".join(in_words(verdict, verbose=False)))
 
 
-def _judged(scenario: Scenario, path: Path, interrupted: str, without: bool, came: _Came) -> RunOutcome:
-    """What came of a run.
+def _judged(scenario: Scenario, path: Path, interrupted: str, without: bool, made: _InProcessRun) -> RunOutcome:
+    """Judge a run.
 
     Raises Fault INTERRUPTED with the line `interrupted`, if any, for a run that did not reach its end.
     """
     from bridge.log.damage import Damage
-    from bridge.log.storage.afterwards import note_afterwards
+    from bridge.log.storage.afterwards import add_table
     from cockpit.judge.judged import judge_log
     from cockpit.judge.setup import settled_from_s
     from cockpit.judge.verdict_words import VERDICT, noted
@@ -208,42 +208,42 @@ def _judged(scenario: Scenario, path: Path, interrupted: str, without: bool, cam
         _say_verdict(path)
         raise Fault("INTERRUPTED", interrupted)
     effects = list(scenario.rig.effects)
-    if came.judge is not None and came.chain is not None:
-        judge = came.judge
-        verdict = judge.result(Damage(0, 0, closed=True), came.chain, {})
+    if made.judge is not None and made.chain is not None:
+        judge = made.judge
+        verdict = judge.result(Damage(0, 0, closed=True), made.chain, {})
     else:
         verdict, _, judge = judge_log(path, margins=bool(effects))
     if interrupted and not verdict.blocks:
         raise Fault("INTERRUPTED", f"{interrupted} and holds no block")
     margins = judge.margins() if effects else None
-    verdict = verdict._replace(told=[*verdict.told, *came.told])
+    verdict = verdict._replace(told=[*verdict.told, *made.events])
     alone = None
     if without and verdict.after is not None:
-        from cockpit.run.without import without_controller
+        from cockpit.run.open_loop_twin import without_controller
 
         alone = without_controller(scenario, settled_from_s(verdict.enabled_from_s), verdict.seconds)
     fields = noted(verdict) | ({"without": alone.as_dict()} if alone is not None else {})
-    verdict = verdict._replace(chain=note_afterwards(path, VERDICT, fields, verdict.chain))
+    verdict = verdict._replace(chain=add_table(path, VERDICT, fields, verdict.chain))
     return RunOutcome(verdict, scenario.rig.name, effects, margins, alone)
 
 
 def _free_bytes(path: Path) -> int:
-    """What is free where a log is, or will be."""
+    """Free space on the disk of a log that exists or will be written."""
     return shutil.disk_usage(next(parent for parent in path.absolute().parents if parent.exists())).free
 
 
 def _refuse_little_room(path: Path) -> None:
-    """Raise Fault LOG_WRITE where a run without an end would be over at once."""
+    """Raise Fault LOG_WRITE if a run without an end would end at once for lack of space."""
     if (free := _free_bytes(path)) < _LEAST_FREE_BYTES:
-        line = f"{path}: {free / 1e6:.0f} MB are free there: a run without an end in one process, which writes some 2 GB a minute"
-        rule = f"needs {_LEAST_FREE_BYTES / 1e6:.0f} MB"
+        line = f"{path}: {free / 1e6:.0f} MB are free: a run without an end in one process writes some 2 GB per minute"
+        rule = f"and needs {_LEAST_FREE_BYTES / 1e6:.0f} MB"
         raise Fault(
-            "LOG_WRITE", f"{line}, {rule}; free space, choose another --log, or give it an end: --set duration_s=60"
+            "LOG_WRITE", f"{line} {rule}; free space, choose another --log, or give it an end: --set duration_s=60"
         )
 
 
 class _Room:
-    """Looks now and then whether the disk of a log has room for more."""
+    """Checks every 0.5 s whether the disk of a log has room for more."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -257,11 +257,11 @@ class _Room:
         return self.is_over
 
 
-def _in_process(scenario: Scenario, path: Path) -> _Came:
-    """Simulate, with a bar on a terminal; without an end show the simulated time, until the operator or the disk ends it.
+def _in_process(scenario: Scenario, path: Path) -> _InProcessRun:
+    """Simulate, with a progress bar on a terminal. A run without an end shows the simulated time, until Ctrl-C or a full disk.
 
-    A run without faults is judged while it is written. A run with faults goes message by message, 0.4 s of CPU a second in place
-    of 0.01 s.
+    A run without faults is judged while it is written. A run with faults is simulated message by message, with 0.4 s of CPU per
+    simulated second instead of 0.01 s.
     """
     from rich.console import Console
     from rich.progress import Progress, TextColumn
@@ -275,7 +275,7 @@ def _in_process(scenario: Scenario, path: Path) -> _Came:
     )
     console = Console(stderr=True)
     if scenario.fault:
-        say("simulating with faults, message by message: 0.4 s for a second of the run, longer on a busy computer")
+        say("simulating with faults, message by message: 0.4 s per simulated second, longer on a busy computer")
     judge, chain = RunJudge(path, {}, margins=bool(scenario.rig.effects)), None
     with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as bar:
         task = bar.add_task("simulating", total=scenario.duration_s or None)
@@ -293,5 +293,5 @@ def _in_process(scenario: Scenario, path: Path) -> _Came:
             run_with_faults(scenario, path, about, progress, stopped)
         else:
             chain = run_onboard(scenario, path, about, progress, stopped=stopped, judge=judge)
-    told = [f"LOG_WRITE: ended, as less than {_LEAST_FREE_BYTES / 1e6:.0f} MB are free for {path}"]
-    return _Came(judge if chain is not None else None, chain, told if no_room.is_over else [], stop.is_set())
+    events = [f"LOG_WRITE: ended, as less than {_LEAST_FREE_BYTES / 1e6:.0f} MB are free for {path}"]
+    return _InProcessRun(judge if chain is not None else None, chain, events if no_room.is_over else [], stop.is_set())

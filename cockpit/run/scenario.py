@@ -22,7 +22,7 @@ from plant.config_limits import refuse_what_no_rig_does
 from plant.faults.kinds import PROCESS
 from plant.faults.table import FaultTable
 
-# Shorter: the answer to a block comes after the next block is due.
+# Shorter: the command for a block arrives after the next block is due.
 _SHORTEST_IN_REAL_TIME_S = 1e-3
 
 
@@ -34,14 +34,14 @@ def _plain(name: str) -> str:
 
 
 class LogTable(Strict):
-    """When the log of a run goes on in a new file, `NAME-0001.mcap` and so on."""
+    """Limits of a file of the log; the log continues in `NAME-0001.mcap` and so on."""
 
-    file_MB: Annotated[float, Field(ge=0)] = Field(default=1000.0, description="Size of a file; 0: any.")
-    file_s: Annotated[float, Field(ge=0)] = Field(default=3600.0, description="Length of the run in a file; 0: any.")
+    file_MB: Annotated[float, Field(ge=0)] = Field(default=1000.0, description="Largest size of a file; 0: no limit.")
+    file_s: Annotated[float, Field(ge=0)] = Field(default=3600.0, description="Longest run in a file; 0: no limit.")
 
     @property
     def rotation(self) -> Rotation:
-        """The same for whoever writes the log."""
+        """These limits for the writer of the log."""
         return Rotation(round(self.file_MB * 1e6), self.file_s)
 
 
@@ -60,7 +60,7 @@ class Scenario(Strict):
     controller: ControllerConfig = ControllerConfig()
     bus: BusConfig = BusConfig()
     log: LogTable = LogTable()
-    fault: list[FaultTable] = Field(default=[], description="What goes wrong on purpose, a table `[[fault]]` each.")
+    fault: list[FaultTable] = Field(default=[], description="Injected faults, a table `[[fault]]` each.")
 
     @model_validator(mode="after")
     def _fits_together(self) -> "Scenario":
@@ -70,7 +70,7 @@ class Scenario(Strict):
             theirs, ours = getattr(solver, name), getattr(controller, name)
             if theirs != ours:
                 raise ValueError(f"controller.{name} = {ours}: must equal rig.solver.{name} = {theirs}")
-        # a frequency that the rig holds at its own limit is another than the one whose v_a the controller measures
+        # beyond its limits the rig would vibrate at another frequency than the controller commands and measures v_a at
         candidates_Hz, piezo = candidate_frequencies_Hz(controller), self.rig.piezo
         lowest_Hz, highest_Hz = candidates_Hz[0], candidates_Hz[-1]
         for name, commanded_Hz, beyond in (
@@ -99,7 +99,7 @@ class Scenario(Strict):
 
 
 class _Runnable(Scenario):
-    """A scenario whose sensors can show its motion; one of the bank, or of a log that is replayed, need not."""
+    """A scenario whose sensors can show its motion. Scenarios of the bench and of replayed logs are exempt."""
 
     @model_validator(mode="after")
     def _sensors_see(self) -> "_Runnable":
@@ -107,13 +107,13 @@ class _Runnable(Scenario):
         return self
 
 
-def refuse_what_takes_no_clock(scenario: Scenario) -> None:
-    """Raise Fault CONFIG for blocks that the bus does not carry in time."""
+def refuse_short_blocks(scenario: Scenario) -> None:
+    """Raise Fault CONFIG for blocks that are too short for the bus in real time."""
     block_s = scenario.rig.solver.block_s
     if block_s < _SHORTEST_IN_REAL_TIME_S * (1.0 - 1e-9):
         line = (
             f"{scenario.name}: rig.solver.block_s = {block_s:g}: must be {_SHORTEST_IN_REAL_TIME_S:g} or more in real time, as "
-            "every block is a message there and back between processes; lengthen it, or use --lockstep or --in-process"
+            "each block needs a message to the controller and back; lengthen it, or use --lockstep or --in-process"
         )
         raise Fault("CONFIG", line)
 
@@ -122,16 +122,16 @@ def refuse_faults_that_take_time(scenario: Scenario) -> None:
     """Raise Fault CONFIG for faults of bus and processes in lockstep."""
     for number, table in enumerate(scenario.fault):
         if table.needs_time:
-            line = f"{scenario.name}: fault.{number}.target = {table.target}: needs a clock, and lockstep has none"
+            line = f"{scenario.name}: fault.{number}.target = {table.target}: needs a clock, which lockstep lacks"
             raise Fault("CONFIG", f"{line}; use --in-process, or real time")
 
 
 def refuse_faults_of_processes(scenario: Scenario) -> None:
-    """Raise Fault CONFIG for faults of processes in real time, where only a person may end a process."""
+    """Raise Fault CONFIG for faults of processes in real time: only the operator may end a process."""
     for number, table in enumerate(scenario.fault):
         if table.group == PROCESS:
-            line = f"{scenario.name}: fault.{number}.target = {table.target}: a scenario ends no process of the machine"
-            raise Fault("CONFIG", f"{line}; use --in-process, or `stickslip fault` beside the run")
+            line = f"{scenario.name}: fault.{number}.target = {table.target}: a scenario cannot end real processes"
+            raise Fault("CONFIG", f"{line}; use --in-process, or `stickslip fault` during the run")
 
 
 def load_rig(name: str, settings: list[str]) -> RigConfig:
@@ -141,7 +141,7 @@ def load_rig(name: str, settings: list[str]) -> RigConfig:
     try:
         return validate(RigConfig, with_overrides(table, settings), path.name)
     except Fault as fault:
-        validate(RigConfig, table, path.name)  # the file by itself
+        validate(RigConfig, table, path.name)  # without settings, so that a fault names the file
         raise blamed(fault, path.name, settings) from None
 
 
@@ -160,7 +160,7 @@ def load_scenario(name: str, settings: list[str]) -> Scenario:
         return validate(_Runnable, table, source)
     except Fault as fault:
         table, source = with_rig(path, with_overrides({"name": path.stem} | given, of_rig))
-        validate(_Runnable, table, source)  # the files by themselves
+        validate(_Runnable, table, source)  # without other settings, so that a fault names the files
         raise blamed(fault, source, [setting for setting in settings if setting not in of_rig]) from None
 
 
@@ -174,9 +174,9 @@ def processor() -> str:
 
 
 def versions() -> dict[str, str]:
-    """What the bits of a run depend on."""
-    found = {name: version(name) for name in ("stickslip", "numpy", "numba", "protobuf", "eclipse-zenoh", "mcap")}
-    return found | {
+    """Versions on which the bits of a run depend."""
+    packages = {name: version(name) for name in ("stickslip", "numpy", "numba", "protobuf", "eclipse-zenoh", "mcap")}
+    return packages | {
         "python": platform.python_version(),
         "libc": "-".join(platform.libc_ver()),
         "processor": processor(),
@@ -184,7 +184,7 @@ def versions() -> dict[str, str]:
 
 
 def header(scenario: Scenario, role: str, lockstep: bool) -> wire.Header:
-    """What a process of this scenario says of itself."""
+    """The header of a process of this scenario: role, configuration and versions."""
     if role == "plant":
         configuration: dict[str, Any] = {
             "rig": scenario.rig.model_dump(mode="json"),

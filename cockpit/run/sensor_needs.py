@@ -12,7 +12,7 @@ import numpy as np
 
 from controller.config import ControllerConfig, candidate_frequencies_Hz
 from plant.config import RigConfig, SensorsConfig
-from plant.drive_motion import Motion, lowest_mps, reach_m
+from plant.drive_motion import DriveMotion, lowest_mps, reach_m
 from plant.records import build
 
 _ROOM = 1.25  # of a range over the largest value. Smaller: noise and overshoot reach its end; larger: coarser sensors are advised
@@ -66,7 +66,7 @@ def refuse_out_of_travel(rig: RigConfig, duration_s: float) -> None:
     _refuse(f"sensors.position_{name}_m", end_m, why, f"{rounded(_ROOM * reached_m):g}, or shorten the run")
 
 
-def _until_s(rig: RigConfig, motion: Motion, duration_s: float) -> float:
+def _until_s(rig: RigConfig, motion: DriveMotion, duration_s: float) -> float:
     """End of the motion that is checked: of a run without an end one cycle, or until its last velocity has left every range."""
     if duration_s or math.isfinite(motion.period_s):
         return duration_s or motion.period_s

@@ -1,6 +1,6 @@
-"""A loop that runs for hours: memory of each process and latency over time, and the verdict of the judge of every run.
+"""A loop that runs for hours: memory of each process, latency over time, and the usual verdict.
 
-The log is judged file by file, each once it is closed, so that memory and disk hold a soak of any length.
+The log is judged file by file, each after it is closed, so that memory and disk suffice for a soak of any length.
 """
 
 import contextlib
@@ -33,10 +33,10 @@ from cockpit.run.processes import run_processes
 
 ROLES = ("plant", "controller", "recorder")
 _LOOK_S = 0.5
-_MOST_PERIODS = 60  # of a soak, unless they were shorter than 10 s
+_MOST_PERIODS = 60  # rows of the report; fewer if periods would be shorter than 10 s
 _SHORTEST_PERIOD_S = 10.0
-_WARM_SHARE, _WARM_MOST_S = 0.2, 60.0  # of the soak, in which memory may grow
-_NICE = 10  # of the thread that judges: the loop that it judges has the processors first
+_WARM_SHARE, _WARM_MOST_S = 0.2, 60.0  # share and longest time of the soak in which memory may grow
+_NICE = 10  # of the thread that judges, so that the loop has the processors first
 
 
 class Period(NamedTuple):
@@ -52,7 +52,7 @@ class Period(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """Of one process."""
+    """Memory of one process."""
 
     role: str
     begin_MB: float  # resident, after its warm-up
@@ -62,7 +62,7 @@ class Memory(NamedTuple):
 
 
 class Soaked(NamedTuple):
-    """What came of it."""
+    """Result of a soak."""
 
     scenario: str
     wanted_s: float
@@ -73,15 +73,20 @@ class Soaked(NamedTuple):
 
     @property
     def good(self) -> bool:
-        """Whether it ran to its end and its log is whole."""
+        """Whether it ran to its end and its log is complete."""
         v = self.verdict
         return not self.interrupted and v.blocks > 0 and v.lost_messages == 0 and v.all_losses_known
 
     def as_dict(self) -> dict[str, Any]:
-        """For `--json`: the verdict, with what a soak has besides."""
-        own = {"scenario": self.scenario, "wanted_s": self.wanted_s, "interrupted": self.interrupted, "good": self.good}
+        """For `--json`: the verdict and the fields of the soak."""
+        more = {
+            "scenario": self.scenario,
+            "wanted_s": self.wanted_s,
+            "interrupted": self.interrupted,
+            "good": self.good,
+        }
         rows = {name: [row._asdict() for row in getattr(self, name)] for name in ("memory", "periods")}
-        return self.verdict.as_dict() | own | rows
+        return self.verdict.as_dict() | more | rows
 
     def in_words(self) -> list[str]:
         """Lines for an operator."""
@@ -89,29 +94,29 @@ class Soaked(NamedTuple):
         lines = [f"soak     {self.scenario}: {self.verdict.seconds:.0f} of {self.wanted_s:.0f} s{short}"]
         lines += in_words(self.verdict, verbose=False)
         lines += [
-            f"memory   {one.role}: {one.begin_MB:.1f} to {one.end_MB:.1f} MB, {one.slope_MB_per_h:+.2f} "
-            f"+- {one.slope_sigma_MB_per_h:.2f} MB/h"
-            for one in self.memory
+            f"memory   {row.role}: {row.begin_MB:.1f} to {row.end_MB:.1f} MB, {row.slope_MB_per_h:+.2f} "
+            f"+- {row.slope_sigma_MB_per_h:.2f} MB/h"
+            for row in self.memory
         ]
         if self.periods:
-            p50, p99 = [one.p50_us for one in self.periods], [one.p99_us for one in self.periods]
-            late = sum(one.late for one in self.periods)
+            p50, p99 = [row.p50_us for row in self.periods], [row.p99_us for row in self.periods]
+            late = sum(row.late for row in self.periods)
             lines.append(
                 f"latency  p50 {min(p50):.0f} to {max(p50):.0f} us, p99 {min(p99):.0f} to {max(p99):.0f} us, "
-                f"longest {max(one.max_us for one in self.periods):.0f} us; {counted(late, 'command')} over 1 ms"
+                f"longest {max(row.max_us for row in self.periods):.0f} us; {counted(late, 'command')} over 1 ms"
             )
         return lines
 
     def page(self) -> str:
-        """The same and each period, in Markdown."""
+        """The report in Markdown: the lines for the operator, and a table of the periods."""
         made = f"stickslip soak --scenario {self.scenario} --hours {self.wanted_s / 3600.0:g} --report FILE"
         lines = [f"# Soak of {self.scenario}", "", f"Made by `{made}`.", ""]
         lines += [*(f"    {line}" for line in self.in_words()), ""]
         lines += ["| until, s | blocks | p50, us | p99, us | p99.9, us | longest, us | over 1 ms |", f"|{'---|' * 7}"]
         lines += [
-            f"| {one.until_s:.0f} | {one.blocks} | {one.p50_us:.0f} | {one.p99_us:.0f} | {one.p999_us:.0f} "
-            f"| {one.max_us:.0f} | {one.late} |"
-            for one in self.periods
+            f"| {row.until_s:.0f} | {row.blocks} | {row.p50_us:.0f} | {row.p99_us:.0f} | {row.p999_us:.0f} "
+            f"| {row.max_us:.0f} | {row.late} |"
+            for row in self.periods
         ]
         return "\n".join([*lines, ""])
 
@@ -128,13 +133,13 @@ def soak(
 
     Args:
         scenario: its name.
-        arguments: the command line that makes it in a child, its duration left out.
-        bus: where they meet.
-        seconds: how long.
-        log: kept there; None: in a folder that is gone at the end, each further file once it is judged.
+        arguments: command line of a child that gives the scenario, without its duration.
+        bus: the bus of the processes.
+        seconds: duration.
+        log: kept at this path; None: in a temporary folder, where all files after the first are deleted once judged.
         progress: called with the share done.
 
-    Raises Fault ENDPOINT_BUSY, INTERRUPTED before anything was recorded, or what ended a process.
+    Raises Fault ENDPOINT_BUSY, INTERRUPTED before anything was recorded, or the fault that ended a process.
 
     """
     with tempfile.TemporaryDirectory(prefix="stickslip-soak-", ignore_cleanup_errors=True) as folder:
@@ -148,7 +153,7 @@ def soak(
 
 
 class _Watch:
-    """Watches a run until it is over, in a thread of its own, and takes the messages of its log."""
+    """Watches a run until its end, in a separate thread, and takes the messages of its log."""
 
     def __init__(
         self, config: BusConfig, seconds: float, path: Path, thin_out: bool, progress: Callable[[float], None]
@@ -159,13 +164,13 @@ class _Watch:
         self._memory: dict[str, list[tuple[float, float]]] = {role: [] for role in ROLES}
         self._periods: dict[int, LatencyWatch] = {}
         self._judge = RunJudge(path, {})
-        self._readers: dict[Path, LogReader] = {}  # of the files that were judged
-        self._one_at_once = threading.Lock()
+        self._readers: dict[Path, LogReader] = {}  # of the judged files
+        self._judging = threading.Lock()
 
     def __call__(self, over: threading.Event) -> None:
-        os.nice(_NICE)  # on Linux of this thread alone
+        os.nice(_NICE)  # on Linux for this thread only
         with contextlib.suppress(Fault), Bus(self._config, "cockpit", lockstep=False, stop=over) as bus:
-            pids = {role: pid_here(role, said.process) for role, said in bus.headers(ROLES, 5.0, over).items()}
+            pids = {role: pid_here(role, header.process) for role, header in bus.headers(ROLES, 5.0, over).items()}
             began_s = time.monotonic()
             while not over.wait(_LOOK_S):
                 t_s = time.monotonic() - began_s
@@ -175,8 +180,8 @@ class _Watch:
                 self._judge_files(still_open=1)
 
     def _judge_files(self, still_open: int) -> None:
-        """Judge the files of the log, but for those at its end that are still open."""
-        with self._one_at_once:
+        """Judge the files of the log, except the last `still_open` files."""
+        with self._judging:
             files = parts_of(self.path) if self.path.is_file() else []
             for file in files[: len(files) - still_open]:
                 if file in self._readers:
@@ -200,11 +205,12 @@ class _Watch:
         self._judge.add_others(topic, payloads)
 
     def result(self, scenario: str, interrupted: bool) -> Soaked:
-        """All of it, once the log is closed. Raises Fault INTERRUPTED where there is none."""
+        """The result, after the log is closed. Raises Fault INTERRUPTED if no log was written."""
         self._judge_files(still_open=0)
         if not self._readers:
             raise Fault("INTERRUPTED", "stopped before anything was recorded")
-        damage = next((one.damage for one in self._readers.values() if not one.damage.whole), Damage(0, 0, closed=True))
+        damages = (reader.damage for reader in self._readers.values() if not reader.damage.whole)
+        damage = next(damages, Damage(0, 0, closed=True))
         verdict = self._judge.result(damage, self._chain, {})
         memory = [_memory(role, points) for role, points in self._memory.items() if points]
         periods = [
@@ -222,7 +228,7 @@ class _Watch:
 
 
 def _resident(t_s: float, pid: int) -> list[tuple[float, float]]:
-    """Time and resident memory [MB]; nothing for a process that is gone, or has ended and still has a number."""
+    """Time and resident memory [MB]; an empty list for a process that has ended, also if it is still a zombie."""
     try:
         pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
     except (OSError, IndexError, ValueError):
@@ -231,13 +237,13 @@ def _resident(t_s: float, pid: int) -> list[tuple[float, float]]:
 
 
 def _memory(role: str, points: list[tuple[float, float]]) -> Memory:
-    """The straight line through what was seen after the warm-up."""
+    """The straight line through the memory after the warm-up."""
     t_s, resident_MB = np.array(points).T
     warm = t_s >= min(_WARM_SHARE * float(t_s[-1]), _WARM_MOST_S)
     t_h, resident_MB = t_s[warm] / 3600.0, resident_MB[warm]
     slope = sigma = math.nan
     if len(t_h) > 2 and np.ptp(t_h) > 0.0:
-        slope, start = (float(one) for one in np.polyfit(t_h, resident_MB, 1))
+        slope, start = (float(coefficient) for coefficient in np.polyfit(t_h, resident_MB, 1))
         rest = resident_MB - start - slope * t_h
         sigma = math.sqrt(float(rest @ rest) / (len(t_h) - 2) / float(((t_h - t_h.mean()) ** 2).sum()))
     return Memory(role, float(resident_MB[0]), float(resident_MB[-1]), slope, sigma)

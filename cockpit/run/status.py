@@ -1,4 +1,4 @@
-"""What goes on at a rig now: who is on its bus, and what the controller and the rig say of themselves. Only listens."""
+"""The state of a rig now: the roles on its bus, and the newest messages of rig and controller. Only listens."""
 
 import contextlib
 import json
@@ -16,19 +16,19 @@ from bridge.wire.event_codes import WEAK_REASONS
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import APPLIED, COMMAND, CONTROLLER_EVENT, PLANT_EVENT, RECORDER_EVENT, STATE, Topic
 from bridge.wire.words import words
-from bridge.wire.zenoh_link import Bus, BusConfig, Received, stands_still
+from bridge.wire.zenoh_link import Bus, BusConfig, Received, is_frozen
 
-_DIAL_S = 0.4  # a rig on this computer answers in milliseconds, one in the same network in tens of them
-_ROLES_S = 0.2  # who is there is known as soon as the link is; only who is not there is waited for
+_DIAL_S = 0.4  # a rig on this computer answers within milliseconds, in the same network within tens of milliseconds
+_ROLES_S = 0.2  # present roles are known as soon as the link is; only a missing role costs this time
 _HEADER_S = 0.2
-_LISTEN_S = 0.3  # three blocks of a rig that is late for 0.1 s; events within this time are told
+_LISTEN_S = 0.3  # three times the delay of a rig that is late by 0.1 s; events within this time are shown
 _ROLES = ("plant", "controller", "recorder")
 _NEXT = {
-    "FAULT": "nothing vibrates until a person resets the rig: `stickslip reset`, then `stickslip arm`",
-    "DISARMED": "nothing vibrates until a person arms the rig: `stickslip arm`",
-    "NO_GUARD": "this rig does not tell of a guard: nothing on its side is known to hold the vibration",
+    "FAULT": "no vibration until an operator resets and arms the rig: `stickslip reset`, then `stickslip arm`",
+    "DISARMED": "no vibration until an operator arms the rig: `stickslip arm`",
+    "NO_GUARD": "this rig reports no guard: nothing on its side is known to limit the vibration",
 }
-_TOLD_ANYWAY = {
+_NO_WARNING = {
     "NO_CAUSE",
     "SLEW_RATE",
     "NO_LIMIT",
@@ -36,23 +36,23 @@ _TOLD_ANYWAY = {
     "RANGE",
     "FREQUENCY_BAND",
     "OPERATOR_STOP",
-}  # limits that are no fault
+}  # limits of normal operation
 
 M = TypeVar("M", bound=Message)
 
 
 class Status(NamedTuple):
-    """A rig at one instant; what nobody told is null."""
+    """A rig at one instant; null for a value without a message."""
 
     endpoint: str
-    rig: str | None  # its name, where the rig says it
-    roles: list[str]  # of plant, controller and recorder, those on the bus
+    rig: str | None  # its name; None if its header lacks it
+    roles: list[str]  # those of plant, controller and recorder that are on the bus
     t_s: float | None  # of the run
     mode: str | None
     reason: str | None
     limit: str | None
     contact: str | None
-    slips: int | None  # since the controller began, which may have seen several runs of the rig
+    slips: int | None  # since the start of the controller, possibly over several runs of the rig
     drive_force_N: float | None
     drive_velocity_mps: float | None
     vibration_velocity_mps: float | None
@@ -61,18 +61,18 @@ class Status(NamedTuple):
     amplitude_m: float | None
     fallback: bool | None  # the rig has no fresh command and ramps to zero by itself
     state: str | None  # of the rig's guard
-    cause: str | None  # of that state
-    guard_limit: str | None  # that holds the command back now
-    heat_share: float | None  # of the exciter's largest rise of temperature, by its model
-    events: list[str]  # while it was listened to
+    cause: str | None  # of `state`
+    guard_limit: str | None  # limit of the guard that restricts the command now
+    heat_share: float | None  # modelled temperature rise of the exciter, as a share of the largest allowed
+    events: list[str]  # received within 0.3 s
 
     @property
     def controlled(self) -> bool:
-        """Whether a rig is there, and a controller whose commands it hears."""
+        """Whether rig and controller are on the bus, and the rig receives the controller's commands."""
         return {"plant", "controller"} <= set(self.roles) and self.mode is not None and not self.fallback
 
     def in_words(self) -> list[str]:
-        """Lines for a person."""
+        """Lines for the operator."""
         missing = [role for role in _ROLES if role not in self.roles]
         lines = [
             f"rig      {self.rig or 'of unknown name'} at {self.endpoint}",
@@ -83,7 +83,7 @@ class Status(NamedTuple):
             lines.append(f"cause    {self.cause}: {_help('cause', self.cause)}")
         if self.t_s is not None:
             counted_slips = counted(self.slips or 0, "slip")
-            lines.append(f"run      {self.t_s:.1f} s of the rig; {counted_slips} since the controller began")
+            lines.append(f"run      {self.t_s:.1f} s; {counted_slips} since the start of the controller")
         for name, column, word in (
             ("mode", "mode", self.mode),
             ("reason", "reason", self.reason),
@@ -104,29 +104,29 @@ class Status(NamedTuple):
         return lines
 
     def warnings(self) -> list[str]:
-        """What a person should look at."""
-        found: list[str] = []
+        """Conditions that need the operator's attention."""
+        lines: list[str] = []
         if "controller" not in self.roles:
-            found.append("no controller is on the bus: the rig is on its own")
+            lines.append("no controller is on the bus: the rig is not controlled")
         elif self.mode is None:
-            found.append(f"the controller sent no command for {_LISTEN_S:g} s")
+            lines.append(f"the controller sent no command for {_LISTEN_S:g} s")
         if self.state in _NEXT:
-            found.append(_NEXT[self.state])
-        if self.guard_limit is not None and self.guard_limit not in _TOLD_ANYWAY:
-            found.append(f"{self.guard_limit}: {_help('cause', self.guard_limit)}")
+            lines.append(_NEXT[self.state])
+        if self.guard_limit is not None and self.guard_limit not in _NO_WARNING:
+            lines.append(f"{self.guard_limit}: {_help('cause', self.guard_limit)}")
         if self.fallback and self.state in {"ARMED", "ACTIVE"}:
-            found.append("the rig has no fresh command and ramps the vibration to zero by itself")
-        if self.limit is not None and self.limit not in _TOLD_ANYWAY:
-            found.append(f"{self.limit}: {_help('limit', self.limit)}")
+            lines.append("the rig has no fresh command and ramps the vibration to zero by itself")
+        if self.limit is not None and self.limit not in _NO_WARNING:
+            lines.append(f"{self.limit}: {_help('limit', self.limit)}")
         if self.reason in WEAK_REASONS:
-            found.append(f"{self.reason}: {_help('reason', self.reason)}")
+            lines.append(f"{self.reason}: {_help('reason', self.reason)}")
         if "recorder" not in self.roles:
-            found.append("nothing is recorded")
-        return found
+            lines.append("nothing is recorded: no recorder is on the bus")
+        return lines
 
 
 def _help(column: str, word: str) -> str:
-    return next((one.help for one in words() if (one.column, one.word) == (column, word)), "not known to this version")
+    return next((row.help for row in words() if (row.column, row.word) == (column, word)), "not known to this version")
 
 
 class _Newest:
@@ -152,25 +152,25 @@ class _Newest:
 
     def get(self, topic: Topic, kind: type[M]) -> M | None:
         payload = self._payloads.get(topic.name)
-        with contextlib.suppress(Fault):  # rubbish of another client
+        with contextlib.suppress(Fault):  # skip malformed messages of other clients
             return parsed(kind, payload, topic.name) if payload is not None else None
         return None
 
 
 def look(bus_config: BusConfig) -> Status:
-    """Listen for a moment. Raises Fault NO_PEER where no rig answers."""
+    """Listen for 0.3 s. Raises Fault NO_PEER if no rig answers."""
     where = bus_config.endpoint
     try:
         bus = Bus(bus_config, "status", lockstep=False, patience_s=_DIAL_S)
     except Fault as fault:
         if fault.kind.code != "NO_PEER":
             raise
-        if stands_still(bus_config):
-            line = f"{where}: what listens there stands still (frozen or overloaded): must run"
+        if is_frozen(bus_config):
+            line = f"{where}: the rig accepts connections but does not answer (frozen or overloaded): must run"
             raise Fault(
-                "NO_PEER", f"{line}; look at the rig's process, and take it that it vibrates as before"
+                "NO_PEER", f"{line}; check the rig's process, and assume that the exciter vibrates as before"
             ) from None
-        line = f"{where}: no rig answers there within {_DIAL_S:g} s: {bus_config.must_be} of a run under way"
+        line = f"{where}: no rig answered within {_DIAL_S:g} s: {bus_config.must_be} of a running rig"
         raise Fault("NO_PEER", f"{line}; start one, or give its --endpoint") from None
     with bus:
         newest = _Newest()
@@ -182,7 +182,7 @@ def look(bus_config: BusConfig) -> Status:
         missing = bus.wait_for(_ROLES, _ROLES_S)
         roles = [role for role in _ROLES if role not in missing]
         if not roles:
-            line = f"{where}: a bus answers, but neither rig nor controller is on it: --prefix must be that of the run"
+            line = f"{where}: neither rig nor controller is on this bus: --prefix must equal the prefix of the run"
             raise Fault("NO_PEER", f"{line}; give the --prefix of the run")
         rig = _rig(bus) if "plant" in roles else None
         newest.wait_for([APPLIED, *([STATE, COMMAND] if "controller" in roles else [])], _LISTEN_S)
@@ -191,7 +191,7 @@ def look(bus_config: BusConfig) -> Status:
 
 
 def _rig(bus: Bus) -> str | None:
-    """The name that the rig gives itself; None where it gives none."""
+    """The name of the rig from its header; None if the header lacks it."""
     with contextlib.suppress(Fault, ValueError, TypeError, KeyError, RecursionError):
         header = bus.headers(["plant"], _HEADER_S, threading.Event())["plant"]
         name = json.loads(header.configuration)["rig"]["name"]
@@ -202,7 +202,7 @@ def _rig(bus: Bus) -> str | None:
 def _status(endpoint: str, rig: str | None, roles: list[str], newest: _Newest) -> Status:
     state, command = newest.get(STATE, wire.State), newest.get(COMMAND, wire.Command)
     applied = newest.get(APPLIED, wire.Applied)
-    named = {(one.column, one.number): one.word for one in words()}
+    named = {(row.column, row.number): row.word for row in words()}
 
     def word(column: str, number: int) -> str:
         return named.get((column, number), str(number))
@@ -233,9 +233,9 @@ def _status(endpoint: str, rig: str | None, roles: list[str], newest: _Newest) -
 
 
 def _events(newest: _Newest) -> list[str]:
-    found: list[str] = []
+    lines: list[str] = []
     for received in newest.events:
         with contextlib.suppress(Fault):
             event = parsed(wire.Event, received.payload, received.topic.name)
-            found.append(f"{event.source} {event.code}: {event.text}")
-    return found
+            lines.append(f"{event.source} {event.code}: {event.text}")
+    return lines

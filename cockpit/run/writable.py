@@ -1,4 +1,4 @@
-"""Files that a command writes at its end: refused at its start where they cannot be, one clear line where they fail."""
+"""Checks, at the start of a command, of the files that it writes at its end; one clear line if a write fails."""
 
 import os
 from collections.abc import Generator
@@ -9,7 +9,7 @@ from bridge import files
 from bridge.faults import Fault
 from bridge.files import refuse_to_replace
 
-# suffixes of what commands write, by kind
+# suffixes of the files that commands write, by kind
 LOG = (".mcap",)
 PICTURE = (".png", ".svg", ".pdf")
 PAGE = (".html", ".htm")
@@ -23,12 +23,12 @@ _NEVER_LOST: dict[tuple[str, ...], str] = {
     JSON: files.JSON,
     PICTURE: files.PICTURE,
     PAGE: files.PAGE,
-}  # a file of another kind under such a name is not replaced
+}  # an existing file with such a suffix is replaced only if its content is of that kind
 _NO_FOLDER = {*LOG, *PICTURE, *PAGE, *RIG, *JSON, *TABLE, ".tdms", ".txt"}
 
 
 def check_output(option: str, path: Path, suffixes: tuple[str, ...]) -> None:
-    """Raise Fault where a file of this kind cannot be written: CONFIG for its name, LOG_WRITE for its place."""
+    """Raise Fault if a file of this kind cannot be written: CONFIG for its name, LOG_WRITE for its folder."""
     check_writable(option, path)
     for known, kind in _NEVER_LOST.items():
         if suffixes == known or path.suffix.lower() in known:
@@ -40,20 +40,22 @@ def check_output(option: str, path: Path, suffixes: tuple[str, ...]) -> None:
 
 
 def check_output_folder(option: str, path: Path) -> None:
-    """Raise Fault where a folder cannot be made: CONFIG for a name that is a file's, LOG_WRITE for its place."""
+    """Raise Fault if a folder cannot be made: CONFIG if the name is a file or looks like a file, LOG_WRITE for its parent."""
     check_writable(option, path)
     if path.exists() and not path.is_dir():
         raise Fault("CONFIG", f"{option} {path}: must be a folder, not a file; choose another")
     if path.suffix.lower() in _NO_FOLDER and not path.exists():
         raise Fault(
-            "CONFIG", f"{option} {path}: must be a folder, and {path.suffix} ends the name of a file; choose another"
+            "CONFIG", f"{option} {path}: must be a folder, but {path.suffix} is a suffix of files; choose another"
         )
 
 
 def check_writable(option: str, path: Path) -> None:
-    """Raise Fault LOG_WRITE where a file, or the nearest folder above it, does not allow it, CONFIG for a mistyped option."""
+    """Raise Fault LOG_WRITE if a file, or the nearest folder above it, is not writable; CONFIG for a mistyped option."""
     if str(path).startswith("--"):
-        line = f"{option} {path}: takes a file, and {path} is an option; give a file, or the whole path of one of that name"
+        line = (
+            f"{option} {path}: takes a file, but {path} is an option; give a file, with its folder if it has this name"
+        )
         raise Fault("CONFIG", line)
     with writing(path):
         needed = [path] if path.exists() else []
@@ -61,12 +63,12 @@ def check_writable(option: str, path: Path) -> None:
             needed.append(next(parent for parent in path.absolute().parents if parent.exists()))
     for place in needed:
         if not os.access(place, os.W_OK) or (place != path and not place.is_dir()):
-            raise Fault("LOG_WRITE", f"{option} {path}: cannot be written: {place} does not allow it; choose another")
+            raise Fault("LOG_WRITE", f"{option} {path}: cannot be written: {place} is not writable; choose another")
 
 
 @contextmanager
 def writing(path: Path | None = None) -> Generator[None]:
-    """Turn what the operating system refuses into a Fault LOG_WRITE, of `path` where it does not say of what."""
+    """Turn an OSError into a Fault LOG_WRITE; it names `path` if the error names no file."""
     try:
         yield
     except BrokenPipeError:

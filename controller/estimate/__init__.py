@@ -1,7 +1,8 @@
-"""The estimate: what the drive and the slide do, from force and positions.
+"""The estimate: the motion of drive and slide, from force and positions.
 
 windows     slopes of the signals in windows of all lengths, and the measured noise of each
 motion      v_d, its direction, its standstill
 contact     stick, slip, surge or smooth sliding; whether a stick can be seen at all
 learning    k_d, breakaway, swing and sliding force
+spikes      spikes
 """

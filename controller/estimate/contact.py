@@ -1,10 +1,10 @@
 """Stick, slip, surge or smooth sliding, from the slide's velocity relative to the drive's.
 
-The slide's velocity v_s comes from two places: its own position, and what the drive's spring tells, v_d - F' / k_d. Each counts
+The slide's velocity v_s comes from two sources: the slide's position, and the drive's spring, v_d - F' / k_d. Each is weighted
 by its measured noise, so that either may be missing. A stick is v_s near 0 while the drive moves; a slip is v_s beyond 1.5 v_d.
 
-The window is the shortest in which a stick stands out from the noise. Where no window does, or none that is shorter than the
-stick that is to be expected, the controller is blind and says so.
+The window is the shortest in which a stick exceeds the noise. If there is no such window, or none shorter than the expected
+stick, the controller is blind and reports BLIND.
 """
 
 import math
@@ -15,21 +15,21 @@ from controller.estimate.windows import BINS, DRIVE, FORCE, OF_STEP, SLIDE, WELL
 
 _SIGMAS = 6.0  # 1e-9 a window: less than one false announcement in 100 hours of windows of 1 ms
 _HALF = 0.5  # of v_d: the distance between stick and sliding that a window must resolve
-_FINE = 0.06  # of v_d: what the longer window resolves that tells a swing from its noise
+_FINE = 0.06  # of v_d: resolution of the longer window that separates a swing of v_s from noise
 # Share of v_d below which the slide sticks. Larger: a slide that lags behind a step of the drive is called stuck. Smaller: less
 # noise is needed to miss a stick: 0.35 is 4.2 sigma from a stick, and 7.8 sigma from sliding, in the noisiest window that counts.
 _STICK = 0.35
 _STICK_ENDS = 0.65  # as far from sliding as _STICK is from a stick
 _SLIP = 1.5  # share of v_d from which the slide runs ahead
 _SLIP_ENDS = 1.2
-_UNSEEN_MPS = 1e-5  # velocity of a slide whose drive seems to stand, from which it slips
+_UNSEEN_MPS = 1e-5  # slip velocity of a slide whose drive seems to be at rest
 _STANDS_S = 0.1  # of a standstill at the beginning, until a slide that moves alone slips
 _AFTER_STOP_S = 0.01  # shortest of the longest windows after a stop
 _SCORE_S = 0.005  # time constant of the score
-_LONGEST_WINDOW_S = 1.0  # a stick that takes longer to see is one that nobody can prevent
-_EXPECTED_SWING = 0.2  # of the force, while no slip was seen: what F_s = 1.1 F_c gives
+_LONGEST_WINDOW_S = 1.0  # a stick that needs a longer window is seen too late to prevent the slip
+_EXPECTED_SWING = 0.2  # of the force, until a slip was seen: the swing at F_s = 1.1 F_c
 # Time without a window that sees a stick until the controller calls itself blind. Shorter: every start of a move is, while the
-# windows fill. Longer: slips that nobody sees.
+# windows fill. Longer: unseen slips.
 _BLIND_S = 0.3
 _EXCITER_PERIODS = 2.0  # least length of a window while vibrating
 
@@ -40,7 +40,7 @@ def contact(p: Record, s: Record, force_N: float, tick_s: float) -> None:
     speed_mps = math.fabs(s.drive_velocity_mps)
     direction = float(s.direction)
     least_s = _EXCITER_PERIODS / s.allowed_Hz if s.allowed_m > 0.0 else 0.0
-    found, found_F, found_x, fine = -1, -1, -1, False
+    level_both, level_F, level_x, fine = -1, -1, -1, False
     slipping, known = False, s.held_mps > 0.0 or s.stood_s > _STANDS_S
     by_force_mps, by_place_mps = 0.0, 0.0
     s.window_s = 0.0
@@ -69,22 +69,22 @@ def contact(p: Record, s: Record, force_N: float, tick_s: float) -> None:
             slipping = True
         resolved_mps = _HALF * speed_mps / _SIGMAS if s.moving == 1 else max(s.held_mps, _UNSEEN_MPS)
         enough = 1.0 / (resolved_mps * resolved_mps)
-        if found_F < 0 and weight_F >= enough:
-            found_F, by_force_mps = level, force_mps
-        if found_x < 0 and weight_x >= enough:
-            found_x, by_place_mps = level, place_mps
-        if found < 0 and weight_F + weight_x >= enough:
-            found = level
+        if level_F < 0 and weight_F >= enough:
+            level_F, by_force_mps = level, force_mps
+        if level_x < 0 and weight_x >= enough:
+            level_x, by_place_mps = level, place_mps
+        if level_both < 0 and weight_F + weight_x >= enough:
+            level_both = level
             s.window_s = length_s
             s.sliding_mps = both_mps
-        if found >= 0:
+        if level_both >= 0:
             s.fine_mps, s.fine_sigma_mps = both_mps, sigma_mps
             fine = _SIGMAS * sigma_mps <= _FINE * speed_mps or s.moving == 0
-    if s.stiffness_learnt == 0 and found_F >= 0 and found_x >= 0:
+    if s.stiffness_learnt == 0 and level_F >= 0 and level_x >= 0:
         s.sliding_mps = min(by_force_mps, by_place_mps)  # a wrong stiffness hides a stick from one of them
-    s.level = found
+    s.level = level_both
     _follow(s, tick_s, slipping, speed_mps)
-    if s.moving == 1 and found >= 0:
+    if s.moving == 1 and level_both >= 0:
         s.force_rate = 1.0 - s.sliding_mps / speed_mps
         likely = min(max(s.force_rate, 0.0), 1.0)
     else:
@@ -114,9 +114,9 @@ def _follow(s: Record, tick_s: float, slipping: bool, speed_mps: float) -> None:
     elif s.measured == 0:
         s.contact = UNKNOWN
     elif s.moving == 0:
-        s.contact = UNKNOWN if s.blind == 1 else STANDSTILL  # a drive that feeds unseen looks as if it stood
+        s.contact = UNKNOWN if s.blind == 1 else STANDSTILL  # an unseen feed looks like a drive at rest
     elif s.level < 0 and s.unseen_s < _BLIND_S and _stood(s, before, tick_s):
-        s.contact = STICK  # a slide that stood sticks until it is seen to slide
+        s.contact = STICK  # a slide at rest sticks until sliding is seen
     elif s.level < 0:
         s.contact = UNKNOWN
     elif s.sliding_mps < (_STICK_ENDS if before == STICK else _STICK) * speed_mps:
@@ -136,7 +136,7 @@ def _follow(s: Record, tick_s: float, slipping: bool, speed_mps: float) -> None:
 
 @kernel
 def _stood(s: Record, before: int, tick_s: float) -> bool:
-    """Whether the slide stood until now, as it did when the drive started or turned."""
+    """Whether the slide has been at rest since the drive started or turned."""
     if s.moved_s > tick_s:
         return before == STICK
     return s.rested == 1 and (before in (STANDSTILL, STICK) or (before == UNKNOWN and s.blind == 1))
@@ -144,7 +144,7 @@ def _stood(s: Record, before: int, tick_s: float) -> bool:
 
 @kernel
 def _expect(p: Record, s: Record, force_N: float, tick_s: float, speed_mps: float) -> None:
-    """Say how long a stick will last and how long it is until the slip, and whether a stick can be seen in time."""
+    """Estimate the length of a stick and the time to the slip, and whether a stick can be seen in time."""
     way = 0 if s.direction > 0 else 1
     along_N = s.direction * force_N
     climbing_N_per_s = s.stiffness_N_per_m * speed_mps
@@ -166,9 +166,9 @@ def _expect(p: Record, s: Record, force_N: float, tick_s: float, speed_mps: floa
 
 @kernel
 def _feeds_unseen(p: Record, s: Record) -> bool:
-    """Whether a feed that counts as motion would not stand out from the noise of the drive's position within a second.
+    """Whether the noise of the drive's position hides the least feed that counts as motion, even within a second.
 
-    The noise is that of the best windows as white noise over a second, as a stop disturbs the long windows for seconds.
+    The noise is extrapolated from the best windows to one second as white noise, as a stop disturbs the long windows for seconds.
     """
     least_mps = math.inf
     for level in range(p.levels):

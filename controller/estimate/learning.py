@@ -1,4 +1,4 @@
-"""What the controller learns of the axis: the drive's stiffness, and the breakaway and sliding force of each direction."""
+"""Learnt values of the axis: the drive's stiffness, and the breakaway and sliding force of each direction."""
 
 import math
 
@@ -9,11 +9,11 @@ from controller.estimate.windows import BINS, DRIVE, FEWEST, FORCE, SLIDE
 # Elongation rate over its noise from which a window teaches. Smaller: the noise of the positions makes k_d too small, by
 # 1 / 6^2 = 3 % at most here.
 _SIGMAS = 6.0
-_KEPT = 0.9983  # of what was learnt of the stiffness, at each window that teaches: half of it over 400 of them
-_FEWEST = 5.0  # windows until the told stiffness gives way to the learnt one
-_TOLD_SIGMA = 0.5  # of a told stiffness, over itself
-_STEADY_S = 0.05  # of constant v_d until a climbing force says something of the stiffness
-_MOST_OFF = 100.0  # factor by which a told stiffness may be off: beyond, the channels are not what they are called
+_KEPT = 0.9983  # weight of earlier windows at each new one: half after 400 windows
+_FEWEST = 5.0  # windows until the learnt stiffness replaces the configured one
+_TOLD_SIGMA = 0.5  # relative sigma of a configured stiffness
+_STEADY_S = 0.05  # of constant v_d until a climbing force bounds the stiffness
+_MOST_OFF = 100.0  # largest factor between configured and learnt stiffness: a larger one means wrong channels
 _SLIP_SHARE = 0.3  # of one more slip in the learnt breakaway and swing
 _SLIDING_S = 0.3  # time constant of the learnt sliding force
 
@@ -22,8 +22,8 @@ _SLIDING_S = 0.3  # time constant of the learnt sliding force
 def stiffness(p: Record, s: Record) -> None:
     """Learn k_d, the force over the elongation of the drive: from rates, so that no offset matters.
 
-    The window that shows the elongation best teaches. Where none does, a told stiffness is at least what a climbing force says:
-    no force climbs faster than k_d v_d.
+    Learnt from the window with the best signal of the elongation. Without such a window, a climbing force bounds the configured
+    stiffness from below: no force climbs faster than k_d v_d.
     """
     if p.use_force == 0:
         return
@@ -65,7 +65,7 @@ def _bounded(p: Record, stiffness_N_per_m: float) -> float:
 
 @kernel
 def begin(p: Record, s: Record) -> None:
-    """Start from the told stiffness."""
+    """Start from the configured stiffness."""
     s.stiffness_N_per_m = p.drive_stiffness_N_per_m
     s.stiffness_sigma = _TOLD_SIGMA
     s.direction = 1

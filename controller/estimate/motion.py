@@ -12,29 +12,29 @@ _AFTER_STOP_S = 0.01  # shortest of the longest windows after a stop
 _EXACT = 0.005  # of v_d: noise at which no longer window is asked
 _SURE = 0.03  # noise of v_d, over it, up to which it is held: the first windows of a move are off by a third
 _STEADY = 0.04  # change of v_d, over it, from which the drive is not steady
-# Standstill after which the slide is taken to have come to rest. Shorter: a slide that still slides is called stuck where the
-# drive only became too slow to be seen at once.
+# Standstill after which the slide counts as at rest. Shorter: a slide that still slides is called stuck when the drive only
+# became too slow to be seen at once.
 _RESTED_S = 0.2
 _SURELY_SIGMAS = 3.3
-_ROUGHLY = 0.1  # noise of a window, over its velocity, up to which it may say that the drive speeds up
-_MOST_AHEAD = 1.3  # of a window's velocity, as a speed that has come to its end looks as if it went on to grow
-_OF_TWO = 1.8  # sigma of twice a slope less that over twice the window, over that of the slope
+_ROUGHLY = 0.1  # noise of a window, over its velocity, up to which it may show that the drive speeds up
+_MOST_AHEAD = 1.3  # of a window's velocity: limit of the extrapolation, which overshoots at the end of an acceleration
+_OF_TWO = 1.8  # sigma of (twice a slope minus the slope of the window twice as long), over the sigma of the slope
 _RISE_SIGMAS = 5.0  # by which it counts for less; at 3 v_a leaps once a second, and the slide runs ahead
 _HUM_S = 0.1  # five periods of mains hum, in which its noise becomes known
 _EXCITER_PERIODS = 2.0  # in a window of the force, at least
-_LONGEST_RISE = 3  # levels above the one that v_d is taken from in which it is looked for
-# Of a move, in which a force that climbs may say so before the position does: at 50 N/um breakaway comes after 6 ms.
+_LONGEST_RISE = 3  # levels above the level of v_d that are searched for a rise
+# First part of a move, and longest window, in which a climbing force shows motion: at 50 N/um breakaway follows after 6 ms.
 _BY_FORCE_S = 0.02
 _FORCE_SETTLES_S = 0.05  # after a vibration: the friction that it took off comes back, and the force climbs with it
-_HOLD_S = 0.1  # in which the held velocity falls to a third: what a slide still does after a step of the drive
+_HOLD_S = 0.1  # in which the held velocity falls to a third, as a slide still moves after a step of the drive
 
 
 @kernel
 def drive_velocity(p: Record, s: Record, tick_s: float) -> None:
     """Measure v_d [m/s], positive and negative, and whether the drive moves.
 
-    It moves if the shortest window that says so is not contradicted by a shorter one that would have seen it, as after a stop.
-    From there on, ever longer windows as long as each agrees with the one before (Lepski's rule), until the noise is small.
+    It moves if a window shows motion and no shorter window with enough resolution contradicts, as after a stop. From there on,
+    longer windows are used while each agrees with the one before (Lepski's rule), until the noise is small.
     """
     velocity_mps, sigma_mps = 0.0, 0.0
     first, taken = -1, 0
@@ -54,7 +54,7 @@ def drive_velocity(p: Record, s: Record, tick_s: float) -> None:
         if first >= 0 and not agrees and level > first + 1:
             break
         velocity_mps, sigma_mps, taken = slope, sigma, level
-        if first < 0 or not agrees:  # what the next window does not confirm was noise
+        if first < 0 or not agrees:  # motion that the next window does not confirm was noise
             sure = _SIGMAS if s.differences[level] >= WELL_KNOWN else _UNSURE_SIGMAS
             first = level if math.fabs(slope) > max(sure * sigma, p.least_feed_mps) else -1
     moving = first >= 0 and not _stopped(s, first)
@@ -98,10 +98,10 @@ def drive_velocity(p: Record, s: Record, tick_s: float) -> None:
 
 @kernel
 def _rising(p: Record, s: Record, speed_mps: float, taken: int) -> float:
-    """|v_d| that the drive surely has at the end of the windows [m/s]; `speed_mps` is that of the middle of level `taken`.
+    """Lower bound of |v_d| at the end of the windows [m/s]; `speed_mps` holds for the middle of level `taken`.
 
-    Of two windows the longer one is as much slower than the shorter one as that is slower than the drive is now. Short windows
-    say so with noise, long ones late: what one of them is sure of counts, as far as the shorter ones do not exclude it.
+    At a constant acceleration v_d now = 2 slope - slope of the window twice as long. Short windows are noisy, long ones late: the
+    highest lower bound counts, up to the upper bounds of the shorter windows.
     """
     rising_mps, most_mps = speed_mps, math.inf
     for level in range(min(taken + _LONGEST_RISE, p.levels - 1)):
@@ -137,7 +137,7 @@ def _pulling(p: Record, s: Record) -> float:
 
 @kernel
 def _stopped(s: Record, level: int) -> bool:
-    """Whether a window shorter than that of `level` would have seen its velocity, and did not: it is the tail of a stop."""
+    """Whether a window shorter than `level` should have seen the velocity and did not: it is the tail of a stop."""
     for i in range(level):
         sigma = s.noise[DRIVE, i]
         slope = s.slope[DRIVE, level]
@@ -152,9 +152,9 @@ def _stopped(s: Record, level: int) -> bool:
 
 @kernel
 def _winds_up(s: Record, level: int) -> bool:
-    """Whether the drive moves against the slide, as one that starts does and hum on both positions does not.
+    """Whether the drive moves relative to the slide: true at a start, false for hum on both positions.
 
-    It is asked at the begin alone: before some periods of it are in the noise, hum is a motion.
+    Used only at the begin of the run, until some periods of the hum are in the measured noise.
     """
     slope = s.slope[DRIVE, level]
     return (slope - s.slope[SLIDE, level]) * slope > 0.5 * slope * slope

@@ -1,6 +1,6 @@
-"""Samples that stand alone: far from both neighbours, which go on as if it were not there.
+"""Spikes: single samples far from both neighbours, which agree with each other.
 
-No slide, drive or spring goes away and comes back within one sample, so such a sample says nothing of any of them, and the mean
+No slide, drive or spring goes away and comes back within one sample, so such a sample carries no information, and the mean
 of its neighbours takes its place (Hampel's rule, with the noise in the place of the median of deviations). One a channel, and
 not in two blocks in a row: more of them are noise, or a fault. The last sample of a block has no neighbour on its right, so a
 leap there counts from the next block on.
@@ -14,11 +14,11 @@ from bridge.kernel import Record, kernel
 from controller.estimate.windows import DRIVE, FORCE, ROWS, SLIDE
 
 # Of the mean bend of white noise, times the root of the samples in a bin: the spike is then 6 sigma of the slope of four bins,
-# and a smaller one is no slip.
+# and a smaller one is not taken for a slip.
 BENDS = 9.0
 _STEPS = 4.0  # of the resolution: a step up and down again bends by two
 _ROUNDED = 2e-7  # of a value, by which the wire's float32 rounds
-_LEFT = 0.25  # share of a bend that the mean of the neighbours leaves beside it; of a step or a kink it leaves half
+_LEFT = 0.25  # share of the bend that may remain next to a replaced spike; after a step or a kink half remains
 _NEAR = 0.25  # of the bend of a spike: where no sample is farther from the one before the block, none is a spike
 _LARGEST = 3e38  # of a bend that a float32 holds
 _LEARN = 0.125  # share of one look
@@ -27,9 +27,9 @@ _GROWS = 2.0  # most by which the noise grows in one block
 
 @kernel
 def find_spikes(p: Record, s: Record, block: Record) -> bool:
-    """Find the spikes of a block; false where a sample is no number: it would stay in the filters for ever.
+    """Find the spikes of a block; false if a sample is NaN or infinite, which would stay in the filters for ever.
 
-    A channel that the configuration leaves out is not looked at.
+    Channels that the configuration leaves out are skipped.
     """
     if s.missing_blocks > 0:
         s.tail[:, :] = math.nan
@@ -77,7 +77,7 @@ def _learn(p: Record, s: Record, row: int, samples: Record) -> None:
 
 @kernel
 def _look(p: Record, s: Record, row: int, samples: Record) -> int:
-    """Look at one channel; return how many samples are no numbers."""
+    """Search one channel; return the number of NaN or infinite samples."""
     count, bad = samples.shape[0], 0
     if _count_far(s.tail[row, 1], samples, _NEAR * s.most_bend[row]) > 0:
         bad = _look_closer(p, s, row, samples)
@@ -99,7 +99,7 @@ def _look_closer(p: Record, s: Record, row: int, samples: Record) -> int:
 
 @kernel
 def _count_far(last: float, samples: Record, most: float) -> int:
-    """How many samples are farther away, or are no numbers; counted without a branch, as eight at once are."""
+    """Number of samples farther away, or not numbers; counted without a branch, so that eight run at once."""
     near, limit, far = np.float32(last), np.float32(most), 0
     for i in range(samples.shape[0]):
         far += 0 if abs(samples[i] - near) <= limit else 1
@@ -108,7 +108,7 @@ def _count_far(last: float, samples: Record, most: float) -> int:
 
 @kernel
 def _count_bent(before: float, last: float, samples: Record, most: float) -> int:
-    """How many samples bend by more, or are no numbers; counted without a branch."""
+    """Number of samples with a larger bend, or not numbers; counted without a branch."""
     first, second, bent = float(samples[0]), float(samples[1]), 0
     bent += 0 if math.fabs(before - 2.0 * last + first) <= most else 1
     bent += 0 if math.fabs(last - 2.0 * first + second) <= most else 1
@@ -121,7 +121,7 @@ def _count_bent(before: float, last: float, samples: Record, most: float) -> int
 
 @kernel
 def _not_finite(samples: Record) -> int:
-    """How many are no number; counted without a branch, as eight at once are."""
+    """Number of samples that are not numbers; counted without a branch, so that eight run at once."""
     bad = 0
     for i in range(samples.shape[0]):
         value = float(samples[i])
@@ -131,12 +131,12 @@ def _not_finite(samples: Record) -> int:
 
 @kernel
 def _search(p: Record, s: Record, row: int, samples: Record) -> None:
-    """Note the largest spike; where there is none, the noise has grown."""
+    """Note the largest spike; without one, raise the noise."""
     count, largest, total = samples.shape[0], s.most_bend[row], 0.0
-    steep = 0.0  # bend before that of the last three samples
+    steep = 0.0  # bend just before the bend of the last three samples
     for i in range(count - 1):
-        left, here, right = _at(s, row, samples, i - 1), float(samples[i]), float(samples[i + 1])
-        bend = math.fabs(left - 2.0 * here + right)
+        left, middle, right = _at(s, row, samples, i - 1), float(samples[i]), float(samples[i + 1])
+        bend = math.fabs(left - 2.0 * middle + right)
         if i == count - 3:
             steep = bend
         total += bend if math.isfinite(bend) else 0.0
@@ -155,13 +155,13 @@ def _search(p: Record, s: Record, row: int, samples: Record) -> None:
         _know(p, s, row, min(max(total / count, s.bends[row]), _GROWS * s.bends[row]), end)
         return
     if s.steps == s.spike_step[row] + 1:
-        s.spike_at[row] = -1  # not alone: what spikes block after block is for the trips to doubt
+        s.spike_at[row] = -1  # a spike in each block is not a single sample: the trips judge it
     s.spike_step[row] = s.steps
 
 
 @kernel
 def _know(p: Record, s: Record, row: int, bend: float, value: float) -> None:
-    """Know the mean bend of the noise, and with it that of the least spike; `value` is one of the samples."""
+    """Set the mean bend of the noise, and from it the least bend of a spike; `value` is one of the samples."""
     s.bends[row] = bend
     floor = _STEPS * max(s.resolution[row], _ROUNDED * math.fabs(value))
     s.most_bend[row] = min(max(p.spike_bends * bend, floor), _LARGEST)

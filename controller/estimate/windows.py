@@ -1,15 +1,14 @@
 """Slopes of the signals in windows from four bins to seconds, and the noise of each slope.
 
 Level j has windows twice as long as level j - 1, of four bins each. A stiff axis needs a window of 0.4 ms and a creep feed one
-of a second, so all of them run at once and `contact` takes the shortest that stands out from its noise.
+of a second, so all of them run at once and `contact` takes the shortest whose signal exceeds its noise.
 
-The noise of a level is measured, not assumed: the slopes of three windows side by side lie on a line but for noise (the idea of
-the Hadamard deviation), so hum, drift and quantisation are in it as well as white noise, and a swing that is slow against the
-window is not. The scale is the lower quartile of how far they are off: slips and re-sticks disturb most of them before
-they move it by much.
+The noise of a level is measured, not assumed: the slopes of three successive windows lie on a line except for noise (the idea of
+the Hadamard deviation), so it contains hum, drift and quantisation as well as white noise, but not a swing that is slow against
+the window. The scale is the lower quartile of the deviations: slips and re-sticks must disturb most of them to move it much.
 
-A slide that swings as fast as the windows are long bends their slopes as noise does, but in force and position alike, by
-the spring's law x_d' - x_s' = F' / k_d. So the noise is at most what the three disagree by, and what the drive itself is off by.
+A slide that swings with about the period of the windows bends their slopes as noise does, but in force and position alike, by
+the spring's law x_d' - x_s' = F' / k_d. So the deviation from this law and the drive's noise together bound the noise from above.
 """
 
 import math
@@ -20,18 +19,20 @@ from bridge.kernel import Record, kernel
 
 BINS = 4  # in a window; a power of 2
 MOST_FRESH = 16  # bins added at once, at most
-LEVELS = 16  # at most; `levels` of the parameters says how many are used
+LEVELS = 16  # at most; `levels` of the parameters is the number in use
 FORCE, SLIDE, DRIVE = 0, 1, 2  # rows: drive force [N], slide position [m], drive position [m]
 ROWS = 3
-_OF_BEND = 6.0**-0.5  # sigma of a slope over that of a - 2 b + c
+_OF_BEND = 6.0**-0.5  # sigma of a slope over the sigma of a - 2 b + c
 _QUARTILE = 0.3186  # of |d| of a normal distribution, over its sigma
 _WHITE = 2.0**-1.5  # noise of a slope over the noise at half the window, for white noise
-# Differences until a level's own noise is used; before, that of shorter windows is carried on as white noise.
+# Differences until the level's measured noise is used; before, the noise of shorter windows is extrapolated as white noise.
 FEWEST = 10
 WELL_KNOWN = 40  # differences from which a level's noise is off by some per cent only
 _CARRIED = 1.3  # factor for a noise that is carried on: ten differences are 20 % off, and no noise is quite white
 _FIRST_SHARE, _LEAST_SHARE = 4.0, 0.005  # of the logarithm of sigma that one difference moves; 6 % of scatter at 0.005
-_LEAST_SHARE_OF_LAW = 0.02  # of what the signals disagree by, which follows a stiffness that is still being learnt
+_LEAST_SHARE_OF_LAW = (
+    0.02  # the same for the deviation from the spring's law, which follows a stiffness that is still being learnt
+)
 # The factors of sigma at the least shares, and the differences from which on they hold.
 _UP, _MANY = math.exp(0.25 * _LEAST_SHARE), round(_FIRST_SHARE / _LEAST_SHARE)
 _UP_OF_LAW, _MANY_OF_LAW = math.exp(0.25 * _LEAST_SHARE_OF_LAW), round(_FIRST_SHARE / _LEAST_SHARE_OF_LAW)
@@ -77,7 +78,7 @@ def push(p: Record, s: Record, count: int, learn: bool) -> None:
 
 @kernel
 def _note_window(p: Record, s: Record, level: int, learn: bool) -> None:
-    """Take the slopes of a window that begins where the last one ended: their bends tell the noise."""
+    """Take the slopes of a window that begins where the last one ended: their differences give the noise."""
     slope, before, sigma = s.slope, s.slope_before, s.sigma
     if learn:
         both = p.use_force == 1 and p.use_slide_position == 1 and s.stiffness_learnt == 1
@@ -109,7 +110,7 @@ def _moved(sigma: float, apart: float, up: float, count: int) -> float:
 
 
 @kernel
-def begin_anew(s: Record) -> None:
+def clear_windows(s: Record) -> None:
     """Empty the windows; the noise stays."""
     for level in range(LEVELS):
         s.pushed[level] = 0
@@ -130,7 +131,7 @@ def _note_noise(p: Record, s: Record, level: int, both: bool) -> None:
                 break
             step = OF_STEP * s.resolution[row] / p.window_s[i]
             s.noise[row, i] = math.sqrt(measured * measured + step * step)
-    # without vibration the slide slips, and what it swings by after a slip would count as more of them
+    # only under vibration: without it the swing after a slip would count as further slips
     if both and s.allowed_m > 0.0 and s.agreements[level] >= WELL_KNOWN:
         off_mps = math.sqrt(s.law_mps[level] * s.law_mps[level] + s.noise[DRIVE, level] * s.noise[DRIVE, level])
         s.noise[FORCE, level] = min(s.noise[FORCE, level], s.stiffness_N_per_m * off_mps)

@@ -1,15 +1,15 @@
-"""Slips in spite of all that the vibration can do: after some of them CANNOT_HELP is said, and it goes on.
+"""Slips that no more vibration can prevent: after some of them CANNOT_HELP is reported, and the vibration continues.
 
-Fewer slips may be all that can be had, as on a track whose friction falls by more than any v_a makes up for, or where v_d changes
-faster than it can be followed. Only where nothing is gained at all `policy` ends the vibration.
+Fewer slips may be the best result, as on a track whose friction falls by more than any v_a makes up for, or where v_d changes
+faster than v_a can follow. Only if the vibration gains nothing `policy` ends it.
 
-A first slip or surge under vibration teaches how much is needed. One that comes again shows that what was learnt does not do.
+A first slip or surge under vibration raises the learnt need. A repeated one shows that the raised need is too small.
 """
 
 from bridge.kernel import Record, kernel
 from controller.codes import CANNOT_HELP, HELD
 
-_FEWEST = 2  # slips until it is said: one may be chance
+_FEWEST = 2  # slips until it is reported: one may be chance
 _REMEMBERED_S = 30.0  # since the last of them
 
 
@@ -24,7 +24,7 @@ def note_failure(s: Record) -> None:
 
 @kernel
 def note_lesson(s: Record) -> None:
-    """Count a slip or surge after which more is asked for: the first of them is none that nothing could have prevented."""
+    """Count a slip or surge after which the ratio rises: the first is a lesson, a repeated one a failure."""
     if s.failed_left_s > 0.0:
         note_failure(s)
     else:
@@ -33,7 +33,7 @@ def note_lesson(s: Record) -> None:
 
 @kernel
 def forget_failures(s: Record, block_s: float) -> None:
-    """Take back what was said once nothing came for long."""
+    """End CANNOT_HELP after a long time without a failure."""
     s.failed_left_s = max(s.failed_left_s - block_s, 0.0)
     if s.reason == CANNOT_HELP and s.failed_left_s == 0.0:
         s.reason = HELD

@@ -1,7 +1,7 @@
 """What the controller remembers of an axis: at which speeds and in which direction it needs vibration, and how much.
 
 Stick-slip lives at low speed: what is needed at a speed is needed below it, and what is not needed at a speed is not needed
-above. So one speed each, for each direction, holds the verdicts; a later verdict that contradicts moves the older one away.
+above. So one speed each, for each direction, holds the verdicts; a later contradicting verdict replaces the older one.
 """
 
 import math
@@ -98,10 +98,10 @@ def swing_held(ratio: float) -> float:
 
 @kernel
 def settling_s(p: Record, s: Record, force_N: float, speed_mps: float) -> float:
-    """Time in which the spring takes up what a change of v_a does to the mean friction.
+    """Time in which the spring takes up a change of the mean friction after a change of v_a.
 
-    Under vibration the mean friction is that without it times v_s / <|v_r|>, <|v_r|> being the mean relative speed between slide
-    and base. It grows with v_s, by 0.4 F / v_d at a ratio of 1.2, and the spring with the way, by k_d.
+    Under vibration the mean friction is the friction without it times v_s / <|v_r|>, where <|v_r|> is the mean relative speed
+    between slide and base. It grows with v_s, by 0.4 F / v_d at a ratio of 1.2, and the spring with the way, by k_d.
     """
     return (
         grows(max(s.ratio[way_of(s)], p.least_ratio))
@@ -122,7 +122,7 @@ def is_wound_up(s: Record, settle_s: float) -> bool:
 
 @kernel
 def follow_swing(p: Record, s: Record, tick_s: float, settle_s: float) -> None:
-    """Bring the ratio to what the swing of the slide asks for, never onto a known edge.
+    """Bring the ratio to the value that the swing of the slide requires, never onto a known edge.
 
     The vibration damps the slide up to v_s = v_a. Friction that swings by a share of itself, while the spring's force stays,
     is held where the mean friction is below that at v_a = v_s by more than this share.

@@ -34,14 +34,14 @@ _BEHIND = 0.1  # the same when a question begins: before, the spring still takes
 _LAST_LAG = 0.12
 _LAG, _SWING = 0.5, 0.2  # shares of v_d by which the slide may lag in the first part of a fade, and be off in the last
 # Settling time up to which a probe is made: it takes some ten of them, and at feeds far below the speed at which friction falls
-# the fall is too small to be told.
+# the fall is too small to be seen.
 _SLOWEST_S = 5.0
 _NEARLY = 0.98  # of the ratio at which it is asked
-# A slide swings about its mean, more and more, before it sticks or runs ahead: what windows of v_s show of it beside windows
-# 2^4 times as long, over a time of two of those.
+# A slide swings about its mean, more and more, before it sticks or runs ahead. The swing is v_s of short windows minus v_s of
+# windows 2^4 times as long, averaged over two of the long windows.
 _LONGER, _MEMORY = 4, 2.0
 _GROWN, _FELT = 2.0, 0.1  # times the least since the fade began, and share of v_d, both rms, from which it is a swing
-_ASKED_FASTER = 2.0  # a fade after a wobble that found no fall of friction, over one that has to find out
+_ASKED_FASTER = 2.0  # speed of a fade after a wobble without a fall of friction, over the speed of a trial fade
 
 
 @kernel
@@ -54,14 +54,14 @@ def begin_probe(p: Record, s: Record, way: int, force_N: float, speed_mps: float
         if not follows:
             s.wobbles = 0
         elif ask(p, s, speed_mps):
-            told = answer(s)
-            if told != UNSURE:
+            verdict = answer(s)
+            if verdict != UNSURE:
                 s.wobbles = 0
-            if told == FALLS:
+            if verdict == FALLS:
                 _still_needed(p, s, way, speed_mps)
                 s.probe_s[way] = p.probe_every_max_s  # an answer, and no trial that may have failed by chance
                 s.reason = STILL_NEEDED
-            elif told == EVEN:
+            elif verdict == EVEN:
                 _fade(p, s, force_N, _ASKED_FASTER)
         return
     every_s = max(s.probe_s[way], p.probe_every_s) if is_needed(s, speed_mps) else p.first_probe_s
@@ -81,13 +81,14 @@ def begin_probe(p: Record, s: Record, way: int, force_N: float, speed_mps: float
 def _fade(p: Record, s: Record, force_N: float, faster: float) -> None:
     s.fade, s.fade_from_N = s.ratio_now, math.fabs(force_N)
     s.fade_per_s = faster * 0.5 / p.probe_fade_s
-    s.swung_least = s.swung if faster == 1.0 else math.inf  # after an answer the slide may lag, and that is no swing
+    # after an answer the slide may lag; this lag does not count as a swing
+    s.swung_least = s.swung if faster == 1.0 else math.inf
     enter(s, PROBE, HELD)
 
 
 @kernel
 def _note_swing(p: Record, s: Record, speed_mps: float) -> None:
-    """Follow the mean square of what v_s swings by, over v_d."""
+    """Follow the mean square of the swing of v_s, over v_d."""
     longer = s.level + _LONGER
     if s.level < 0 or longer >= p.levels or s.pushed[longer] < BINS:
         return

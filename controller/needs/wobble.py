@@ -5,8 +5,8 @@ depends on v_a / v_s alone, as nothing else has the unit of a velocity. So at a 
 the same share. Where friction falls with speed, more v_a takes off more than that, and v_s follows by more. It is there that the
 slide sticks or runs ahead when the vibration goes, and no vibration has to be taken away to find it out.
 
-The force has to be given: the wobble must be quick against the time in which the spring takes up what v_a takes off. Both
-answers are taken at the frequency of the wobble alone, under a Hann window, so that a slow trend of v_s does not count.
+The force must be constant: the wobble must be faster than the spring takes up the change of friction. Both answers are taken at
+the frequency of the wobble alone, under a Hann window, so that a slow trend of v_s does not count.
 """
 
 import math
@@ -22,14 +22,14 @@ PERIODS = 4.0
 _NOISE = 0.02  # of v_d: noise of v_s in the windows that are compared, a quarter of the wobble
 _WINDOWS, _BLOCKS = 6.0, 8.0  # in a period, at least: a window then makes the wobble smaller by 3 %
 _EXCITER_PERIODS = 2.0  # in a window, at least
-_SMOOTHED = 0.973  # what windows of a sixth of a period leave of a wobble
-# v_s over v_a, as shares: from the first on friction surely falls with speed, up to the second it surely does not, and what is
-# still between them after some rounds is judged by the third. Measured on the bank: one answer of PTFE 0.98 to 1.03, of steel
-# 1.03 at 1.5 mm/s to 1.5 at 0.3 mm/s on a soft drive.
+_SMOOTHED = 0.973  # share of a wobble that passes windows of a sixth of its period
+# Relative change of v_s over relative change of v_a. At the first or above: friction falls with speed. At the second or below:
+# it does not. Values between them are judged by the third after some rounds. Measured on the bank: one answer of PTFE 0.98 to
+# 1.03, of steel 1.03 at 1.5 mm/s to 1.5 at 0.3 mm/s on a soft drive.
 _FALLS, _EVEN, _LAST = 1.035, 1.01, 1.02
 _MOST_ROUNDS = 3.5  # of `PERIODS`
 EVEN, UNSURE, FALLS = range(3)
-_ASIDE = 0.25  # share of the question by which the answer may be out of step; more is no answer to it
+_ASIDE = 0.25  # of v_s / v_a: largest answer a quarter period out of phase; above, v_s follows something else
 
 
 @kernel
@@ -72,7 +72,7 @@ def wobble_factor(s: Record) -> float:
 
 @kernel
 def wobble(p: Record, s: Record, speed_mps: float) -> bool:
-    """Take what this block tells of v_a and v_s; whether an answer may be had: after each `PERIODS`."""
+    """Add a block's v_a and v_s; return whether an answer is complete: after each `PERIODS`."""
     turn_rad = TWO_PI * s.wobble_s / s.wobble_period_s
     late_rad = math.pi * (p.window_s[s.wobble_level] - p.block_s) / s.wobble_period_s  # between the middles of both
     weight = 1.0 - math.cos(turn_rad / PERIODS)
@@ -90,10 +90,10 @@ def wobble(p: Record, s: Record, speed_mps: float) -> bool:
 
 @kernel
 def answer(s: Record) -> int:
-    """Of the wobble: FALLS where v_s follows by more than its share or follows something else, EVEN, or UNSURE: ask on.
+    """Result of the wobble: FALLS if v_s follows by more than its share or follows something else; EVEN; or UNSURE: continue.
 
-    The mass of the slide makes it late, as 1 / (1 + j x). The share that it would follow by without is the square of what it does
-    over the part that is in step.
+    The mass of the slide delays the answer by 1 / (1 + j x). Without mass the answer would be its squared size over its in-phase
+    part.
     """
     a, v = s.wobble_a, s.wobble_v
     asked = a[0] * a[0] + a[1] * a[1]

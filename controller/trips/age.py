@@ -1,10 +1,10 @@
 """How old the blocks are when they are answered, against the youngest ever: a computer, a link or a rig that became slow.
 
-The clocks of rig and controller are two: what they drift apart is forgotten, and with it a delay that has been there for minutes.
+Rig and controller have two clocks: their drift is forgotten, and with it a delay that lasts for minutes.
 """
 
 MARGIN_NS = 15_000_000  # by which the loop may be late: v_a then stays within 4 %
-HOLD_NS = 200_000_000  # for which blocks are older until LATE is published; those of one stall are older for less
+HOLD_NS = 200_000_000  # for which blocks are older until LATE is published; after a single stall it is less
 _DRIFT = 2e-4  # of two clocks
 
 
@@ -39,5 +39,5 @@ class Age:
             self._since_ns = answered_ns
 
     def forget(self) -> None:
-        """Begin anew, as the rig's clock jumped or began anew."""
+        """Start again after a jump or restart of the rig's clock."""
         self._last_ns = self._since_ns = None

@@ -1,18 +1,18 @@
-"""To begin anew after a fault of force or place: what was learnt from a channel that lied is forgotten.
+"""Reset after a fault of force or position: values learnt from a wrong channel are forgotten.
 
-Windows, noise, stiffness, forces, and the speeds at which a vibration was needed or not are learnt again, as at a start. What is
-known of exciter, loop delay and accelerometer stays: no channel that was doubted taught it.
+Windows, noise, stiffness, forces, and the speeds at which a vibration was needed or not are learnt again, as at a start. Values
+of exciter, loop delay and accelerometer stay: they do not depend on the doubted channels.
 """
 
 from bridge.kernel import Record, kernel
 from controller.estimate.learning import begin
-from controller.estimate.windows import begin_anew
+from controller.estimate.windows import clear_windows
 
 
 @kernel
 def forget_motion(p: Record, s: Record) -> None:
-    """Forget all that force and places have taught."""
-    begin_anew(s)
+    """Forget all values learnt from force and positions."""
+    clear_windows(s)
     for table in (s.slope, s.sigma, s.noise):
         table[:, :] = 0.0
     s.slope_before[:, :, :] = 0.0

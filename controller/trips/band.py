@@ -1,9 +1,9 @@
 """The exciter's known gain, and the stroke that it allows.
 
-The known gain is what the rig's loop check measured at the tones beside a frequency, else that of the configuration, else the
-mean over the first tenth of a second of even vibration at the frequency, within what the check measured. It
-does not follow what is learnt later: an accelerometer that loses its gain looks like an exciter that does, and the loop would
-raise the stroke for ever. So the stroke is never more than the wanted v_a asks for at the known gain, times the band.
+The known gain is the one that the rig's loop check measured at the tones next to a frequency, else the configured one, else the
+mean over the first tenth of a second of even vibration at the frequency, within the range of the check. It does not follow the
+gain learnt later: an accelerometer that loses its gain looks like an exciter that does, and the loop would raise the stroke for
+ever. So the stroke never exceeds the stroke for the wanted v_a at the known gain, times the band.
 """
 
 import math
@@ -14,12 +14,12 @@ from bridge.kernel import Record, kernel
 KNOWN_S = 0.1
 
 CHECK_BLOCKS = 16  # after a check, in which its tones come; there are 8 at most
-OTHER_TOLD_S = 2.0  # for which it is told that the check measured another gain than the configuration says
+OTHER_REPORTED_S = 2.0  # for which GAIN_OTHER is reported: the check's gain differs from the configured one
 
 
 @kernel
 def begin_known(p: Record, s: Record) -> None:
-    """Know what the configuration tells, and nothing else."""
+    """Start from the configured gain alone."""
     for i in range(p.candidates):
         s.known_gain[i] = p.told_gain
         s.known_steps[i] = p.known_steps if p.told_gain > 0.0 else 0
@@ -55,7 +55,7 @@ def _use_check(p: Record, s: Record) -> None:
         s.known_gain[i] = math.sqrt(low * high)
         s.known_steps[i] = p.known_steps if alike else 0
         other = other and not low / p.gain_band < p.told_gain < high * p.gain_band
-    s.gain_other_s = OTHER_TOLD_S if other else 0.0
+    s.gain_other_s = OTHER_REPORTED_S if other else 0.0
 
 
 @kernel

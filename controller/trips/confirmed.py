@@ -1,9 +1,9 @@
-"""v_d that a second channel confirms: what the drive's place alone says raises no vibration.
+"""Cross-check of v_d: the drive position alone must not raise the vibration.
 
-While it vibrates, the slide goes at v_d but for what the spring winds up by: v_s + F' / k_d = v_d. Where the place of the drive
-goes faster than both say, v_a is for what they say. A law that holds three signals together does not tell which of them is wrong:
-the one that changed is, where only one did (DRIVE_DOUBTED, SLIDE_DOUBTED, FORCE_DOUBTED), else POSITIONS_APART names both places.
-k_d is the largest that was learnt, as places that go apart teach a spring that is ever softer.
+While it vibrates, the slide moves at v_d minus the rate of the spring's elongation: v_s + F' / k_d = v_d. If the drive position
+is faster than slide and force together, v_a follows these two. The law does not show which of its three signals is wrong: if only
+one changed, that one is doubted (DRIVE_DOUBTED, SLIDE_DOUBTED, FORCE_DOUBTED), else POSITIONS_APART names both positions. k_d is
+the largest value learnt, as diverging positions look like an ever softer spring.
 """
 
 import math
@@ -16,25 +16,25 @@ from controller.trips.doubts import CONTACT, trip
 from controller.trips.doubts import DRIVE as DRIVE_DOUBT
 
 WINDOW_S = 0.05  # shortest; shorter: nothing, as v_a changes no faster by it
-_LONGER = 4  # levels of longer windows for feeds that do not stand out
+_LONGER = 4  # further, longer levels for feeds below the noise
 _EXACT = 0.05  # noise of both places over v_d, at most
 _APART = 1.2  # by which they are apart; scales are better
-_MARGIN = 1.1  # of v_a over what is confirmed, once they are
+_MARGIN = 1.1  # of v_a over the confirmed velocity, once they differ
 _RISES_S = 1.0  # time constant in which more is confirmed while they are apart: v_a that changes moves slide and force
 _WINDOWS = 5.0 * BINS  # that taught a stiffness: BINS in a row overlap, and in hum five of them agree on a wrong one
 _SURE = 0.03  # of a learnt stiffness, over itself; the first ones are a third too large
-# Share of v_d below which the slide sticks, and what is confirmed of it then at least: all the rest hangs on the stiffness.
+# Share of v_d below which the slide sticks, and the share that counts as confirmed then: the rest depends on the stiffness.
 _STICKS, _STUCK = 0.25, 0.4
 _SOFTER = 2.0  # times that the spring may be softer here than where it was stiffest
-_TWICE = 2.0  # change of one over that of the other from which the one is what changed
-_SAME = 0.08  # of v_d, up to which a velocity is the same; less than half of what they are apart by then
+_TWICE = 2.0  # ratio of the two changes from which only the larger one counts as a change
+_SAME = 0.08  # of v_d: a smaller change of a velocity is none; less than half of the difference at that time
 _NONE = -1  # row of none
-TRIP_S = 0.3  # for which they are apart until it trips; a turning drive crosses its backlash meanwhile
+TRIP_S = 0.3  # for which they differ until it trips; longer than a reversing drive needs to cross its backlash
 
 
 @kernel
 def watch_confirmed(p: Record, s: Record) -> None:
-    """Follow which share of v_d is confirmed; trip where it is none for long. Once in SOME steps."""
+    """Follow the confirmed share of v_d; trip if nothing is confirmed for long. Once in SOME steps."""
     some_s = SOME * p.block_s
     vibrates = s.moving == 1 and (s.allowed_m > 0.0 or s.confirmed < 1.0)
     s.shaken_s = s.shaken_s + some_s if vibrates else 0.0
@@ -91,7 +91,7 @@ def _changed(s: Record, drive_mps: float, slide_mps: float) -> int:
 
 @kernel
 def _level(p: Record, s: Record) -> int:
-    """The shortest windows of motion under vibration in which both places stand out; -1 for none."""
+    """The shortest windows under vibration in which both positions move by more than noise; -1 for none."""
     for level in range(p.confirm_level, min(p.confirm_level + _LONGER, p.levels)):
         window_s = p.window_s[level]
         if s.pushed[level] < 2 * BINS or s.shaken_s < 2.0 * window_s or s.moved_s < 2.0 * window_s:

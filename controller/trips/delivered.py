@@ -1,8 +1,8 @@
-"""v_a as measured, against what the command gives by the known gain, while the command is even.
+"""Measured v_a against the v_a expected from command and known gain, while the command is even.
 
-Less than the band allows: OPEN_LOOP, or what a look at the block says more. A gain that is lost within a second, by more than
-the band, trips as well. A slow loss inside of the band is what an exciter does that warms up; beyond it `band` holds the stroke.
-More than the band allows: RESONANCE, and the command follows down, as a mount may have come loose.
+Less than the band allows: OPEN_LOOP, or a more exact reason from the block's samples. A gain lost within a second, by more than
+the band, trips as well. A slow loss inside the band is normal for an exciter that warms up; beyond it `band` limits the stroke.
+More than the band allows: RESONANCE, and the command is lowered, as a mount may have come loose.
 """
 
 import math
@@ -14,15 +14,15 @@ from controller.trips.doubts import ACCELEROMETER, OF_BASE, trip
 from controller.vibration import velocity_of
 
 _TWO_PI = 2.0 * math.pi
-SOME = 4  # steps in which what need not be quick is looked at once
+SOME = 4  # steps between two slow checks
 _EVEN = 0.05  # change of the commanded v_a, over its low-pass, up to which it is even
-HOLD_S = 0.05  # of too little v_a until it trips; the band bounds v_a meanwhile
-LOUD_HOLD_S = 0.1  # of too much, until it is told; a slip that shakes the base is shorter
+HOLD_S = 0.05  # of too little v_a until it trips; until then the band bounds v_a
+LOUD_HOLD_S = 0.1  # of too much, until it is reported; a slip that shakes the base is shorter
 GROWN_HOLD_S = 1.0  # of half as much too much, on a scale of factors: a gain that grows slowly
 PASSED_S = 1.0  # without too much until that is over
 FOLLOW_S = 1.0  # time constant of the gain that a sudden loss is compared with
-_NO_SINE = 0.25  # mean square beside the sine, over that of the sine, from which an acceleration is no sine any more
-_NOISIER = 16.0  # and over what it was before
+_NO_SINE = 0.25  # mean square of the rest over the mean square of the sine, from which an acceleration is not a sine
+_NOISIER = 16.0  # and over its value before
 _AT_EXTREME = 0.99  # of the largest sample of a block, from which another is as large
 _CLIPPED_SHARE = 0.3  # of samples at the extremes; a sine has 0.09 there
 _MOST_OFF = 1.6  # factor by which the slide's accelerometer may miss the known gain when it is in the base's place

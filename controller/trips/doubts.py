@@ -1,8 +1,8 @@
-"""Which signals are doubted, and what follows.
+"""Which signals are doubted, and the response.
 
-A doubted accelerometer: the vibration goes on open loop, at the known gain. A doubted force, or place of the slide: it vibrates
-whenever the drive moves, as where it is blind. A doubted place of the drive: it fades to zero, as no v_a can be related to v_d.
-A trip stays until a person has looked: a reset, or a new loop check of the rig.
+Accelerometer doubted: the vibration continues open loop, at the known gain. Force or slide position doubted: it vibrates
+whenever the drive moves, as when blind. Drive position doubted: it fades to zero, as v_a cannot be related to v_d.
+A trip lasts until the operator resets it or runs a new loop check of the rig.
 """
 
 import math
@@ -33,13 +33,13 @@ def trip(s: Record, reason: int, doubts: int) -> None:
 
 @kernel
 def end_trips(p: Record, s: Record, events: int) -> None:
-    """End all trips on a person's reset; a loop check begins the known gain anew, too."""
+    """End all trips on the operator's reset or a loop check, which also restarts the known gain."""
     if events & RESET:
         if s.doubted & (CONTACT | DRIVE):
             forget_motion(p, s)
         forget_needs(p, s)
         _forget(s)
-        for i in range(p.candidates):  # without a step: what a doubted accelerometer taught is forgotten
+        for i in range(p.candidates):  # forget the gain learnt from a doubted accelerometer, without a step of v_a
             if s.known_steps[i] > 0:
                 s.log_gain[i] = math.log(s.known_gain[i])
     if s.guard_state == CHECKING:

@@ -1,8 +1,8 @@
 """Channels that repeat their bits: a converter that hangs, a wire that is cut, a range that is at its end.
 
-A channel that has noise never shows the same number for long. Whether it has is learnt from the samples of a block, apart for a
-drive that moves and one that stands: noise goes up and down within a block, while the steps of an encoder without noise go one
-way, and show one number for hours where the drive stands.
+A channel with noise never repeats a number for long. Whether it has noise is learnt from the samples of a block, separately for a
+moving drive and a drive at rest: noise goes up and down within a block, while an encoder without noise steps one way, and repeats
+one number for hours at rest.
 """
 
 import math
@@ -29,15 +29,15 @@ HOLD_S, FEWEST = (
     0.05,
     40,
 )  # of equal samples, and blocks of them, until it trips: at a noise of one step half of all are equal
-# Of this time, for one of which all channels repeat: what reads them hangs, as a rig that is silent for so long
+# Parts of HOLD_S. If all channels repeat for one part, their reader hangs: treated as a silent rig.
 _ALL_PARTS = 2
 _FASTEST_MPS = 100.0  # of a drive; a place that goes faster was not gone through
-_LOOK_STEPS = 16  # blocks from one look at the noise of a channel to that of the next
+_LOOK_STEPS = 16  # blocks between looks at the noise of one channel and the next
 _LOOKS = 8  # until a channel counts as one with noise
 _LIVELY = 0.9  # share of the looks that must show it
 _DROPS_S, _MOST_DROPS = 1.0, 3.5  # time constant of the count of dropouts, and how many are too many
 _DEAD_S = 0.3  # of a move in which a force has not changed since the start
-_SAME = 4  # equal samples in a row from which a look says nothing of the noise
+_SAME = 4  # equal samples in a row from which a look gives no information on the noise
 
 
 @kernel
@@ -115,7 +115,7 @@ def _look_at_one(s: Record, block: Record) -> None:
 
 @kernel
 def _state(s: Record, channel: int) -> int:
-    """What the noise of a channel depends on: whether the base vibrates, or the drive moves."""
+    """The condition that the noise of a channel depends on: whether the base vibrates, or the drive moves."""
     if channel == OF_BASE:
         return 1 if s.allowed_m > 0.0 else 0
     return s.moving

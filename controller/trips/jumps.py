@@ -4,16 +4,16 @@ import math
 
 from bridge.kernel import Record, kernel
 from controller.codes import DRIVE_DOUBTED
-from controller.estimate.windows import BINS, begin_anew
+from controller.estimate.windows import BINS, clear_windows
 from controller.estimate.windows import DRIVE as DRIVE_ROW
 from controller.trips.doubts import DRIVE, OF_DRIVE, trip
 
-_FARTHER = 10.0  # than in the blocks beside it
+_FARTHER = 10.0  # than in the blocks before and after
 _BENDS = 20.0  # of the bend within a block, which is noise: 2 sigma of it
 _ANOTHER = 0.3  # change of v_d, over it, with a jump: a unit that changed
 _SIGMAS = 3.0  # and of its noise
 _STEPS = 4.0  # of the resolution
-HOLD_S = 0.1  # for which v_d is that before the jump, while the windows begin anew
+HOLD_S = 0.1  # for which v_d keeps its value before the jump, while the windows refill
 _MOST = 2.5  # jumps within FORGET_S, from which the place is doubted
 FORGET_S = 1.0
 
@@ -37,7 +37,7 @@ def watch_jumps(p: Record, s: Record, place_m: float, blocks: int) -> None:
         return
     s.jumped_s, s.shaken_s = HOLD_S, 0.0
     s.jumps += 1.0
-    begin_anew(s)  # a window that holds a jump teaches noise and a soft spring
+    clear_windows(s)  # a window that holds a jump teaches noise and a soft spring
     if s.jumps > _MOST:
         trip(s, DRIVE_DOUBTED, DRIVE)
 

@@ -1,6 +1,6 @@
-"""Noise that becomes many times larger: the windows learn it anew, as what they knew of it would pass noise for motion.
+"""Noise that grows many times: the windows learn it again, as with the old value they would take noise for motion.
 
-And slips of which there are more than the spring could wind up for: they are noise.
+And more slips than the spring could wind up for: these are noise.
 """
 
 import math
@@ -9,17 +9,18 @@ from bridge.kernel import Record, kernel
 from controller.estimate.windows import DRIVE, LEVELS
 from controller.trips.delivered import SOME
 
-_LOUDER = 4.0  # bend of the drive's place from sample to sample, over what it was, from which its noise is another
+_LOUDER = 4.0  # growth of the drive position's second difference that counts as a new noise level
 _LEARN = 1.0 / 16.0  # share of one look
 _SLIPS_S = 1.0  # time constant of the count of slips
-_MOST_SLIPS, _TIMES = 8.0, 3.0  # in it, besides what the spring could wind up for, and times that
+# Most slips: this number plus this factor times the slips that the spring could wind up for.
+_MOST_SLIPS, _TIMES = 8.0, 3.0
 _UNBELIEVED_S = 2.0  # for which slips are not believed after too many of them
-_TOLD_S = 2.0  # for which noise that became larger is told
+_TOLD_S = 2.0  # for which grown noise is reported
 
 
 @kernel
 def look_at_noise(s: Record, samples: Record) -> None:
-    """Follow the bend of the drive's place within a block; begin to learn the noise anew after two looks at much more of it."""
+    """Follow the second difference of the drive position within a block; restart the learning of noise after two large ones."""
     bend_m = 0.0
     for i in range(2, samples.shape[0]):
         bend_m += math.fabs(float(samples[i]) - 2.0 * float(samples[i - 1]) + float(samples[i - 2]))

@@ -1,10 +1,10 @@
 """Force and positions against the law of the drive's spring: F' = k_d (v_d - v_s).
 
-The law holds while the slide sticks, slips, slides and vibrates, as the force is that of the spring. It does not hold where the
-force is dead, frozen, of another gain or sign and the spring is wound up, nor where a position has another unit. It is looked at
-in the shortest window in which half of v_d stands out from the noise, and doubted once it is broken for longer than a window
-remembers a jump. The place of the drive is doubted where v_d is what changed, that of the slide where it goes faster than drive
-and spring explain, else the force, which the contact is judged by. Meanwhile v_d counts as before, and slips are not believed.
+The law holds while the slide sticks, slips, slides and vibrates, as the force is the spring's. It breaks where the spring winds
+up and the force is dead, frozen or of another gain or sign, and where a position has another unit. It is checked in the shortest
+window in which half of v_d exceeds the noise, and trips once it is broken for longer than a window remembers a jump. The drive
+position is doubted if v_d changed, the slide position if it is faster than drive and spring explain, else the force. Until then
+v_d keeps its value before the break, and slips do not count.
 """
 
 import math
@@ -18,14 +18,14 @@ from controller.trips.doubts import DRIVE as DRIVE_DOUBT
 
 SHORTEST_S = 0.01  # window; shorter: a force that comes 2 ms late breaks the law in every slip
 HOLD_S, _WINDOWS = 0.05, 2.0  # and windows, in which the law is broken until it trips
-FIRST_S = 0.015  # of them, that say which signal it is
+FIRST_S = 0.015  # first part of HOLD_S, which decides the doubted signal
 _SIGMAS = 8.0
 # Of the larger of the two sides by which they may differ: a spring is softer or stiffer at places by a factor of 5. Where k_d is
-# told and not learnt yet, by a factor of 20.
+# configured and not learnt yet, by a factor of 20.
 _OFF, _TOLD_OFF = 0.8, 0.95
 _SURE = 0.06  # of a learnt stiffness, over itself, up to which it takes the place of the one before
 _HALF = 0.5  # of v_d: a difference that counts
-_TWICE = 2.0  # change of v_d over that of v_s from which the drive is what changed
+_TWICE = 2.0  # change of v_d over the change of v_s from which the drive is doubted
 
 
 @kernel
@@ -75,7 +75,7 @@ def _largest_mps(p: Record, s: Record) -> float:
 
 @kernel
 def _level(p: Record, s: Record) -> int:
-    """The shortest windows in which half of v_d stands out from the noise; -1 for none. Once broken, the same as before."""
+    """The shortest windows in which half of v_d exceeds the noise; -1 for none. Once broken, the same as before."""
     if s.broken_steps > 0:
         return s.spring_level
     counts_mps = _HALF * _largest_mps(p, s)
@@ -93,5 +93,5 @@ def _level(p: Record, s: Record) -> int:
 
 @kernel
 def is_drive_off(s: Record) -> bool:
-    """Whether the law is broken now, and the drive is what changed."""
+    """Whether the law is broken now by a change of the drive position."""
     return s.broken_steps > 0 and s.broken_drive > 0

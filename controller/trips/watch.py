@@ -1,4 +1,4 @@
-"""All trips, once a block: what the block shows, before the policy decides, and what a doubt does to what it wants."""
+"""All trips, once a block: the checks before the policy decides, and the limits of a doubt on the wanted v_a after it."""
 
 import math
 
@@ -15,7 +15,7 @@ from controller.trips.spring import is_drive_off, watch_spring
 
 @kernel
 def watch(p: Record, s: Record, block: Record) -> None:
-    """Look for faults in a block that was measured and estimated, and keep the policy from what is doubted."""
+    """Look for faults in a block after its estimate, and hide doubted signals from the policy."""
     watch_frozen(p, s, block)
     watch_delivered(p, s, block)
     s.slip_count += s.slip_began
@@ -38,7 +38,7 @@ def watch(p: Record, s: Record, block: Record) -> None:
         s.slip_began, s.stick_began = 0, 0
     if doubted:
         s.blind = 1
-        for way in range(s.ratio.shape[0]):  # what doubtful slips have raised
+        for way in range(s.ratio.shape[0]):  # doubtful slips may have raised it
             s.ratio[way] = min(s.ratio[way], p.v_ratio)
 
 
@@ -64,8 +64,8 @@ def restrain(p: Record, s: Record) -> None:
 
 
 @kernel
-def told_reason(s: Record) -> int:
-    """The reason that a command carries: that of a trip, before what passes by itself, before that of the policy."""
+def reported_reason(s: Record) -> int:
+    """The reason that a command carries: first the trip, then passing conditions, then the policy's reason."""
     if s.trip > 0:
         return s.trip
     if s.outside == 1:

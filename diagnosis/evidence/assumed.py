@@ -1,4 +1,4 @@
-"""Rig numbers that an owner can hardly know: what is assumed where a manifest or a channel map leaves them out."""
+"""Assumed values of rig numbers that few owners know, where a manifest or a channel map leaves them out."""
 
 import math
 from typing import Any
@@ -14,15 +14,15 @@ _PRESLIDING_M = 0.22e-6
 _TOLERANCE = 0.3  # relative, of the numbers that follow from it: 3.3 standard deviations reach 0.11 to 2.2 um
 # Stribeck velocities of dry and boundary-lubricated pairs lie between 0.1 and 10 mm/s.
 _STRIBECK_MPS = 1e-3
-_WIDE = 1.0  # tolerance of a number that nobody knows: it may be a third or three times as large
+_WIDE = 1.0  # tolerance of an unknown number: it may be a third or three times as large
 _SLIP_S = 0.1  # duration of a slip that gives a mass where the runs do not show one
 WIDE = ("mass_kg", "stribeck_velocity_mps")  # numbers that are assumed so widely that they decide nothing
 
 
 def with_assumed(given: dict[str, Any], mass_kg: float | None = None) -> tuple[dict[str, Any], list[str]]:
-    """The table `[rig]` with every number that may be left out, with tolerances; and the names of what was added.
+    """The table `[rig]` with every number that may be left out, with tolerances; and the names of the added numbers.
 
-    `mass_kg` is what the runs show, for a table without a mass.
+    `mass_kg` is the mass that the runs show, for a table without a mass.
     """
     table = dict(given)
     turns = table.get("drive") == "torsion"
@@ -50,14 +50,14 @@ def with_assumed(given: dict[str, Any], mass_kg: float | None = None) -> tuple[d
 
 
 def _mass_kg(stiffness_N_per_m: Any, static_N: float) -> float:
-    """A mass that slips in a tenth of a second; with a force drive one that its friction would stop as quickly."""
+    """A mass that slips in a tenth of a second; with a force drive, a mass that its friction decelerates by 10 m/s²."""
     if stiffness_N_per_m is None:
         return static_N / 10.0
     return _positive(stiffness_N_per_m) * (_SLIP_S / math.pi) ** 2
 
 
 def _positive(value: Any) -> float:
-    """The number, or 1 in place of what `validate` refuses: one wrong number must not make others seem to be missing."""
+    """The number, or 1 where `validate` will refuse it: one wrong number must not make others seem to be missing."""
     try:
         return _POSITIVE.validate_python(value, strict=True)
     except ValidationError:

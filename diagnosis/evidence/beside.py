@@ -1,48 +1,49 @@
 """Columns that some rigs measure besides, brought into the standard ones: tare, motor current, velocities, other forces, load."""
 
 import numpy as np
-import numpy.typing as npt
 from scipy.integrate import cumulative_trapezoid
 
+from bridge.arrays import Floats
 from bridge.faults import Fault
 from bridge.log.finding import Finding
 from diagnosis.evidence.manifest import MANIFEST, RigTable, RunTable
 
-Floats = npt.NDArray[np.float64]
 Columns = dict[str, Floats]
 
 
 def with_beside(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, list[Finding]]:
-    """The columns [samples] with all that the manifest and the further columns tell, in the units of the manifest; and findings.
+    """The columns [samples] completed from the manifest and the further columns, in the units of the manifest; and findings.
 
-    Raises Fault BAD_EVIDENCE for a motor current without its constant, where nothing else tells the force.
+    Raises Fault BAD_EVIDENCE for a motor current without its constant, where no other column gives the force.
     """
-    found = dict(columns)
+    completed = dict(columns)
     findings: list[Finding] = []
 
     def note(name: str, text: str) -> None:
         findings.append(Finding("besides", f"{table.name}: {name}", text))
 
-    if "motor_current_A" in found and rig.drive == "force" and "drive_force_N" not in found:
+    if "motor_current_A" in completed and rig.drive == "force" and "drive_force_N" not in completed:
         if rig.force_per_current_N_per_A is None:
             line = f"{MANIFEST}: rig.force_per_current_N_per_A: missing; {table.name} has motor_current_A and no drive_force_N"
             raise Fault("BAD_EVIDENCE", f"{line}; add it")
-        found["drive_force_N"] = rig.force_per_current_N_per_A * found["motor_current_A"]
+        completed["drive_force_N"] = rig.force_per_current_N_per_A * completed["motor_current_A"]
         note("drive_force_N", f"is motor_current_A times {rig.force_per_current_N_per_A:g} N/A")
-    if table.tare_N and "drive_force_N" in found:
-        found["drive_force_N"] = found["drive_force_N"] - table.tare_N
-    if "other_force_N" in found:
-        if rig.drive == "force" and "drive_force_N" in found:
-            found["drive_force_N"] = found["drive_force_N"] + found["other_force_N"]
+    if table.tare_N and "drive_force_N" in completed:
+        completed["drive_force_N"] = completed["drive_force_N"] - table.tare_N
+    if "other_force_N" in completed:
+        if rig.drive == "force" and "drive_force_N" in completed:
+            completed["drive_force_N"] = completed["drive_force_N"] + completed["other_force_N"]
             note("other_force_N", "is added to drive_force_N: both act on the mass")
         else:
             note("other_force_N", "counts in the friction that is measured, not in the fits")
     for velocity, position in (("mass_velocity_mps", "mass_position_m"), ("drive_velocity_mps", "drive_position_m")):
         # the place of a slide on a spring must be better than an integral is
         wanted = rig.drive == "force" if position == "mass_position_m" else rig.drive != "force"
-        if wanted and velocity in found and position not in found:
-            found[position] = cumulative_trapezoid(np.nan_to_num(found[velocity]), found["t_s"], initial=0.0)
-            note(position, f"not there: {velocity} is integrated, so places are known but for a constant")
-    if table.normal_load_N is not None and "normal_load_N" not in found:
-        found["normal_load_N"] = np.full(len(found["t_s"]), table.normal_load_N)
-    return found, findings
+        if wanted and velocity in completed and position not in completed:
+            completed[position] = cumulative_trapezoid(
+                np.nan_to_num(completed[velocity]), completed["t_s"], initial=0.0
+            )
+            note(position, f"not there: {velocity} is integrated, so positions have an unknown constant")
+    if table.normal_load_N is not None and "normal_load_N" not in completed:
+        completed["normal_load_N"] = np.full(len(completed["t_s"]), table.normal_load_N)
+    return completed, findings

@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.faults import Fault
 from bridge.log.check.signal_range import look
 from bridge.log.finding import Finding
@@ -14,7 +15,6 @@ from diagnosis.evidence.manifest import RigTable, RunTable
 from diagnosis.evidence.manifest_keys import BESIDE
 from diagnosis.evidence.sign_and_unit import apparent_stiffness_N_per_m
 
-Floats = npt.NDArray[np.float64]
 Columns = dict[str, Floats]
 Clipped = dict[str, tuple[float, float]]
 Note = Callable[[str, str, str], None]  # kind, column, text
@@ -30,7 +30,7 @@ _GAP_STEPS = 10.0  # times the median step between samples from which a step is 
 # Longest gap, and largest share of gaps in a run. In a longer gap the rig slips unseen, and the model goes on slipping.
 _LONGEST_GAP_S, _LARGEST_GAP_SHARE = 1.0, 0.1
 _VELOCITY_TOLERANCE = 0.1  # relative difference of the stated drive velocity and the drive position's slope
-# Factor between the two (or another sign) from which the stated velocity is that of another run
+# Factor between the two (or another sign) from which the stated velocity belongs to another run
 _OTHER_RUN_FACTOR = 3.0
 _MOST_TRAVEL = 10.0  # times the way of the drive that a position may travel; mm in place of m are a factor of 1000
 _LEAST_TRAVEL = 0.002  # of the way to the first slip that a drive must move; the noise of a drive at rest is less
@@ -97,7 +97,7 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
         if longest_s > _LONGEST_GAP_S or share > _LARGEST_GAP_SHARE:
             line = (
                 f"{file}: t_s: {text}, the longest {longest_s:.3g} s, {percent(share)} of the run in all: must be "
-                f"{_LONGEST_GAP_S:g} s and {100 * _LARGEST_GAP_SHARE:g} % at most; split the file there into runs of their own"
+                f"{_LONGEST_GAP_S:g} s and {100 * _LARGEST_GAP_SHARE:g} % at most; split the file there into several runs"
             )
             raise Fault("BAD_EVIDENCE", line)
         note("time-gap", "t_s", text, len(gaps))
@@ -193,21 +193,21 @@ def _good_rows(
     t_s = columns["t_s"]
     rows = len(t_s)
     good = np.ones(rows, np.bool_)
-    found: list[Finding] = []
+    new_findings: list[Finding] = []
     for name, values in columns.items():
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
             text = f"{counted(len(bad), 'sample is', 'samples are')} no finite number, first row {bad[0] + 1}; not used"
-            found.append(Finding("not-finite", f"{file}: {name}", text, len(bad)))
+            new_findings.append(Finding("not-finite", f"{file}: {name}", text, len(bad)))
             good[bad] = False
         limit = _FORCE_FACTOR * rig.static_force_N if name == "drive_force_N" else _LARGEST.get(name, math.inf)
         wild = np.flatnonzero(np.isfinite(values) & (np.abs(values) > limit))
-        # with a larger share of wild samples the unit is wrong: `_wrong_unit` says so
+        # a larger share of wild samples means a wrong unit: `_wrong_unit` reports it
         if not name.endswith("position_m") and 0 < len(wild) <= _LARGEST_WILD_SHARE * rows:
             at = int(wild[0])
             many = counted(len(wild), "sample is", "samples are")
             text = f"{many} beyond {limit:g}, first row {at + 1}: {values[at]:g}; not used"
-            found.append(Finding("wild", f"{file}: {name}", text, len(wild)))
+            new_findings.append(Finding("wild", f"{file}: {name}", text, len(wild)))
             good[wild] = False
     latest_s = np.maximum.accumulate(np.where(np.isfinite(t_s), t_s, -np.inf))
     repeated = np.zeros(rows, np.bool_)
@@ -219,11 +219,11 @@ def _good_rows(
             f"{counted(len(back), 'row is', 'rows are')} not later than the one before, first row {at + 1}: "
             f"{t_s[at]:.9g} s after {latest_s[at - 1]:.9g} s; not used"
         )
-        found.append(Finding("time", f"{file}: t_s", text, len(back)))
+        new_findings.append(Finding("time", f"{file}: t_s", text, len(back)))
         good[back] = False
     lost = rows - int(good.sum())
     if lost > _LARGEST_BAD_SHARE * rows or rows - lost < _FEWEST_ROWS:
-        worst = max(found, key=lambda one: one.times)
+        worst = max(new_findings, key=lambda finding: finding.times)
         few = (
             f"{_FEWEST_ROWS} rows must be left"
             if rows - lost < _FEWEST_ROWS
@@ -232,12 +232,12 @@ def _good_rows(
         remedy = "repair the file, or cut it where the trouble begins"
         if len(back) and worst.kind == "time" and (np.diff(t_s[np.isfinite(t_s)]) >= 0.0).all():
             remedy = (
-                "it stands but never goes back: write it with more digits, or give `stickslip log import` the "
+                "time repeats but never goes back: write it with more digits, or give `stickslip log import` the "
                 "source.sample_rate_Hz in place of channels.t_s"
             )
         line = f"{worst.where}: {worst.text}: {lost} of {rows} rows cannot be used: {few}; {remedy}"
         raise Fault("BAD_EVIDENCE", line)
-    findings += found
+    findings += new_findings
     return ({name: values[good] for name, values in columns.items()} if lost else columns), np.flatnonzero(good)
 
 
@@ -289,7 +289,7 @@ def _compare_velocity(columns: Columns, rig: RigTable, table: RunTable, note: No
         moved_mps = _way_m(t_s, position_m) / float(t_s[-1] - t_s[0])  # both directions count as positive
         if stated_mps is not None:
             text = (
-                f"moves at {measured_mps:.4g} m/s on average, drive_velocity_mps says {stated_mps:.4g}: check units and time; "
+                f"moves at {measured_mps:.4g} m/s on average, but drive_velocity_mps = {stated_mps:.4g}: check units and time; "
                 "where the drive changes its speed leave drive_velocity_mps out"
             )
             reach_m = rig.static_force_N / (rig.drive_stiffness_N_per_m or math.inf)
@@ -316,7 +316,7 @@ def _way_m(t_s: Floats, position_m: Floats) -> float:
 
 
 def _check_moves(columns: Columns, rig: RigTable, table: RunTable, note: Note) -> None:
-    """Note a drive that stands still: such a run fits nearly every rig."""
+    """Note a drive that does not move: such a run fits nearly every rig."""
     if rig.drive_stiffness_N_per_m is None:
         return
     if "drive_position_m" in columns:
@@ -328,7 +328,7 @@ def _check_moves(columns: Columns, rig: RigTable, table: RunTable, note: Note) -
         return
     share = travel_m * rig.drive_stiffness_N_per_m / rig.static_force_N
     if share < _LEAST_TRAVEL:
-        text = f"{travel_m:.2g} m in all, {share:.2g} of what breaks the mass away: it stands still in the whole run"
+        text = f"{travel_m:.2g} m in all, {share:.2g} of the travel to the first slip: the drive rests in the whole run"
         note("still", where, f"{text}: friction and drive are not tested")
 
 
@@ -347,7 +347,7 @@ def _check_bending(columns: Columns, rig: RigTable, note: Note) -> None:
     elif not 1.0 / _OTHER_UNIT_FACTOR < apparent / described < _OTHER_UNIT_FACTOR:
         text = (
             f"bends with the acceleration of the mass as a spring of {apparent:.2g} N/m makes it, "
-            f"rig.drive_stiffness_N_per_m says {described:g}: check the units of these three"
+            f"but rig.drive_stiffness_N_per_m = {described:g}: check the units of these three"
         )
         note("units", "drive_force_N", text)
 

@@ -1,7 +1,7 @@
 """Whether the base vibrates at other frequencies than the commanded one: an exciter whose motion is not a sine.
 
 Every model of the library shakes the base with a sine. The rest of the diagnosis compares the rms of the shake over all
-frequencies, so without this check harmonics of the piezo pass for a resonance of the piezo (docs/method/evidence.md).
+frequencies, so without this check harmonics of the piezo pass for a resonance of the piezo (docs/method/diagnosis.md).
 """
 
 from collections.abc import Mapping
@@ -17,14 +17,14 @@ DISTORTED = "distorted"  # kind of the finding
 _MULTIPLES = (0.5, 1.5, 2.0, 3.0)  # of the commanded frequency, at which a line is looked for
 # Smallest line that is reported, as a share of the commanded line's velocity (velocity decides where slips end: v_a / v_d = 1.00
 # fails, 1.05 passes). Too small: the hysteresis of every piezo, some per cent, is reported. Too large: harmonics stay unseen.
-# Counted on 56 synthetic rigs (docs/method/evidence.md).
+# Counted on 56 synthetic rigs (docs/method/diagnosis.md).
 _SHARE = 0.05
-# Times the amplitude beside the line that the line must have; noise and slips are at both frequencies
+# Times that a line must exceed the amplitude at the neighbouring frequencies; noise and slips are at both
 _TIMES_BESIDE = 4.0
 
 
 class Distortion(NamedTuple):
-    """The strongest line beside the commanded one in the base's acceleration of one run."""
+    """The strongest line other than the commanded one in the base's acceleration of one run."""
 
     commanded_Hz: float
     multiple: float  # of the commanded frequency
@@ -61,23 +61,23 @@ def distortion(t_s: Floats, columns: Mapping[str, npt.NDArray[np.floating]]) -> 
         return None
     lock_in = LockIn(t_s, columns)
     accel_mps2 = columns["base_accel_mps2"]
-    found: list[Distortion] = []
+    lines: list[Distortion] = []
     if steady := lock_in.steady():
         base = lock_in.amplitude(accel_mps2)
         for multiple in _MULTIPLES:
             line = lock_in.amplitude(accel_mps2, multiple)
             beside = [lock_in.amplitude(accel_mps2, multiple, apart_Hz) for apart_Hz in (-BESIDE_HZ, BESIDE_HZ)]
-            for own in steady:
-                commanded_Hz = float(lock_in.lowest_Hz[own[0]])
-                size, whole = float(np.median(line[own])), float(np.median(base[own]))
-                around = max(float(np.median(each[own])) for each in beside)
+            for windows in steady:
+                commanded_Hz = float(lock_in.lowest_Hz[windows[0]])
+                size, whole = float(np.median(line[windows])), float(np.median(base[windows]))
+                around = max(float(np.median(each[windows])) for each in beside)
                 if _is_apart(multiple * commanded_Hz, commanded_Hz, lock_in.rate_Hz) and size > _TIMES_BESIDE * around:
-                    found.append(Distortion(commanded_Hz, multiple, size / (multiple * max(whole, size / 1e3))))
-    strongest = max(found, key=lambda one: one.share, default=None)
+                    lines.append(Distortion(commanded_Hz, multiple, size / (multiple * max(whole, size / 1e3))))
+    strongest = max(lines, key=lambda line: line.share, default=None)
     return strongest if strongest is not None and strongest.limits > 1.0 else None
 
 
 def _is_apart(line_Hz: float, commanded_Hz: float, rate_Hz: float) -> bool:
-    """Whether a line, folded by the sampling, and the frequencies beside it are away from 0 Hz and from the commanded line."""
+    """Whether a line, folded by the sampling, and its neighbouring frequencies are away from 0 Hz and the commanded line."""
     folded_Hz = abs((line_Hz + 0.5 * rate_Hz) % rate_Hz - 0.5 * rate_Hz)
     return folded_Hz > 2.0 * BESIDE_HZ and abs(folded_Hz - commanded_Hz) > 2.0 * BESIDE_HZ

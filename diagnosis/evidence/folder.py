@@ -8,8 +8,8 @@ from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.faults import Fault
 from bridge.files import check_file
 from bridge.log.finding import Finding
@@ -24,29 +24,28 @@ from diagnosis.evidence.manifest import MANIFEST, Manifest, RigTable, RunTable, 
 from diagnosis.evidence.manifest_keys import STANDARD, ChannelMap
 from diagnosis.evidence.mapped import has_time, mapped
 from diagnosis.evidence.rotary import as_sliding, run_as_sliding, told
-from diagnosis.evidence.run import Evidence, Run
+from diagnosis.evidence.run import Evidence, MeasuredRun
 from diagnosis.evidence.run_log import columns_of_log
 from diagnosis.evidence.split import split
 from diagnosis.evidence.unknown_mass import shown_mass_kg
 
-Floats = npt.NDArray[np.float64]
 _NO_COLUMN = "column"  # kind of finding: the file lacks a column that the channel map names
 _NEVER_EXACT = ("coulomb_force_N", "static_force_N", "stribeck_velocity_mps", "drive_stiffness_N_per_m")
 # Similarity of two column names (`difflib`) from which one may be a misspelling of the other: one letter, or the case, differs.
 # Too small: unrelated columns are offered. Too large: misspellings stay unseen.
 _SIMILAR = 0.85
 SHAKE_RATE_HZ = 8000.0  # lowest sampling rate at which the rms within 1 ms is compared; slower has too few samples
-# what is lost without a column, by kind of drive
+# consequence of a missing column, by kind of drive
 _COST_SPRING = {
     "drive_force_N": "slips are seen in the acceleration only, and no force level or drive stiffness can be judged",
     "mass_accel_mps2": "mass, normal-load fluctuation and the fast part of a slip are judged from the force alone",
-    "base_accel_mps2": "what the piezo really delivers, and a base that gives way, cannot be seen",
+    "base_accel_mps2": "the amplitude that the piezo delivers, and a base that gives way, cannot be seen",
     "mass_position_m": "position-dependent friction and frame compliance are judged from the drive position only",
     "drive_position_m": "the drive counts as perfectly even: no speed ripple can be seen",
 }
 _COST_FORCE = {
     "mass_accel_mps2": "the acceleration is taken from the position, twice differentiated",
-    "mass_position_m": "the motion is taken from the acceleration: nothing that goes with place or a slow drift can be judged",
+    "mass_position_m": "the motion is taken from the acceleration: effects of place and slow drift cannot be judged",
 }
 
 
@@ -62,7 +61,7 @@ def load_evidence(folder: Path) -> Evidence:
         _refuse_a_way_out(folder, table.file)
         check_file(folder / table.file, "BAD_EVIDENCE", f"correct run.file in {MANIFEST}, or copy the file there")
     read = _read_all(folder, manifest)
-    _refuse_misspelt(manifest, [finding for _, found in read for finding in found])
+    _refuse_misspelt(manifest, [finding for _, findings in read for finding in findings])
     seen_kg: float | None = None
     if "mass_kg" in assumed:
         shown = (
@@ -71,7 +70,7 @@ def load_evidence(folder: Path) -> Evidence:
         )
         seen_kg = next((mass_kg for mass_kg in shown if mass_kg is not None), None)
         manifest, assumed = described(folder, seen_kg)
-    runs: list[Run] = []
+    runs: list[MeasuredRun] = []
     findings = told(manifest.rig)
     findings += [
         Finding("assumed", f"{MANIFEST}: rig.{name}", _assumed_in_words(name, manifest.rig, seen_kg is not None))
@@ -88,11 +87,11 @@ def load_evidence(folder: Path) -> Evidence:
         text = f"none for {', '.join(exact)}: known exactly, so an ordinary difference there will be called an effect"
         findings.append(Finding("tolerance", f"{MANIFEST}: rig.tolerance", text))
     for table, (columns, damaged) in zip(manifest.run, read, strict=True):
-        run, found = examine(columns, manifest.rig, table)
+        run, noted = examine(columns, manifest.rig, table)
         runs.append(run)
-        findings += damaged + found
+        findings += damaged + noted
     if len(runs) > 1 and not any(run.holdout for run in runs):
-        # the last run is held out, and the finding says so: a run that is added later moves the choice
+        # the last run is held out, with a finding: a run that is added later moves the choice
         runs[-1] = runs[-1]._replace(holdout=True)
         text = "no run is marked holdout: this one is held out; mark one to choose for yourself"
         findings.append(Finding("holdout", runs[-1].file, text))
@@ -103,15 +102,15 @@ def load_evidence(folder: Path) -> Evidence:
 
 
 def _read_all(folder: Path, manifest: Manifest) -> list[tuple[Columns, list[Finding]]]:
-    """The columns of every run and what was found about them; a file that several runs share is read once."""
+    """The columns of every run and their findings; a file that several runs share is read once."""
     known: dict[str, tuple[Columns, list[Finding]]] = {}
     result: list[tuple[Columns, list[Finding]]] = []
     for table in manifest.run:
         channels = manifest.channels | table.channels
         key = f"{table.file} {sorted(channels.items())}"
-        found, told = known.get(key) or read_columns(folder / table.file, channels, manifest.rig.drive == "torsion")
-        result.append((_stretch(found, table), [] if key in known else told))
-        known[key] = (found, told)
+        columns, notes = known.get(key) or read_columns(folder / table.file, channels, manifest.rig.drive == "torsion")
+        result.append((_stretch(columns, table), [] if key in known else notes))
+        known[key] = (columns, notes)
     return result
 
 
@@ -121,11 +120,11 @@ def _stretch(columns: Columns, table: RunTable) -> Columns:
         return columns
     t_s = columns["t_s"]
     since_s = t_s - t_s[np.isfinite(t_s)][0] if np.isfinite(t_s).any() else t_s
-    own = (since_s >= table.from_s) & (since_s < (np.inf if table.until_s is None else table.until_s))
-    if not own.any():
+    inside = (since_s >= table.from_s) & (since_s < (np.inf if table.until_s is None else table.until_s))
+    if not inside.any():
         line = f"{table.name}: from_s = {table.from_s:g}: must be before its end at {np.nanmax(since_s):.6g} s"
         raise Fault("BAD_EVIDENCE", f"{line}; correct it in [[run]]")
-    return {name: values[own] for name, values in columns.items()}
+    return {name: values[inside] for name, values in columns.items()}
 
 
 def _assumed_in_words(name: str, rig: RigTable, mass_is_seen: bool) -> str:
@@ -137,7 +136,7 @@ def _assumed_in_words(name: str, rig: RigTable, mass_is_seen: bool) -> str:
 
 
 def _refuse_a_way_out(folder: Path, file: str) -> None:
-    """Raise Fault BAD_EVIDENCE for a run that is a link to a file outside of its folder, which may be nobody's to show."""
+    """Raise Fault BAD_EVIDENCE for a run that links to a file outside its folder: that file may be confidential."""
     if not (folder / file).resolve().is_relative_to(folder.resolve()):
         line = f"{MANIFEST}: run.file = {file!r}: is a link that leads out of the folder: must be a file in it"
         raise Fault("BAD_EVIDENCE", f"{line}; copy the file there")
@@ -155,7 +154,7 @@ def _refuse_misspelt(manifest: Manifest, findings: list[Finding]) -> None:
             raise Fault("BAD_EVIDENCE", f"{line}; no run has it: correct channels.{name}.column")
 
 
-def examine(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Run, list[Finding]]:
+def examine(columns: Columns, rig: RigTable, table: RunTable) -> tuple[MeasuredRun, list[Finding]]:
     """A checked run from its raw columns ([samples], SI units), and the findings about it.
 
     Raises Fault BAD_EVIDENCE when the run cannot be used, or lacks a column that this kind of drive needs.
@@ -193,7 +192,9 @@ def examine(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Run, list
     distorted = distortion(t_s, usable)
     if distorted:
         findings.append(Finding(DISTORTED, f"{table.name}: base_accel_mps2", distorted.text))
-    return Run(table.name, t_s, usable, clipped, table.drive_velocity_mps, table.holdout, vibrates, distorted), findings
+    return MeasuredRun(
+        table.name, t_s, usable, clipped, table.drive_velocity_mps, table.holdout, vibrates, distorted
+    ), findings
 
 
 def _vibration(columns: Columns, t_s: Floats) -> Iterator[tuple[str, str, str]]:
@@ -203,7 +204,7 @@ def _vibration(columns: Columns, t_s: Floats) -> Iterator[tuple[str, str, str]]:
         yield (
             "missing",
             given[0],
-            "stands alone: frequency and amplitude are needed, the run counts as one without vibration",
+            "is given alone: frequency and amplitude are needed, the run counts as one without vibration",
         )
     for name in given:
         if negative := int((columns[name] < 0.0).sum()):
@@ -238,11 +239,11 @@ def read_columns(path: Path, channels: dict[str, ChannelMap], rotary: bool = Fal
             has = ", ".join(wanted) or "no standard column"
             line = f"{path.name}: t_s: missing; the file has {has}; add the column or map it in [channels]"
             raise Fault("BAD_EVIDENCE", line)
-        found, noted = mapped(table, wanted, rotary=rotary)
+        standard, noted = mapped(table, wanted, rotary=rotary)
     except Fault as fault:
         line = fault.line if path.name in fault.line else f"{path.name}: {fault.line}"
         raise Fault("BAD_EVIDENCE", line) from None
-    return found, [*lacking, *noted, *_misspelt(path.name, found, table)]
+    return standard, [*lacking, *noted, *_misspelt(path.name, standard, table)]
 
 
 def _wanted(table: Table, channels: dict[str, ChannelMap]) -> tuple[dict[str, ChannelMap], list[Finding]]:
@@ -264,10 +265,10 @@ def _wanted(table: Table, channels: dict[str, ChannelMap]) -> tuple[dict[str, Ch
     return wanted, lacking
 
 
-def _misspelt(file: str, found: Columns, table: Table) -> Iterator[Finding]:
-    """A finding for each unused column whose name is nearly that of a missing standard column."""
+def _misspelt(file: str, columns: Columns, table: Table) -> Iterator[Finding]:
+    """A finding for each unused column with nearly the name of a missing standard column."""
     for name in STANDARD:
-        near = [] if name in found else get_close_matches(name, table.columns.keys() - found.keys(), 1, _SIMILAR)
+        near = [] if name in columns else get_close_matches(name, table.columns.keys() - columns.keys(), 1, _SIMILAR)
         for other in near:
             yield Finding(
                 "missing", f"{file}: {name}", f'not there, but {other} is: set channels.{name}.column = "{other}"'

@@ -1,25 +1,25 @@
 """Whether the force signal holds a vibration that the spring cannot carry: the exciter's voltage in the sensor's cable.
 
-The rest of the diagnosis compares means over 1 ms, in which a vibration is lost, and cannot see it (docs/method/evidence.md).
+The rest of the diagnosis compares means over 1 ms, in which a vibration is lost, and cannot see it (docs/method/diagnosis.md).
 """
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.units import quantity
 from diagnosis.evidence.lock_in import BESIDE_HZ, FEWEST_WINDOWS, WINDOW_S, LockIn
 from diagnosis.evidence.manifest import RigTable
 
-Floats = npt.NDArray[np.floating[Any]]
 PICK_UP = "pick-up"  # kind of the finding
 # A vibration of the force is reported above the largest of these three limits. Lower limits report ordinary rigs; higher limits
 # miss a pick-up.
 _SHARE = 0.005  # of the static friction: the most that the roughness of a surface makes
 _TIMES_SPRING = 3.0  # times the force that the spring carries by the described rig numbers, which are not exact
-_TIMES_BESIDE = 4.0  # times the amplitude at frequencies beside the commanded one: noise, and quick slips
+_TIMES_BESIDE = 4.0  # times the amplitude at frequencies next to the commanded one, where noise and quick slips are
 
 
 class PickUp(NamedTuple):
@@ -58,8 +58,8 @@ def pick_up(rig: RigTable, t_s: Floats, columns: Mapping[str, npt.NDArray[np.flo
     """The vibration in the force signal of a run with a spring drive; None where it is small or cannot be known.
 
     `columns` needs force, mass acceleration, and the vibration's frequency and amplitude, [samples] as `t_s`. Each frequency
-    counts with its median window, as few windows hold a slip. Of several frequencies, the one that is farthest above its limit is
-    returned: a pick-up of a voltage grows with the frequency.
+    counts with its median window, as few windows hold a slip. Of several frequencies, the farthest above its limit is returned: a
+    pick-up of a voltage grows with the frequency.
     """
     stiffness_N_per_m = rig.drive_stiffness_N_per_m
     needed = {"drive_force_N", "mass_accel_mps2", "vibration_frequency_Hz", "vibration_amplitude_m"}
@@ -71,14 +71,16 @@ def pick_up(rig: RigTable, t_s: Floats, columns: Mapping[str, npt.NDArray[np.flo
     force_N, accel_mps2 = (lock_in.amplitude(columns[name]) for name in ("drive_force_N", "mass_accel_mps2"))
     beside_N = [lock_in.amplitude(columns["drive_force_N"], apart_Hz=apart_Hz) for apart_Hz in (-BESIDE_HZ, BESIDE_HZ)]
 
-    def of(own: npt.NDArray[np.int64]) -> PickUp:
-        angular = 2.0 * np.pi * lock_in.lowest_Hz[own]
+    def of(windows: npt.NDArray[np.int64]) -> PickUp:
+        angular = 2.0 * np.pi * lock_in.lowest_Hz[windows]
         yields = np.abs(stiffness_N_per_m + 1j * angular * (rig.drive_damping_Ns_per_m or 0.0))
-        spring_N = float(np.median(yields * accel_mps2[own] / angular**2))
-        around_N = max(float(np.median(each[own])) for each in beside_N)
+        spring_N = float(np.median(yields * accel_mps2[windows] / angular**2))
+        around_N = max(float(np.median(each[windows])) for each in beside_N)
         limit_N = max(_SHARE * rig.static_force_N, _TIMES_SPRING * spring_N, _TIMES_BESIDE * around_N)
-        return PickUp(float(np.median(lock_in.lowest_Hz[own])), float(np.median(force_N[own])), spring_N, limit_N)
+        return PickUp(
+            float(np.median(lock_in.lowest_Hz[windows])), float(np.median(force_N[windows])), spring_N, limit_N
+        )
 
-    each = [of(own) for own in lock_in.steady()] or [of(lock_in.used)]
-    found = max(each, key=lambda one: one.limits)
-    return found if found.limits > 1.0 else None
+    each = [of(windows) for windows in lock_in.steady()] or [of(lock_in.used)]
+    strongest = max(each, key=lambda pickup: pickup.limits)
+    return strongest if strongest.limits > 1.0 else None

@@ -10,6 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from pydantic import Field, model_validator
 
+from bridge.arrays import Floats
 from bridge.config import Strict, read_toml, validate
 from bridge.faults import Fault
 from bridge.files import LOG, folder_beside, followed, refuse_to_replace, replacing
@@ -32,7 +33,6 @@ from diagnosis.evidence.manifest_text import manifest_text
 from diagnosis.evidence.mapped import mapped
 from diagnosis.evidence.unknown_mass import shown_mass_kg
 
-Floats = npt.NDArray[np.float64]
 Columns = dict[str, Floats]
 _AGAINST = 0.3  # share of all work that the drive would get back; a loaded spring gives back some at the end
 _BLOCK_SAMPLES = 20
@@ -46,24 +46,26 @@ class SourceMap(Strict):
     sample_rate_Hz: Annotated[float, Field(ge=1.0, le=1e7)] | None = Field(
         default=None, description="Where no column holds the time."
     )
-    format: Kind | None = Field(default=None, description="Of the file, where its first bytes do not say it.")
+    format: Kind | None = Field(default=None, description="Of the file, where its first bytes do not show it.")
     delimiter: Annotated[str, Field(min_length=1, max_length=1)] | None = Field(
-        default=None, description="Of columns; a blank stands for any number of blanks and tabs."
+        default=None, description="Of columns; a blank means any number of blanks and tabs."
     )
     decimal: Literal[".", ","] | None = Field(default=None, description="Mark of decimals.")
     thousands: Annotated[str, Field(max_length=1)] | None = Field(default=None, description="Mark of thousands.")
-    skip_rows: Annotated[int, Field(ge=0)] | None = Field(default=None, description="Lines before that of the names.")
+    skip_rows: Annotated[int, Field(ge=0)] | None = Field(
+        default=None, description="Lines before the line of the names."
+    )
     encoding: str | None = None
     names: list[str] | None = Field(default=None, description="Of the columns, where the file has none.")
     units_row: bool | None = Field(default=None, description="Whether a line of units follows the names.")
     comment: Annotated[str, Field(min_length=1)] | None = Field(
-        default=None, description="What lines begin with that are passed over."
+        default=None, description="Beginning of the lines that are skipped."
     )
     sheet: str | None = Field(default=None, description="Of a workbook.")
 
     @property
     def dialect(self) -> Dialect:
-        """What the map says of a text or a sheet."""
+        """The map's keys for a text or a sheet."""
         given = self.model_dump(exclude={"sample_rate_Hz", "format", "names"})
         return Dialect(**given, names=None if self.names is None else tuple(self.names))
 
@@ -112,7 +114,7 @@ class Imported(NamedTuple):
 def import_file(path: Path, map_path: Path, out: Path) -> Imported:
     """Import one file; `out` is an evidence folder, to which a run is added, or a .mcap file.
 
-    Raises Fault CONFIG for the map, BAD_TABLE for the file, BAD_EVIDENCE for what is in it, LOG_WRITE. Nothing
+    Raises Fault CONFIG for the map, BAD_TABLE for the file, BAD_EVIDENCE for its content, LOG_WRITE. Nothing
     unfinished is left behind.
     """
     wanted = validate(ImportMap, read_toml(map_path), map_path.name)
@@ -129,11 +131,11 @@ def import_file(path: Path, map_path: Path, out: Path) -> Imported:
         raise Fault("LOG_WRITE", f"{out}: {error.strerror or error}; choose another --out") from None
 
 
-def _with_sign(found: list[Finding], file: str, columns: Columns, wanted: ImportMap, table: Table) -> list[Finding]:
+def _with_sign(findings: list[Finding], file: str, columns: Columns, wanted: ImportMap, table: Table) -> list[Finding]:
     """The findings, with a line to copy where the force has the other sign."""
-    others = [one for one in found if one.kind != "sign" or not one.where.endswith("drive_force_N")]
-    if len(others) == len(found) and not _pulls_back(columns):
-        return found
+    others = [finding for finding in findings if finding.kind != "sign" or not finding.where.endswith("drive_force_N")]
+    if len(others) == len(findings) and not _pulls_back(columns):
+        return findings
     channel = wanted.channels["drive_force_N"]
     known = known_unit(channel.unit or table.unit(channel.column))
     scale = channel.scale if channel.scale is not None else known[1] if known is not None else 1.0
@@ -168,7 +170,7 @@ def _missing(columns: Columns) -> list[str]:
 
 
 def _rig(given: dict[str, Any], map_name: str, mass_kg: float | None = None) -> tuple[RigTable, list[str]]:
-    """The rig of the map, with assumed values for numbers that an owner can hardly know; and the names of these numbers."""
+    """The rig of the map, with assumed values for missing numbers that few owners know; and the names of these numbers."""
     if not given:
         raise Fault("CONFIG", f"{map_name}: rig: missing; an evidence folder needs it, or import into a .mcap file")
     table, filled = with_assumed(given, mass_kg)
@@ -200,7 +202,7 @@ def _to_folder(path: Path, columns: Columns, wanted: ImportMap, map_name: str, o
         )
         raise Fault("CONFIG", line)
     _check_free(out / run.file)
-    # named as the file that is there: run.file is none before it is sound
+    # named after the source file: run.file does not exist before the check passes
     findings = examine(columns, rig, run.model_copy(update={"file": path.name}))[1]
     findings += [
         Finding("assumed", f"{MANIFEST}: rig.{name}", f"not in {map_name}: taken as {getattr(rig, name):.6g}")
@@ -268,8 +270,8 @@ def _to_log(path: Path, columns: Columns, out: Path) -> Imported:
             "a log has an even clock; repair the file, or import it into a folder"
         )
         raise Fault("BAD_EVIDENCE", line)
-    even_s, step_s, gone, told = _even_clock(t_s, path.name)
-    findings += told
+    even_s, step_s, gone, notes = _even_clock(t_s, path.name)
+    findings += notes
     if len(even_s) != len(t_s) or float(np.abs(t_s - even_s).max()) > _IRREGULAR_SHARE * step_s:
         columns = columns | {name: np.interp(even_s, t_s, columns[name]) for name in CHANNELS if name in columns}
     blocks = len(even_s) // _BLOCK_SAMPLES

@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.floating[Any]]
+from bridge.arrays import Floats
+
 # Seconds of a window. Too short: lines near each other melt together. Too long: every window holds a slip.
 WINDOW_S = 0.02
 FEWEST_WINDOWS = 5  # windows that a frequency needs; a median of fewer may be one of a slip
-BESIDE_HZ = 3.5 / WINDOW_S  # distance to the frequencies beside a line; a line leaks over 2 / WINDOW_S at most
+BESIDE_HZ = 3.5 / WINDOW_S  # distance to the neighbouring frequencies of a line; a line leaks over 2 / WINDOW_S at most
 _HIGHEST = 0.45  # share of the sampling rate above which a vibration is not used: sampling folds it to a low frequency
 
 
@@ -45,7 +46,7 @@ class LockIn:
         """For each frequency that is held for `FEWEST_WINDOWS` or more: the indices of its windows."""
         held = self.used[self.lowest_Hz[self.used] == self._highest_Hz[self.used]]
         alike = [held[self.lowest_Hz[held] == each_Hz] for each_Hz in np.unique(self.lowest_Hz[held])]
-        return [own for own in alike if len(own) >= FEWEST_WINDOWS]
+        return [windows for windows in alike if len(windows) >= FEWEST_WINDOWS]
 
     def amplitude(self, values: Floats, times: float = 1.0, apart_Hz: float = 0.0) -> Floats:
         """Amplitude of `values` [samples] in each window, [windows], in their unit.

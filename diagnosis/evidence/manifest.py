@@ -16,7 +16,7 @@ from diagnosis.evidence.manifest_keys import ChannelMap, NotNegative, Positive, 
 
 FORMAT = "evidence/1"
 MANIFEST = "manifest.toml"
-# of runs, in any case; what a table is, its first bytes say
+# of runs, in upper or lower case; the first bytes of a table give its format
 RUN_SUFFIXES = (
     ".parquet",
     ".csv",
@@ -35,8 +35,8 @@ RUN_SUFFIXES = (
 )
 _SPRING_ONLY = ("drive_stiffness_N_per_m", "drive_damping_Ns_per_m")
 
-# Highest natural frequency of the mass on a stiffness. Larger values let the plant's step become unstable: the plant refuses the
-# numbers beside, and fits vary mass and stiffness within their tolerances. Smaller values would refuse stiff rigs.
+# Highest natural frequency of the mass on a stiffness. Larger: the plant's step becomes unstable in fits, which vary mass and
+# stiffness within their tolerances; the plant refuses such numbers. Smaller: stiff rigs are refused.
 _FASTEST_RAD_PER_S = {
     "contact_stiffness_N_per_m": 9e4,  # the plant refuses 1e5, the inverse of its step; 7.2e3 on the paper's rig
     "drive_stiffness_N_per_m": 3e4,  # the plant refuses 3.14e4; 88 on the paper's rig
@@ -53,9 +53,10 @@ class RigTable(Strict):
         description="torsion: a rig that turns; every number in N m, rad and kg m2 in place of N, m and kg."
     )
     radius_m: Positive | None = Field(
-        default=None, description='With drive = "torsion": where its numbers are told in N and m; 1 if not given.'
+        default=None,
+        description='With drive = "torsion": at this radius its numbers are given in N and m; 1 if not given.',
     )
-    mass_kg: Positive = Field(description="Left out, what the runs show.")
+    mass_kg: Positive = Field(description="If not given, the mass that the runs show.")
     drive_stiffness_N_per_m: Positive | None = Field(default=None, description='With drive = "spring" only.')
     drive_damping_Ns_per_m: NotNegative | None = Field(default=None, description='With drive = "spring" only.')
     contact_stiffness_N_per_m: Positive
@@ -65,7 +66,7 @@ class RigTable(Strict):
     static_force_N: Positive
     stribeck_velocity_mps: Positive
     force_per_current_N_per_A: Positive | None = Field(
-        default=None, description='With drive = "force": of the motor, where motor_current_A stands for the force.'
+        default=None, description='With drive = "force": of the motor, where motor_current_A replaces the force.'
     )
     tolerance: dict[str, float] = Field(
         default={}, description="One standard deviation, relative; a number without a tolerance is known exactly."
@@ -83,7 +84,7 @@ class RigTable(Strict):
             raise ValueError('radius_m: unknown without drive = "torsion"; remove it, or set drive = "torsion"')
         if self.force_per_current_N_per_A is not None and self.drive != "force":
             raise ValueError(
-                'force_per_current_N_per_A: unknown without drive = "force"; the force of a spring is not that of its motor'
+                'force_per_current_N_per_A: unknown without drive = "force"; the force of a spring is not the force of its motor'
             )
         if self.static_force_N < self.coulomb_force_N:
             raise ValueError(
@@ -129,8 +130,8 @@ class RunTable(Strict):
     holdout: bool = False
     from_s: NotNegative = Field(default=0.0, description="Where the run begins, since the first sample of its file.")
     until_s: Positive | None = Field(default=None, description="Where it ends; the end of the file if not given.")
-    tare_N: float = Field(default=0.0, description="What the force sensor shows where no force acts; taken off.")
-    normal_load_N: Positive | None = Field(default=None, description="Constant, where no column tells it.")
+    tare_N: float = Field(default=0.0, description="Reading of the force sensor without a force; subtracted.")
+    normal_load_N: Positive | None = Field(default=None, description="Constant, where no column gives it.")
     channels: dict[str, ChannelMap] = Field(default={}, description="Of this run, where they differ from [channels].")
 
     @property
@@ -179,8 +180,8 @@ class Manifest(Strict):
         for run, name in zip(self.run, names, strict=True):
             if counts[name] > 1:
                 raise ValueError(
-                    f"run.file = {run.file!r}: {counts[name]} runs are called {name!r}; each run has a file of its own, "
-                    "and goes by its name without the suffix: rename one, or tell their stretches by from_s and until_s"
+                    f"run.file = {run.file!r}: {counts[name]} runs are called {name!r}; each run needs another file, "
+                    "as its name without the suffix identifies it: rename one, or give their stretches by from_s and until_s"
                 )
         _refuse_overlap(self.run)
         if all(run.holdout for run in self.run):
@@ -189,7 +190,7 @@ class Manifest(Strict):
 
 
 def _refuse_overlap(runs: list[RunTable]) -> None:
-    """Raise ValueError where two runs share a stretch of a file: what is held out must not be fitted."""
+    """Raise ValueError where two runs share a stretch of a file: a held-out stretch must not be fitted."""
     ordered = sorted(runs, key=lambda run: (run.file, run.from_s))
     for run, after in pairwise(ordered):
         if run.file == after.file and after.from_s < (math.inf if run.until_s is None else run.until_s):
@@ -200,7 +201,7 @@ def _refuse_overlap(runs: list[RunTable]) -> None:
 
 
 def check_folder(folder: Path) -> None:
-    """Raise Fault BAD_EVIDENCE where `folder` is no folder."""
+    """Raise Fault BAD_EVIDENCE where `folder` is not a folder."""
     try:
         what = "" if folder.is_dir() else "no folder" if folder.exists() else "no such folder"
     except OSError as error:
@@ -222,7 +223,7 @@ def described(folder: Path, mass_kg: float | None = None) -> tuple[Manifest, lis
 
     Args:
         folder: with the manifest.
-        mass_kg: what the runs show, for a manifest without a mass.
+        mass_kg: the mass that the runs show, for a manifest without a mass.
 
     """
     if shown(folder) != str(folder):

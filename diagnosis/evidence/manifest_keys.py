@@ -17,7 +17,7 @@ USUAL = (
     "vibration_frequency_Hz",
     "vibration_amplitude_m",
 )
-# what some rigs measure besides
+# further columns that some rigs measure
 BESIDE = ("mass_velocity_mps", "drive_velocity_mps", "normal_load_N", "other_force_N", "motor_current_A")
 STANDARD = (*USUAL, *BESIDE)
 # The upper limit is far above any rig, and low enough that no product of such numbers overflows.
@@ -31,7 +31,7 @@ class ChannelMap(Strict):
     column: Annotated[str, Field(min_length=1)] = Field(description="Its name, or its number, from 1 on.")
     scale: float | None = Field(default=None, description="To SI; if not given, from the unit of the column.")
     offset: float = Field(default=0.0, description="In SI.")
-    unit: str = Field(default="", description="Of the column, such as mm or kN, where its name does not say it.")
+    unit: str = Field(default="", description="Of the column, such as mm or kN, where its name does not state it.")
 
     @model_validator(mode="before")
     @classmethod
@@ -45,7 +45,7 @@ class ChannelMap(Strict):
     @model_validator(mode="after")
     def _unit_is_known(self) -> "ChannelMap":
         if self.unit and known_unit(self.unit) is None:
-            raise ValueError(f"unit = {self.unit!r}: is none that is known here, such as mm, kN, g or ms; give a scale")
+            raise ValueError(f"unit = {self.unit!r}: must be a known unit, such as mm, kN, g or ms; else give a scale")
         if self.unit and self.scale is not None:
             raise ValueError("scale and unit: must be one of them; remove the other")
         return self
@@ -53,7 +53,7 @@ class ChannelMap(Strict):
     @model_validator(mode="after")
     def _scale_is_not_zero(self) -> "ChannelMap":
         if self.scale == 0.0:
-            raise ValueError("scale = 0: must not be 0, it would erase the column; 1 keeps it as it is")
+            raise ValueError("scale = 0: must not be 0, it would erase the column; 1 keeps it unchanged")
         return self
 
 

@@ -31,5 +31,5 @@ def manifest_text(rig: RigTable, runs: list[RunTable], assumed: list[str]) -> st
 
 
 def _value(value: Any) -> str:
-    """A number, a truth value or a text in TOML: JSON has the same form but for DEL; `repr` keeps every digit of a number."""
+    """A number, a truth value or a text in TOML: as in JSON, except DEL; `repr` keeps every digit of a number."""
     return repr(value) if isinstance(value, float) else json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.faults import Fault
 from bridge.log.finding import Finding
 from bridge.tables.one_clock import Sampled, on_one_clock, own_rows, with_own_rows
@@ -14,9 +14,8 @@ from bridge.units import counted
 from diagnosis.evidence.manifest_keys import STANDARD, ChannelMap
 from diagnosis.evidence.sentinels import SMOOTH, without_sentinels
 
-Floats = npt.NDArray[np.float64]
 Columns = dict[str, Floats]
-# what each standard column measures: on a rig of a spring, and on one that turns
+# quantity of each standard column: on a sliding rig, and on a rig that turns
 _MEASURES = {
     "t_s": ("time", "time"),
     "drive_force_N": ("force", "torque"),
@@ -32,7 +31,7 @@ _MEASURES = {
     "other_force_N": ("force", "torque"),
     "motor_current_A": ("current", "current"),
 }
-# Seconds from which a column of times without a unit is no time of a run but of a calendar, by the unit that it is then in
+# Values from which a column of times without a unit counts calendar time, not time of the run, with its unit [s]
 _SINCE_1970 = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3), (1e8, 1.0))
 # Days from 2000 to 2100 as spreadsheets and MATLAB's datenum count them. As seconds they are known by their steps: shorter ones
 # would be rates above 50 kHz, longer ones are less than 0.6 rows a second.
@@ -41,7 +40,7 @@ _DAY_S, _LONGEST_STEP = 86400.0, 2e-5
 
 
 class Mapped(NamedTuple):
-    """The standard columns of a table, [rows] each, in SI units, and what was found and assumed."""
+    """The standard columns of a table, [rows] each, in SI units, with findings and assumptions."""
 
     columns: Columns
     findings: list[Finding]
@@ -52,25 +51,25 @@ def mapped(
 ) -> Mapped:
     """The standard columns that `channels` names.
 
-    The time comes from its column, from `sample_rate_Hz`, or from what the file says itself. `rotary`: the rig turns; None: it is
-    not known, and both N and N m are taken.
+    The time is taken from its column, from `sample_rate_Hz`, or from the clock in the file. `rotary`: the rig turns; None:
+    unknown, and both N and N m are accepted.
 
     Raises Fault BAD_TABLE for a column that is missing, is of another length or of another quantity; CONFIG without a time.
     """
-    found: list[Finding] = []
+    findings: list[Finding] = []
     values = {
-        name: _in_si(table, name, channels[name], found, rotary)
+        name: _in_si(table, name, channels[name], findings, rotary)
         for name in STANDARD
         if name in channels and name != "t_s"
     }
     file = table.path.name
     if "t_s" in channels:
-        t_s = _time(table, channels["t_s"], found)
+        t_s = _time(table, channels["t_s"], findings)
         _same_length(table, channels, values, len(t_s), "the time")
         if with_own_rows(t_s, values):
             t_s, values, moved = on_one_clock(own_rows(t_s, values), file)
-            found += moved
-        return Mapped({"t_s": t_s} | values, table.findings + found)
+            findings += moved
+        return Mapped({"t_s": t_s} | values, table.findings + findings)
     clocks = {name: table.clocks.get(table.find(channels[name].column)) for name in values}
     if sample_rate_Hz is None and values and all(clock is not None for clock in clocks.values()):
         sampled = {
@@ -79,28 +78,28 @@ def mapped(
             if clock is not None
         }
         t_s, values, moved = on_one_clock(sampled, file)
-        return Mapped({"t_s": t_s} | values, table.findings + found + moved)
+        return Mapped({"t_s": t_s} | values, table.findings + findings + moved)
     rate_Hz = sample_rate_Hz or table.sample_rate_Hz
     if rate_Hz is None:
         line = f'{file}: no time: name its column, channels.t_s = "NAME", or add under [source] sample_rate_Hz = 1000.0'
         raise Fault("CONFIG", f"{line} (columns here: {', '.join(table.columns)})")
     if sample_rate_Hz is None:
-        found.append(Finding("assumed", file, f"sample_rate_Hz = {rate_Hz:.9g}, as the file states"))
+        findings.append(Finding("assumed", file, f"sample_rate_Hz = {rate_Hz:.9g}, as the file states"))
     rows = len(next(iter(values.values())))
     _same_length(table, channels, values, rows, "the first channel")
-    return Mapped({"t_s": np.arange(rows) / rate_Hz} | values, table.findings + found)
+    return Mapped({"t_s": np.arange(rows) / rate_Hz} | values, table.findings + findings)
 
 
 def _sampled(times_s: Floats, values: Floats) -> Sampled:
     """A channel without the rows behind its last time, where another one of the file is longer."""
-    there = np.isfinite(times_s)
-    return Sampled(times_s[there], values[there])
+    finite = np.isfinite(times_s)
+    return Sampled(times_s[finite], values[finite])
 
 
 def has_time(table: Table, channels: dict[str, ChannelMap]) -> bool:
-    """Whether a column, the file, or the clocks of all channels tell the time."""
-    own = [table.clocks.get(table.find(channel.column)) is not None for channel in channels.values()]
-    return "t_s" in channels or table.sample_rate_Hz is not None or (bool(own) and all(own))
+    """Whether a column, the file, or the clocks of all channels give the time."""
+    with_clock = [table.clocks.get(table.find(channel.column)) is not None for channel in channels.values()]
+    return "t_s" in channels or table.sample_rate_Hz is not None or (bool(with_clock) and all(with_clock))
 
 
 def _same_length(table: Table, channels: dict[str, ChannelMap], values: Columns, rows: int, what: str) -> None:
@@ -113,16 +112,16 @@ def _same_length(table: Table, channels: dict[str, ChannelMap], values: Columns,
             raise Fault("BAD_TABLE", line)
 
 
-def _in_si(table: Table, name: str, channel: ChannelMap, found: list[Finding], rotary: bool | None) -> Floats:
-    """A channel in its SI unit: by its scale, by the unit of the map, or by that of the file."""
-    values, told = without_sentinels(
+def _in_si(table: Table, name: str, channel: ChannelMap, findings: list[Finding], rotary: bool | None) -> Floats:
+    """A channel in its SI unit: by its scale, by the unit of the map, or by the unit of the file."""
+    values, outliers = without_sentinels(
         table.column(channel.column), f"{table.path.name}: column {channel.column}", name in SMOOTH
     )
-    found += told
-    return values * _factor(table, name, channel, found, rotary) + channel.offset
+    findings += outliers
+    return values * _factor(table, name, channel, findings, rotary) + channel.offset
 
 
-def _factor(table: Table, name: str, channel: ChannelMap, found: list[Finding], rotary: bool | None) -> float:
+def _factor(table: Table, name: str, channel: ChannelMap, findings: list[Finding], rotary: bool | None) -> float:
     if channel.scale is not None:
         return channel.scale
     unit = channel.unit or table.unit(channel.column)
@@ -130,11 +129,9 @@ def _factor(table: Table, name: str, channel: ChannelMap, found: list[Finding], 
     if known is None:
         column = table.find(channel.column)
         stated = in_brackets(column)
-        if stated and not unit:  # an unknown one of a line of units is told where that line is read
-            text = (
-                f"column {column}: {stated!r} is no unit that is known here: taken as it is; a map may say scale = ..."
-            )
-            found.append(Finding("units", f"{table.path.name}: {name}", text))
+        if stated and not unit:  # an unknown unit in a line of units is reported where that line is read
+            text = f"column {column}: {stated!r} is not a known unit: the values are used unscaled; a map may give scale = ..."
+            findings.append(Finding("units", f"{table.path.name}: {name}", text))
         return 1.0
     what, factor = known
     if rotary is False and what == _MEASURES[name][1] != _MEASURES[name][0]:
@@ -145,11 +142,11 @@ def _factor(table: Table, name: str, channel: ChannelMap, found: list[Finding], 
         raise Fault("BAD_TABLE", f"{line}; name another column, or give channels.{name}.scale")
     if factor != 1.0 and not channel.unit:
         text = f"column {channel.column} is in {unit}: times {factor:g} to be in {si_unit(what)}"
-        found.append(Finding("units", f"{table.path.name}: {name}", text))
+        findings.append(Finding("units", f"{table.path.name}: {name}", text))
     return factor
 
 
-def _time(table: Table, channel: ChannelMap, found: list[Finding]) -> Floats:
+def _time(table: Table, channel: ChannelMap, findings: list[Finding]) -> Floats:
     """The time in s, [rows]; a time of the calendar is counted from the first row."""
     times_s, counted_already = table.seconds(channel.column)
     where = f"{table.path.name}: t_s"
@@ -160,18 +157,18 @@ def _time(table: Table, channel: ChannelMap, found: list[Finding]) -> Floats:
             )
         return times_s + channel.offset
     if channel.scale is not None or channel.unit or table.unit(channel.column):
-        return times_s * _factor(table, "t_s", channel, found, None) + channel.offset
+        return times_s * _factor(table, "t_s", channel, findings, None) + channel.offset
     unit_s = calendar_unit_s(times_s)
     if unit_s is None:
-        return times_s * _factor(table, "t_s", channel, found, None) + channel.offset
-    found.append(
+        return times_s * _factor(table, "t_s", channel, findings, None) + channel.offset
+    findings.append(
         Finding("time", where, f"is a time of the calendar in steps of {unit_s:g} s: counted from the first row")
     )
     return (times_s - times_s[np.isfinite(times_s)][0]) * unit_s + channel.offset
 
 
 def calendar_unit_s(times_s: Floats) -> float | None:
-    """The unit in which a column without a unit counts the calendar's time [s]; None where it counts that of a run."""
+    """The unit in which a column without a unit counts calendar time [s]; None where it counts time of the run."""
     finite = times_s[np.isfinite(times_s)]
     if not len(finite):
         return None

@@ -1,15 +1,13 @@
-"""A rig that turns, told as one that slides at a radius: N m, rad and kg m2 become N, m and kg there.
+"""A rig that turns, converted to a rig that slides at a radius: N m, rad and kg m2 become N, m and kg there.
 
 At a radius of 1 m every number keeps its digits.
 """
 
-import numpy as np
-import numpy.typing as npt
-
+from bridge.arrays import Floats
 from bridge.log.finding import Finding
 from diagnosis.evidence.manifest import MANIFEST, RigTable, RunTable
 
-Columns = dict[str, npt.NDArray[np.float64]]
+Columns = dict[str, Floats]
 # power of the radius by which a number of a rig that turns is multiplied
 _POWERS = {
     "mass_kg": -2,
@@ -35,7 +33,7 @@ _POWERS = {
 
 
 def as_sliding(rig: RigTable) -> RigTable:
-    """The rig as one with a spring; `radius_m` says at which radius. A rig that does not turn is returned as it is."""
+    """The rig as one with a spring, at its `radius_m`. A rig that does not turn is returned unchanged."""
     if rig.drive != "torsion":
         return rig
     radius_m = rig.radius_m or 1.0
@@ -58,10 +56,10 @@ def _at(name: str, value: float, radius_m: float) -> float:
 
 
 def told(rig: RigTable) -> list[Finding]:
-    """What a person must know who reads numbers of such a rig."""
+    """A finding that gives the units and the radius of such a rig's numbers."""
     if rig.drive != "torsion":
         return []
-    text = f"turns: told in N, m and kg at a radius of {rig.radius_m or 1.0:g} m" + (
+    text = f"turns: numbers are in N, m and kg at a radius of {rig.radius_m or 1.0:g} m" + (
         ", where they have the digits of N m, rad and kg m2" if (rig.radius_m or 1.0) == 1.0 else ""
     )
     return [Finding("rotary", f"{MANIFEST}: rig.drive", text)]

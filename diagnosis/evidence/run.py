@@ -3,18 +3,14 @@
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
+from bridge.arrays import Floats
 from bridge.log.finding import Finding
 from diagnosis.evidence.exciter_harmonics import Distortion
 from diagnosis.evidence.force_pickup import PickUp
 from diagnosis.evidence.manifest import RigTable
 
-Floats = npt.NDArray[np.float64]
 
-
-class Run(NamedTuple):
+class MeasuredRun(NamedTuple):
     """One measured run. Arrays are [samples], finite, SI units; `t_s` increases."""
 
     file: str
@@ -33,6 +29,6 @@ class Evidence(NamedTuple):
 
     folder: Path
     rig: RigTable
-    runs: tuple[Run, ...]
+    runs: tuple[MeasuredRun, ...]
     findings: tuple[Finding, ...]
-    assumed: tuple[str, ...] = ()  # rig numbers that nobody stated
+    assumed: tuple[str, ...] = ()  # rig numbers that the manifest leaves out

@@ -3,15 +3,15 @@
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.faults import Fault
 from bridge.log.damage import damage_findings
 from bridge.log.finding import Finding
 from bridge.log.logfile import RunData, block_period_ns, read_run, sample_times_s
 from bridge.tables.export import CHANNELS
 
-Columns = dict[str, npt.NDArray[np.float64]]
+Columns = dict[str, Floats]
 
 
 def columns_of_log(path: Path) -> tuple[Columns, list[Finding]]:
@@ -35,7 +35,7 @@ def columns_of_log(path: Path) -> tuple[Columns, list[Finding]]:
     return columns, damage_findings(run.damage, path)
 
 
-def _commanded(run: RunData) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+def _commanded(run: RunData) -> tuple[Floats, Floats]:
     """Frequency and amplitude in force during each block, [blocks]; 0 before the first command."""
     block = run.sensors["sequence"]
     # The rig's own log of the applied commands comes first; else the command that answers the block before, as in lockstep.
@@ -49,5 +49,5 @@ def _commanded(run: RunData) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.fl
     blocks = run.command["block"][order]
     at = np.minimum(np.searchsorted(blocks, answered), len(blocks) - 1)
     known = blocks[at] == answered
-    found = run.command[order][at]
-    return np.where(known, found["frequency_Hz"], 0.0), np.where(known, found["amplitude_m"], 0.0)
+    commands = run.command[order][at]
+    return np.where(known, commands["frequency_Hz"], 0.0), np.where(known, commands["amplitude_m"], 0.0)

@@ -1,28 +1,28 @@
-"""Values of a column that are no measurement: what a program writes where it has none."""
+"""Sentinels in a column: values that a program writes in place of a missing measurement."""
 
 import re
 
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.log.finding import Finding
 from bridge.units import counted
 
-Floats = npt.NDArray[np.float64]
-# Spreads (from the 5th to the 95th percentile) from the median, from which a value is none; -9999 and its like, and one that
-# comes again and again, as full scale does. A slip moves a force or a position by a few.
+# Distance from the median, in spreads (5th to 95th percentile), from which a value is a sentinel; the second for -9999 and the
+# like, and for a repeated value such as full scale. A slip moves a force or a position by a few spreads.
 _FAR, _FAR_ALIKE = 1000.0, 20.0
-_LARGEST = 1e20  # 1e30 and the largest of float32 stand for none
+_LARGEST = 1e20  # 1e30 and the largest float32 mean "no value"
 _NINES = re.compile(r"0*9{3,}0*")
-# that show no spikes. An acceleration has them, and at rest its spread is that of its noise
+# columns without spikes. An acceleration has spikes, and at rest its spread is only noise
 SMOOTH = ("drive_force_N", "mass_position_m", "drive_position_m", "normal_load_N", "other_force_N")
 
 
 def without_sentinels(values: Floats, where: str, smooth: bool) -> tuple[Floats, list[Finding]]:
-    """A column with NaN for what is no measurement, [rows].
+    """A column with NaN in place of sentinels, [rows].
 
     Args:
-        values: as they are in the file.
+        values: as read from the file.
         where: file and column, for the finding.
         smooth: the column shows no spikes.
 
@@ -38,8 +38,8 @@ def without_sentinels(values: Floats, where: str, smooth: bool) -> tuple[Floats,
         far = _leaps(small, away > _FAR_ALIKE * spread, 0.5 * _FAR_ALIKE * spread)
         if smooth:
             bad |= far & (away > _FAR * spread)
-        found, times = np.unique(values[~bad & far], return_counts=True)
-        for value, again in zip(found.tolist(), (times > 1).tolist(), strict=True):
+        numbers, times = np.unique(values[~bad & far], return_counts=True)
+        for value, again in zip(numbers.tolist(), (times > 1).tolist(), strict=True):
             if (smooth and again) or _NINES.fullmatch(f"{abs(value):.6f}".replace(".", "")):
                 bad |= far & (values == value)
     rows = np.flatnonzero(bad)
@@ -50,7 +50,7 @@ def without_sentinels(values: Floats, where: str, smooth: bool) -> tuple[Floats,
 
 
 def _leaps(values: Floats, far: npt.NDArray[np.bool_], least: float) -> npt.NDArray[np.bool_]:
-    """Of the stretches that are far away those of one number that is leapt to and from, as no motion is.
+    """Marks stretches of one constant far value that begin and end with a jump, [rows]; no motion does that.
 
     A slide that rests for long and then moves goes far, too.
     """

@@ -4,13 +4,12 @@ A drive that moves evenly pulls with F = k (s - x). So F'' = -k x'' in every sli
 """
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
-Floats = npt.NDArray[np.floating[Any]]
+from bridge.arrays import Floats
+
 _BIN_S = 1e-3
 # Standard deviation of the smoothing. Too small: noise; too large: slips are lost. A slip on the paper's spring takes about
 # 40 ms, and 4 ms leave most of its acceleration.
@@ -18,7 +17,7 @@ _SMOOTH_BINS = 4.0
 _BESIDE_BINS = 61  # around a vibration that are left out: its remainder in a mean over 1 ms is as large as a slip
 _FEWEST_BINS = 500  # that a run needs; a stiffness from fewer bins is noise
 # Smallest correlation of force and acceleration for which a stiffness is returned. Too small: runs without slips, noise against
-# noise, give a false stiffness. Too large: wrong signs and units stay unseen. Counted: docs/method/evidence.md.
+# noise, give a false stiffness. Too large: wrong signs and units stay unseen. Counted: docs/method/diagnosis.md.
 _LEAST_CORRELATION = 0.9
 
 

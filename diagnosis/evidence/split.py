@@ -1,21 +1,21 @@
-"""One long run as two parts: one to fit and one to judge on, where nobody marks a run."""
+"""One long run as two parts: one to fit and one to judge on, where the manifest marks no run."""
 
 import math
 
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.log.finding import Finding
-from diagnosis.evidence.run import Run
+from diagnosis.evidence.run import MeasuredRun
 
-Floats = npt.NDArray[np.float64]
 _SHORTEST_S = 12.0  # of a run that is split: a third of it must hold some slips
 _WINDOW_S = 0.1  # over which speed and vibration count as one condition
 _PARTS = 3  # the part to judge on is one of them
 
 
-def split(run: Run) -> tuple[list[Run], list[Finding]]:
-    """The run as parts, one of which is held out, and a finding that says which; the run as it is where it is short.
+def split(run: MeasuredRun) -> tuple[list[MeasuredRun], list[Finding]]:
+    """The run in parts, one of them held out, and a finding that names it; a short run unchanged.
 
     Held out is the third whose speeds and vibrations occur most in the rest; among equals the last one.
     """
@@ -28,7 +28,7 @@ def split(run: Run) -> tuple[list[Run], list[Finding]]:
     common = [_common(condition[part == held], condition[part != held]) for held in range(_PARTS)]
     held = max(range(_PARTS), key=lambda i: (round(common[i], 2), i))
     first_s, last_s = (edges_s[held : held + 2] - run.t_s[0]).tolist()
-    until_s = last_s if held < _PARTS - 1 else math.inf  # the last sample is no stretch of its own
+    until_s = last_s if held < _PARTS - 1 else math.inf  # the last sample is not a separate stretch
     stretches = [(0.0, first_s), (first_s, until_s), (until_s, math.inf)]
     parts = [
         cut(run, begin_s, end_s)._replace(holdout=number == 1)
@@ -42,16 +42,18 @@ def split(run: Run) -> tuple[list[Run], list[Finding]]:
     return parts, [Finding("holdout", run.file, text)]
 
 
-def cut(run: Run, from_s: float, until_s: float) -> Run:
+def cut(run: MeasuredRun, from_s: float, until_s: float) -> MeasuredRun:
     """The stretch of a run, in seconds since its first sample; it goes by its stretch."""
     since_s = run.t_s - run.t_s[0]
-    own = (since_s >= from_s) & (since_s < until_s)
+    inside = (since_s >= from_s) & (since_s < until_s)
     stem, dot, suffix = run.file.rpartition(".")
     name = f"{stem}-{from_s:.4g}-to-{min(until_s, float(since_s[-1])):.4g}s{dot}{suffix}"
-    return run._replace(file=name, t_s=run.t_s[own], columns={key: values[own] for key, values in run.columns.items()})
+    return run._replace(
+        file=name, t_s=run.t_s[inside], columns={key: values[inside] for key, values in run.columns.items()}
+    )
 
 
-def _conditions(run: Run) -> tuple[npt.NDArray[np.int64], Floats]:
+def _conditions(run: MeasuredRun) -> tuple[npt.NDArray[np.int64], Floats]:
     """A number for the speed and the vibration in each window of 0.1 s, and the windows' instants, [windows]."""
     at_s = np.arange(run.t_s[0], run.t_s[-1], _WINDOW_S)
     first = np.searchsorted(run.t_s, at_s)
@@ -71,9 +73,9 @@ def _conditions(run: Run) -> tuple[npt.NDArray[np.int64], Floats]:
 
 
 def _common(held: npt.NDArray[np.int64], rest: npt.NDArray[np.int64]) -> float:
-    """Share of what was held out whose condition the rest has as often."""
+    """Share of the held-out windows whose condition occurs as often in the rest."""
     if not len(held) or not len(rest):
         return 0.0
     keys, counts = np.unique(held, return_counts=True)
     share = counts / len(held)
-    return float(sum(min(own, float((rest == key).mean())) for key, own in zip(keys, share, strict=True)))
+    return float(sum(min(part, float((rest == key).mean())) for key, part in zip(keys, share, strict=True)))

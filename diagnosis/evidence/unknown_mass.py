@@ -1,13 +1,12 @@
 """The mass that the runs show, for an owner who cannot weigh it."""
 
 import numpy as np
-import numpy.typing as npt
 from scipy.signal import savgol_filter
 
+from bridge.arrays import Floats
 from diagnosis.evidence.manifest import RigTable, RunTable
-from diagnosis.look.look import Known, look
+from diagnosis.look.look import RecordFacts, look
 
-Floats = npt.NDArray[np.float64]
 Columns = dict[str, Floats]
 _WINDOW_S = 0.03  # of the cubic that smooths a position before it is differentiated twice
 _SLOW = 0.1  # of the fastest speed: below it the friction turns, and no line explains the force
@@ -20,13 +19,15 @@ def shown_mass_kg(rig: RigTable, table: RunTable, columns: Columns) -> float | N
         return None
     if rig.drive == "force":
         return _accelerated(force_N, columns)
-    seen = look(columns["t_s"], force_N, columns.get("drive_position_m"), Known(speed_mps=table.drive_velocity_mps))
+    seen = look(
+        columns["t_s"], force_N, columns.get("drive_position_m"), RecordFacts(speed_mps=table.drive_velocity_mps)
+    )
     number = None if seen is None else seen.numbers.get("mass_kg")
     return None if number is None or not 0.0 < number.low < number.value else number.value
 
 
 def _accelerated(force_N: Floats, columns: Columns) -> float | None:
-    """Force over acceleration beside a friction of two directions that rises with the speed."""
+    """Force over acceleration, fitted together with a friction of two directions that rises with the speed."""
     step_s = float(np.median(np.diff(columns["t_s"])))
     window = max(2 * round(0.5 * _WINDOW_S / step_s) + 1, 5)
     position_m, accel = columns.get("mass_position_m"), columns.get("mass_accel_mps2")

@@ -1,6 +1,6 @@
-"""What to measure or to check next.
+"""The next run to measure, or the next check by hand.
 
 candidate_runs   runs that could be measured next
 proposal         which of these runs separates the two leading explanations
-checks_by_hand   what a person can check without a run
+checks_by_hand   checks by hand, without a run
 """

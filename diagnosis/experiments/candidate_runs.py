@@ -26,7 +26,7 @@ _WATCHED_S = 10.0  # effort, in seconds of a run, that a run far outside the use
 _SHIFT_M = 3.7e-3
 
 
-class Step(NamedTuple):
+class ConstantSpeed(NamedTuple):
     """A stretch of constant command."""
 
     seconds: float
@@ -38,14 +38,14 @@ class Step(NamedTuple):
 class Plan(NamedTuple):
     """One run that could be measured."""
 
-    what: str  # the instruction for a person
-    steps: tuple[Step, ...]
+    what: str  # the instruction for the operator
+    steps: tuple[ConstantSpeed, ...]
     shift_m: float = 0.0  # start of the run, from the start of an earlier run
     beyond: bool = False  # whether the speed is far outside those used, so that the rig may behave in a new way
 
     @property
     def effort_s(self) -> float:
-        """Duration of the run, and `_WATCHED_S` more where a person has to watch the rig."""
+        """Duration of the run, and `_WATCHED_S` more where the operator has to watch the rig."""
         return sum(step.seconds for step in self.steps) + (_WATCHED_S if self.beyond else 0.0)
 
 
@@ -60,7 +60,7 @@ def plans(problem: Problem) -> list[Plan]:
         length_s[speed] = length_s.get(speed, 0.0) + (segment.last - segment.first) * BLOCK_S
     usual = max(length_s, key=lambda speed: length_s[speed])
     cycle_m = _cycle_m(problem.rig, problem.scales)
-    found: list[Plan] = []
+    result: list[Plan] = []
     slowest, fastest = min(length_s), max(length_s)
     seen_m = max(abs(segment.drive_velocity_mps) * (segment.last - segment.first) * BLOCK_S for segment in used)
     for speed, beyond in ((0.2 * slowest, True), (0.5 * slowest, False), (2.0 * fastest, False), (5.0 * fastest, True)):
@@ -68,32 +68,32 @@ def plans(problem: Problem) -> list[Plan]:
         seconds = max(travel_m / speed, min(_SHORTEST_S, _FARTHEST_M / speed), _LEAST_S)
         if seconds <= _LONGEST_S and _LEAST_S * speed <= max(_FARTHEST_M, seen_m):
             what = f"Drag at {_speed(speed)} for {seconds:.2g} s without vibration."
-            found.append(Plan(what, (Step(seconds, speed),), beyond=beyond))
+            result.append(Plan(what, (ConstantSpeed(seconds, speed),), beyond=beyond))
     some_s = max(_travel_m(problem.scales, 2.0 * cycle_m) / usual, 2.0)
     if some_s * 3.0 <= _LONGEST_S:
-        found += _others(usual, some_s, cycle_m)
-    found += _vibrations(used, usual, 2.0 * cycle_m / usual + 1.0)
-    return found
+        result += _others(usual, some_s, cycle_m)
+    result += _vibrations(used, usual, 2.0 * cycle_m / usual + 1.0)
+    return result
 
 
 def _others(usual: float, some_s: float, cycle_m: float) -> list[Plan]:
     again_s = max(2.0 * cycle_m / usual, 1.0)
-    holds = [step for hold_s in _HOLDS_S for step in (Step(hold_s, 0.0), Step(again_s, usual))]
+    holds = [step for hold_s in _HOLDS_S for step in (ConstantSpeed(hold_s, 0.0), ConstantSpeed(again_s, usual))]
     dwells = ", ".join(f"{hold_s:g}" for hold_s in _HOLDS_S)
-    back = (Step(some_s, usual), Step(some_s, -usual))
+    back = (ConstantSpeed(some_s, usual), ConstantSpeed(some_s, -usual))
     return [
         Plan(
             f"Drag at {_speed(usual)}, hold the drive for {dwells} s in turn, and drag on after each.",
-            (Step(some_s, usual), *holds),
+            (ConstantSpeed(some_s, usual), *holds),
         ),
         Plan(f"Drag at {_speed(usual)} for {some_s:.0f} s, then back for {some_s:.0f} s.", back),
         Plan(
             f"Drag at {_speed(usual)} for {some_s:.0f} s, go back, wait 10 s, and drag along the same track again.",
-            (*back, Step(10.0, 0.0), Step(some_s, usual)),
+            (*back, ConstantSpeed(10.0, 0.0), ConstantSpeed(some_s, usual)),
         ),
         Plan(
             f"Drag at {_speed(usual)} for {some_s:.0f} s from a start {_SHIFT_M * 1e3:.1f} mm further on.",
-            (Step(some_s, usual),),
+            (ConstantSpeed(some_s, usual),),
             _SHIFT_M,
         ),
     ]
@@ -114,19 +114,19 @@ def _vibrations(used: list[Segment], usual: float, each_s: float) -> list[Plan]:
     return [
         Plan(
             f"Drag at {_speed(usual)} with {amplitude_m * 1e9:.3g} nm at {told_Hz} kHz, {each_s:.1f} s each.",
-            tuple(Step(each_s, usual, frequency_Hz, amplitude_m) for frequency_Hz in frequencies),
+            tuple(ConstantSpeed(each_s, usual, frequency_Hz, amplitude_m) for frequency_Hz in frequencies),
         ),
         Plan(
             f"Drag at {_speed(usual)} with {told_m} nm at {0.5 * highest_Hz * 1e-3:.3g} kHz, {each_s:.1f} s each.",
-            tuple(Step(each_s, usual, 0.5 * highest_Hz, value_m) for value_m in amplitudes),
+            tuple(ConstantSpeed(each_s, usual, 0.5 * highest_Hz, value_m) for value_m in amplitudes),
         ),
     ]
 
 
 def as_run(problem: Problem, plan: Plan, point: Point) -> Prepared:
-    """The plan as a prepared run that measures what the model at `point` predicts.
+    """The plan as a prepared run that measures the prediction of the model at `point`.
 
-    Its channels are those of the measured run that has most, with an exciter if the plan needs one.
+    It has the channels of the measured run with the most channels, with an exciter if the plan needs one.
     """
     with_exciter = any(step.frequency_Hz > 0.0 for step in plan.steps)
     template = max(

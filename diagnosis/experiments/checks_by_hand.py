@@ -1,4 +1,4 @@
-"""What to do by hand where no run of the rig tells two explanations apart: one look, one weight or one tap."""
+"""Checks by hand where no run of the rig separates two explanations: one look, one weight or one tap."""
 
 from typing import Final
 
@@ -6,20 +6,20 @@ from diagnosis.hypotheses.catalogue import CATALOGUE
 from diagnosis.hypotheses.catalogue_row import FRAME, SPEEDS, SWEEP, TAP, TRACK, WEIGHT
 from plant.effects.library import EFFECTS
 
-UNCOUPLE = "Uncouple the drive from the mass and vibrate: what the force signal still shows is not force."
+UNCOUPLE = "Uncouple the drive from the mass and vibrate: any vibration left in the force signal is not force."
 SINE = "Halve the piezo's voltage, then tighten its mount: harmonics of a drive too hard or loose fall faster than the vibration."
 _FORCES = "Move the axis to and fro at 0.2, 1 and 5 times the present speeds, from other positions, with rests of 1, 10 and 60 s."
 _BY_PLACE: Final = {"sensor": WEIGHT, "drive": TAP, "structure": FRAME, "piezo": SWEEP, "friction": SPEEDS}
 
 
 def advice(effects: tuple[str, ...], drive: str) -> str:
-    """A physical check that separates these effects; with `drive` "force" friction is told apart by other motions."""
+    """A physical check that separates these effects; with `drive` "force" other motions separate effects of friction."""
     for a in effects:
         for b in effects:
             check = CATALOGUE[a].check_against.get(b) or CATALOGUE[b].check_against.get(a)
             if check is not None and not (drive == "force" and check in {TRACK, SPEEDS}):
                 return check
-    # what is checked at one part alone comes before what needs runs
+    # checks at a single part come before checks that need runs
     for places in (("sensor",), ("piezo", "structure", "drive"), ("friction",)):
         for name in effects:
             place = EFFECTS[name].acts_on

@@ -1,15 +1,16 @@
-"""Which run to measure next: the shortest that surely separates the two leading explanations, or the one that separates most.
+"""The next run to measure: the shortest that separates the two leading explanations decisively, or the best separation.
 
 Both explanations predict every run that could be measured. The difference counts in noise floors, and only the part that
-neither explanation can imitate by moving what the present runs leave uncertain: rig numbers, sensors and its own parameters.
+neither explanation can imitate by moving numbers that the present runs leave uncertain: rig, sensors and its own parameters.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.units import signal_name
 from diagnosis.experiments.candidate_runs import Plan, as_run, plans
 from diagnosis.experiments.checks_by_hand import advice
@@ -22,7 +23,6 @@ from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.result import Experiment
 from plant.effects.library import EFFECTS
 
-Floats = npt.NDArray[np.floating[Any]]
 # Replicates for a first look, and for a judgement. Fewer: the floor of the imagined run is uncertain. More: time.
 _FEW, _SOME = 2, 6
 # Separation, in standard deviations, that is enough. Smaller: an unsure run is proposed. Larger: longer runs for no more
@@ -67,7 +67,7 @@ def next_experiment(problem: Problem, nuisances: Nuisances, leaders: list[Fit]) 
     names = tuple(dict.fromkeys((*first.hypothesis.effects, *second.hypothesis.effects)))
     both = f"{_name(first)} and {_name(second)}"
     if problem.rig.drive == "force":
-        return Experiment(advice(names, "force"), f"Of what was tried, {both} explain these runs best.", None)
+        return Experiment(advice(names, "force"), f"Of all tried explanations, {both} fit these runs best.", None)
     # how far the two fits are apart in the present runs
     present = float(np.linalg.norm(first.residual - second.residual))
     best = _best(problem, nuisances, first, second)
@@ -78,18 +78,16 @@ def next_experiment(problem: Problem, nuisances: Nuisances, leaders: list[Fit]) 
             else f"no run separates them by more than {best.separation:.1f} standard deviations"
         )
         return Experiment(advice(names, "spring"), f"{both} look alike: {most}: this is a check by hand.", None)
-    there = f"{best.separation:.1f} standard deviations, most in {_in_words(best.feature)}"
+    separation = f"{best.separation:.1f} standard deviations, most in {_in_words(best.feature)}"
     if present > _DECISIVE:
         why = (
             f"{both} differ by {present:.1f} standard deviations in the present runs already; "
-            f"a run like this would confirm it, with {there}."
+            f"a run like this would confirm it, with {separation}."
         )
     elif present > best.separation:
-        why = (
-            f"{both} differ by {present:.1f} standard deviations in the present runs; there it would again be {there}."
-        )
+        why = f"{both} differ by {present:.1f} standard deviations in the present runs; there it would again be {separation}."
     else:
-        why = f"There {both} differ by {there}; in the present runs by {present:.1f}."
+        why = f"There {both} differ by {separation}; in the present runs by {present:.1f}."
     return Experiment(best.plan.what, why, best.separation)
 
 
@@ -125,18 +123,20 @@ class _Imagined:
 
     def __init__(self, problem: Problem, nuisances: Nuisances, plan: Plan, first: Fit, second: Fit, count: int) -> None:
         self._nuisances = nuisances
-        here, there = (nuisances.point(fit.deviations, fit.effects) for fit in (first, second))
-        self.problem = Problem(problem.rig, [as_run(problem, plan, here)])
-        drawn = replicates(self.problem, here, ROUGHNESS, count, 3, perhaps=(here, there))
-        self.floor: Floor = floor_of(self.problem, here, drawn)
-        expected, other = self._expected([here, there])
+        first_point, second_point = (nuisances.point(fit.deviations, fit.effects) for fit in (first, second))
+        self.problem = Problem(problem.rig, [as_run(problem, plan, first_point)])
+        drawn = replicates(self.problem, first_point, ROUGHNESS, count, 3, perhaps=(first_point, second_point))
+        self.floor: Floor = floor_of(self.problem, first_point, drawn)
+        expected, other = self._expected([first_point, second_point])
         self.apart = np.where(np.isfinite(other - expected), other - expected, _MISSING)
         """How far the second explanation is from the first, in floors [compared]."""
 
     def _expected(self, points: list[Point]) -> list[Floats]:
         """The expected features at every point, in floors [compared]."""
-        found = self.problem.predicted_many(points)
-        return [(self.floor.expected(one) / self.floor.scatter)[self.floor.compared] for one in found]
+        predictions = self.problem.predicted_many(points)
+        return [
+            (self.floor.expected(prediction) / self.floor.scatter)[self.floor.compared] for prediction in predictions
+        ]
 
     def columns(self, fit: Fit, which: npt.NDArray[np.int64]) -> Floats:
         """Derivatives of the expected features with respect to some parameters of a fit, in floors [compared, which].
@@ -146,16 +146,16 @@ class _Imagined:
             which: indices into nuisances, then the hypothesis' coordinates.
 
         """
-        own = len(fit.deviations)
+        nuisances = len(fit.deviations)
         at = np.concatenate([fit.deviations, fit.w])
-        steps = [(_STEP if i < own else _STEP_OF_EFFECT) * (-1.0 if at[i] > 0.0 else 1.0) for i in which.tolist()]
+        steps = [(_STEP if i < nuisances else _STEP_OF_EFFECT) * (-1.0 if at[i] > 0.0 else 1.0) for i in which.tolist()]
         ahead = [at, *(at + step * (np.arange(len(at)) == i) for i, step in zip(which.tolist(), steps, strict=True))]
-        here, *there = self._expected(
-            [self._nuisances.point(one[:own], fit.hypothesis.tables(one[own:])) for one in ahead]
+        base, *moved = self._expected(
+            [self._nuisances.point(vector[:nuisances], fit.hypothesis.tables(vector[nuisances:])) for vector in ahead]
         )
-        columns = [(one - here) / step for one, step in zip(there, steps, strict=True)]
+        columns = [(features - base) / step for features, step in zip(moved, steps, strict=True)]
         columns = [np.where(np.isfinite(column), column, 0.0) for column in columns]
-        return np.column_stack(columns) if columns else np.zeros((len(here), 0))
+        return np.column_stack(columns) if columns else np.zeros((len(base), 0))
 
 
 def _first_look(problem: Problem, nuisances: Nuisances, plan: Plan, first: Fit, second: Fit) -> _Look | None:

@@ -5,24 +5,23 @@ of 95 kg. A model that is led along the measured motion cannot drift. The force 
 friction or gain shows where it acts.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import minimize
 from scipy.signal import savgol_filter
 
+from bridge.arrays import Floats
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.grid import BLOCK_S
 
-Floats = npt.NDArray[np.floating[Any]]
 # Blocks over which a cubic smooths the position. Too small: noise of the encoder; too large: reversals are smeared.
 # With 31 blocks, 0.2 um of encoder noise give 1e-5 m/s and 1e-3 m/s^2.
 _WINDOW = 31
 _EVERY = 5  # blocks from one sample to the next in the search for zero and speed; fewer blocks only cost time
 
 
-class Motion(NamedTuple):
+class SlideMotion(NamedTuple):
     """Motion of the slide, [blocks] each, at the start of each block as a sampled control has it.
 
     Velocity, acceleration and inertia are smoothed; they only sort the blocks into bins.
@@ -34,7 +33,7 @@ class Motion(NamedTuple):
     inertia_N: Floats  # force that accelerates the mass of the rig table
 
 
-def motion_of(signals: dict[str, Floats], samples_per_block: float, rig: RigTable) -> Motion:
+def motion_of(signals: dict[str, Floats], samples_per_block: float, rig: RigTable) -> SlideMotion:
     """The motion of a reduced run, from its position; from its acceleration where no position was measured.
 
     Args:
@@ -51,7 +50,7 @@ def motion_of(signals: dict[str, Floats], samples_per_block: float, rig: RigTabl
         position = np.interp(at - 0.5, at, position)
     velocity = np.asarray(savgol_filter(position, _WINDOW, 3, deriv=1, delta=BLOCK_S), np.float64)
     accel = np.asarray(savgol_filter(position, _WINDOW, 3, deriv=2, delta=BLOCK_S), np.float64)
-    return Motion(position, velocity, accel, rig.mass_kg * accel)
+    return SlideMotion(position, velocity, accel, rig.mass_kg * accel)
 
 
 def _from_acceleration(accel_mps2: Floats, force_N: Floats, rig: RigTable) -> Floats:
@@ -62,17 +61,17 @@ def _from_acceleration(accel_mps2: Floats, force_N: Floats, rig: RigTable) -> Fl
     """
     gone_mps = np.cumsum(accel_mps2) * BLOCK_S
     time = np.arange(len(gone_mps)) / len(gone_mps)
-    some = slice(None, None, _EVERY)
-    left_N = (force_N - rig.mass_kg * (accel_mps2 - accel_mps2.mean()))[some]
+    thinned = slice(None, None, _EVERY)
+    left_N = (force_N - rig.mass_kg * (accel_mps2 - accel_mps2.mean()))[thinned]
 
     def rest(line: Floats) -> float:
-        v = gone_mps[some] - line[0] - line[1] * time[some]
+        v = gone_mps[thinned] - line[0] - line[1] * time[thinned]
         friction_N = rig.coulomb_force_N * np.tanh(v / rig.stribeck_velocity_mps) + rig.viscous_damping_Ns_per_m * v
         return float(np.var(left_N - friction_N))
 
     slope, start = np.polyfit(time, gone_mps, 1)
     size = max(float(np.std(gone_mps - start - slope * time)), rig.stribeck_velocity_mps)
     corners = np.array([[start, slope], [start + size, slope], [start, slope + size]])
-    found = minimize(rest, corners[0], method="Nelder-Mead", options={"initial_simplex": corners})
-    line = np.asarray(found.x)
+    optimum = minimize(rest, corners[0], method="Nelder-Mead", options={"initial_simplex": corners})
+    line = np.asarray(optimum.x)
     return np.cumsum(gone_mps - line[0] - line[1] * time) * BLOCK_S

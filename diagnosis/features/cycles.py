@@ -1,13 +1,12 @@
 """Slips of a force record: breakaways, re-sticks, and their means over a run."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Floats
 from diagnosis.look.turns import turns
-
-Floats = npt.NDArray[np.floating[Any]]
 
 # Seconds over which samples are averaged first. Too small: noise; too large: the peaks of a slip are cut.
 # A slip of the paper's rig lasts pi sqrt(m / k_d) = 36 ms and its peaks are round: 1 ms cuts them by less than 3 mN and
@@ -121,7 +120,7 @@ def smallest_drop_N(t_s: npt.ArrayLike, drive_force_N: npt.ArrayLike) -> float:
 
 
 def _binned(t_s: Floats, force_N: Floats) -> tuple[Floats, Floats]:
-    """Means over bins of about 1 ms; a record sampled more slowly stays as it is."""
+    """Means over bins of about 1 ms; a record sampled more slowly stays unchanged."""
     if t_s.shape != force_N.shape or t_s.ndim != 1:
         raise ValueError(f"t_s {t_s.shape}, drive_force_N {force_N.shape}: must be two rows of equal length")
     if len(t_s) < 2:

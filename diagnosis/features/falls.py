@@ -1,15 +1,10 @@
 """Falls of a record, compiled: where each begins, where it ends, and when half of it is done."""
 
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats, Indices
 from bridge.kernel import kernel
 from diagnosis.look.turns import turns
-
-Floats = npt.NDArray[np.floating[Any]]
-Indices = npt.NDArray[np.int64]
 
 _turns = kernel(turns)
 
@@ -27,12 +22,12 @@ def turning_points(force_N: Floats, drop_N: float) -> tuple[Indices, Indices]:
 @kernel
 def half_fallen(falling: Floats, tops: Indices, bottoms: Indices) -> Floats:
     """Instant, in samples, at which half of each fall is done, [falls]; interpolated between two samples."""
-    found = np.empty(len(tops))
+    middles = np.empty(len(tops))
     for fall in range(len(tops)):
         half = 0.5 * (falling[tops[fall]] + falling[bottoms[fall]])
         under = tops[fall]
         while falling[under] > half:
             under += 1
         step = falling[under - 1] - falling[under]
-        found[fall] = under - (half - falling[under]) / step if step > 0.0 else under
-    return found
+        middles[fall] = under - (half - falling[under]) / step if step > 0.0 else under
+    return middles

@@ -1,14 +1,13 @@
 """Definition of a feature: one number of a run that does not depend on the instants of the slips; its band and its scales."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from diagnosis.evidence.manifest import RigTable
 
-Floats = npt.NDArray[np.floating[Any]]
 Signals = dict[str, Floats]
 Band = tuple[float, float]
 LOW: Band = (0.0, 5.0)
@@ -41,7 +40,7 @@ class Scales(NamedTuple):
 
 
 class Features:
-    """Collects features of one run, with their labels where somebody wants them."""
+    """Collects features of one run, with labels on request."""
 
     def __init__(self, labelled: bool = True) -> None:
         self._labels: list[tuple[str, str, str, Band, int]] | None = [] if labelled else None

@@ -9,21 +9,19 @@ same blocks. All features but the powers are linear in the force. Each step work
 """
 
 import math
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.fft import dct
 from scipy.ndimage import uniform_filter1d
 
+from bridge.arrays import Floats, Indices
 from diagnosis.evidence.manifest import RigTable
-from diagnosis.features.axis_motion import Motion
+from diagnosis.features.axis_motion import SlideMotion
 from diagnosis.features.feature import LOW, Features, Signals
 from diagnosis.features.grid import BLOCK_S
-from diagnosis.features.segments import Commands
+from diagnosis.features.segments import CommandedRun
 
-Floats = npt.NDArray[np.floating[Any]]
-Indices = npt.NDArray[np.int64]
 # Blocks left out at either end of a run, where the window of the smoothed motion is one-sided. Too small: its errors count.
 _EDGE = 50
 # Edges of the slow bins, in Stribeck velocities. Below the first edge the slide is about to stick.
@@ -45,36 +43,36 @@ _BANDS_HZ = ((3.0, 8.0), (8.0, 24.0))  # above the waves over time, below the no
 _SHORTEST_REST_S = 0.2  # of a rest whose breakaway counts; shorter rests are reversals
 
 
-def axis_features(signals: Signals, commands: Commands, rig: RigTable) -> Features:
+def axis_features(signals: Signals, commands: CommandedRun, rig: RigTable) -> Features:
     """All features of a run with a force drive; `signals` [blocks] each, measured or predicted."""
-    found = Features()
+    features = Features()
     motion = commands.motion
     assert motion is not None, "a force drive has a motion"  # noqa: S101
     rest_N = signals["drive_force_N"] - motion.inertia_N
-    _breakaways(found, rest_N, motion, rig.stribeck_velocity_mps)
+    _breakaways(features, rest_N, motion, rig.stribeck_velocity_mps)
     inner = slice(_first(motion, rig), len(rest_N) - _EDGE)
-    cut = Motion(*(values[inner] for values in motion))
-    # a velocity integrated from an acceleration is wrong by some mm/s: it does not tell when the axis turns
+    cut = SlideMotion(*(values[inner] for values in motion))
+    # a velocity integrated from an acceleration is wrong by some mm/s: it does not show when the axis turns
     slowest = 0 if "mass_position_m" in signals else len(_SLOW)
-    rest_N = _without_curve(found, rest_N[inner], cut, rig.stribeck_velocity_mps, slowest)
+    rest_N = _without_curve(features, rest_N[inner], cut, rig.stribeck_velocity_mps, slowest)
     # near a turn of the motion every error of the presliding model would pass for a wave
     sliding = np.abs(cut.velocity_mps) > _SLOW[-2] * rig.stribeck_velocity_mps
-    rest_N = _without_inertia(found, np.where(sliding, rest_N, 0.0), cut, sliding)
-    _waves(found, rest_N, cut, sliding)
+    rest_N = _without_inertia(features, np.where(sliding, rest_N, 0.0), cut, sliding)
+    _waves(features, rest_N, cut, sliding)
     friction_N = rest_N * np.sign(cut.velocity_mps)
     for low_Hz, high_Hz in _BANDS_HZ:
         band = _smooth(friction_N, high_Hz) - _smooth(friction_N, low_Hz)
         power = float(np.var(band[sliding])) if sliding.any() else math.nan
-        found.add("ripple", "drive_force_N", "steady", (low_Hz, high_Hz), -1, power)
+        features.add("ripple", "drive_force_N", "steady", (low_Hz, high_Hz), -1, power)
     if "mass_accel_mps2" in signals and "mass_position_m" in signals:
         accel = signals["mass_accel_mps2"][inner]
         about = cut.accel_mps2 - cut.accel_mps2.mean()
         gain = float(accel @ about) / (float(about @ about) + 1e-12)
-        found.add("gain", "mass_accel_mps2", "steady", LOW, -1, gain)
-    return found
+        features.add("gain", "mass_accel_mps2", "steady", LOW, -1, gain)
+    return features
 
 
-def friction_share(force_N: Floats, motion: Motion) -> tuple[Floats, npt.NDArray[np.bool_]]:
+def friction_share(force_N: Floats, motion: SlideMotion) -> tuple[Floats, npt.NDArray[np.bool_]]:
     """Relative deviation of the friction from its mean at that direction and speed, and the blocks where it is known.
 
     Both are [blocks]. The deviation is 0 where the slide is too slow for it to be known.
@@ -90,7 +88,7 @@ def friction_share(force_N: Floats, motion: Motion) -> tuple[Floats, npt.NDArray
     return np.where(valid, np.sign(motion.velocity_mps) * (rest_N - mean) / size_N, 0.0), valid
 
 
-def moving_s(motion: Motion, rig: RigTable) -> float:
+def moving_s(motion: SlideMotion, rig: RigTable) -> float:
     """Seconds of a run that its features can use."""
     if float(np.ptp(motion.position_m)) <= _forgetting_m(rig):
         return 0.0
@@ -101,7 +99,7 @@ def _forgetting_m(rig: RigTable) -> float:
     return _FORGETTING_LENGTHS * rig.static_force_N / rig.contact_stiffness_N_per_m
 
 
-def _first(motion: Motion, rig: RigTable) -> int:
+def _first(motion: SlideMotion, rig: RigTable) -> int:
     """First block that counts for the features."""
     gone_m = np.abs(motion.position_m - motion.position_m[0])
     gone = gone_m > _forgetting_m(rig)
@@ -125,7 +123,9 @@ def _profile(values: Floats, bins: Indices, count: int) -> Floats:
     return sums / np.maximum(held, max(float(np.median(held)), 1.0))
 
 
-def _without_curve(found: Features, rest_N: Floats, motion: Motion, stribeck_mps: float, slowest: int) -> Floats:
+def _without_curve(
+    features: Features, rest_N: Floats, motion: SlideMotion, stribeck_mps: float, slowest: int
+) -> Floats:
     """Add the features of the force over velocity, and return the remainder of the force [blocks].
 
     A ring is a range of speeds, slowest first; features of rings below the index `slowest` are NaN.
@@ -137,7 +137,7 @@ def _without_curve(found: Features, rest_N: Floats, motion: Motion, stribeck_mps
     slow = len(_SLOW) - 1  # rings 1 to `slow` have two branches
     forward = motion.velocity_mps > 0.0
     speeding = (motion.accel_mps2 > 0.0) == forward
-    # about to stick, the slide has no direction but that of the acceleration
+    # about to stick, the slide has only the direction of the acceleration
     way = np.where(ring == 0, motion.accel_mps2 > 0.0, forward)
     branch = np.where((ring > 0) & (ring <= slow), speeding, False)
     bins = ring * 4 + way * 2 + branch
@@ -149,11 +149,11 @@ def _without_curve(found: Features, rest_N: Floats, motion: Motion, stribeck_mps
                 regime = "stick" if number == 0 else "steady" if number > slow else "breakaway" if fork else "restick"
                 name = f"friction {sign}{number}{'ab'[fork]}"
                 mean_N = float(means[number * 4 + side + fork]) if number >= slowest else math.nan
-                found.add(name, "drive_force_N", regime, LOW, -1, mean_N)
+                features.add(name, "drive_force_N", regime, LOW, -1, mean_N)
     return rest_N - np.nan_to_num(means)[bins]
 
 
-def _without_inertia(found: Features, rest_N: Floats, motion: Motion, sliding: npt.NDArray[np.bool_]) -> Floats:
+def _without_inertia(features: Features, rest_N: Floats, motion: SlideMotion, sliding: npt.NDArray[np.bool_]) -> Floats:
     # smoothed well below the motion that leads the model: otherwise the encoder's noise in both would pass for a lag
     smooth = uniform_filter1d(uniform_filter1d(motion.accel_mps2, _RATE_WINDOW), _RATE_WINDOW)
     for name, column in (("inertia", motion.accel_mps2), ("lag", np.gradient(smooth, BLOCK_S))):
@@ -161,12 +161,12 @@ def _without_inertia(found: Features, rest_N: Floats, motion: Motion, sliding: n
         size = math.sqrt(float(about @ about) / max(int(sliding.sum()), 1)) + 1e-12
         about = about / size
         force_N = float(rest_N @ about) / max(int(sliding.sum()), 1)
-        found.add(name, "drive_force_N", "slip", LOW, -1, force_N)
+        features.add(name, "drive_force_N", "slip", LOW, -1, force_N)
         rest_N = rest_N - force_N * about
     return rest_N
 
 
-def _waves(found: Features, rest_N: Floats, motion: Motion, sliding: npt.NDArray[np.bool_]) -> None:
+def _waves(features: Features, rest_N: Floats, motion: SlideMotion, sliding: npt.NDArray[np.bool_]) -> None:
     time = np.arange(len(rest_N)) / len(rest_N)
     way = motion.position_m - motion.position_m.min()
     way = way / max(float(way.max()), 1e-12)
@@ -182,10 +182,10 @@ def _waves(found: Features, rest_N: Floats, motion: Motion, sliding: npt.NDArray
         profile = _profile(values[sliding], at[sliding], bins)
         weights = np.asarray(dct(profile))[1 : waves + 1] / bins
         for wave, value in enumerate(weights.tolist(), start=1):
-            found.add(f"{name} {wave}", "drive_force_N", "steady", LOW, -1, value)
+            features.add(f"{name} {wave}", "drive_force_N", "steady", LOW, -1, value)
 
 
-def _breakaways(found: Features, rest_N: Floats, motion: Motion, stribeck_mps: float) -> None:
+def _breakaways(features: Features, rest_N: Floats, motion: SlideMotion, stribeck_mps: float) -> None:
     """Add the force at which motion starts after a rest, and its slope over the logarithm of the rest."""
     still = np.abs(motion.velocity_mps) < _SLOW[0] * stribeck_mps
     ends = np.flatnonzero(still[:-1] & ~still[1:]) + 1
@@ -202,8 +202,8 @@ def _breakaways(found: Features, rest_N: Floats, motion: Motion, stribeck_mps: f
     slope = math.nan
     if len(rests) >= 3 and np.ptp(rests) > 0.3:
         slope = float(np.polyfit(rests, forces, 1)[0])
-    found.add("mean", "drive_force_N", "breakaway", LOW, -1, mean)
-    found.add("over rest", "drive_force_N", "breakaway", LOW, -1, slope)
+    features.add("mean", "drive_force_N", "breakaway", LOW, -1, mean)
+    features.add("over rest", "drive_force_N", "breakaway", LOW, -1, slope)
 
 
 def _smooth(values: Floats, frequency_Hz: float) -> Floats:

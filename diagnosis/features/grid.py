@@ -5,15 +5,15 @@ spring) and averages 20 samples of noise. Vibration is too fast for the grid and
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.wire.messages import CHANNELS
-from diagnosis.evidence.folder import SHAKE_RATE_HZ, Run
+from diagnosis.evidence.folder import SHAKE_RATE_HZ, MeasuredRun
 
-Floats = npt.NDArray[np.floating[Any]]
 BLOCK_S = 1e-3
 MEANS = CHANNELS
 SHAKES = ("mass_shake_mps2", "base_shake_mps2")  # rms within a block, about the block's mean
@@ -27,7 +27,7 @@ _FURTHEST_BLOCKS = 5
 _LARGEST_COSINE = 0.3
 
 
-def reduce_run(run: Run) -> dict[str, Floats]:
+def reduce_run(run: MeasuredRun) -> dict[str, Floats]:
     """The signals of a measured run by name, [blocks] each; only those that its columns allow.
 
     A block without a sample (in a gap, or between slow samples) is interpolated.
@@ -49,7 +49,7 @@ def reduce_run(run: Run) -> dict[str, Floats]:
     return reduced
 
 
-def block_means(run: Run, names: Sequence[str]) -> dict[str, Floats]:
+def block_means(run: MeasuredRun, names: Sequence[str]) -> dict[str, Floats]:
     """Means of the columns `names` that the run has, [blocks] each; a block without a sample is interpolated."""
     index = _index(run)
     blocks = int(index[-1]) + 1
@@ -65,7 +65,7 @@ def block_means(run: Run, names: Sequence[str]) -> dict[str, Floats]:
     return reduced
 
 
-def _index(run: Run) -> npt.NDArray[np.int64]:
+def _index(run: MeasuredRun) -> npt.NDArray[np.int64]:
     """The block of every sample, [samples]."""
     return np.floor((run.t_s - run.t_s[0]) / BLOCK_S + 1e-6).astype(np.int64)
 
@@ -91,8 +91,10 @@ def averaged(frequency_Hz: Floats) -> Averaged:
     turned = np.cos(2.0 * np.pi * BLOCK_S * np.outer(values_Hz, np.arange(1, _FURTHEST_BLOCKS + 1)))
     cosine = turned.min(axis=1, initial=1.0)[which]
     distance = (turned.argmin(axis=1) + 1)[which]
-    own, cosine, distance = (values[cosine < _LARGEST_COSINE] for values in (shaken, cosine, distance))
-    return Averaged(own, np.maximum(own - distance, 0), np.minimum(own + distance, len(frequency_Hz) - 1), cosine)
+    affected, cosine, distance = (values[cosine < _LARGEST_COSINE] for values in (shaken, cosine, distance))
+    return Averaged(
+        affected, np.maximum(affected - distance, 0), np.minimum(affected + distance, len(frequency_Hz) - 1), cosine
+    )
 
 
 def without_vibration(signals: dict[str, Floats], blocks: Averaged) -> dict[str, Floats]:
@@ -103,15 +105,15 @@ def without_vibration(signals: dict[str, Floats], blocks: Averaged) -> dict[str,
         blocks: from `averaged`, of the vibration in their run.
 
     """
-    own, before, after, cosine = blocks
+    blocks_of, before, after, cosine = blocks
     result = dict(signals)
     for shake, source in SHAKEN.items():
         if source in signals:
             mean = signals[source]
-            steady = (mean[before] - 2.0 * cosine * mean[own] + mean[after]) / (2.0 - 2.0 * cosine)
+            steady = (mean[before] - 2.0 * cosine * mean[blocks_of] + mean[after]) / (2.0 - 2.0 * cosine)
             result[source] = mean.copy()
-            result[source][own] = steady
+            result[source][blocks_of] = steady
             if shake in signals:
                 result[shake] = signals[shake].copy()
-                result[shake][own] = np.hypot(signals[shake][own], mean[own] - steady)
+                result[shake][blocks_of] = np.hypot(signals[shake][blocks_of], mean[blocks_of] - steady)
     return result

@@ -1,20 +1,16 @@
 """A moving mean of equal weights, compiled: a call of scipy's takes 60 us before it begins."""
 
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.kernel import kernel
-
-Floats = npt.NDArray[np.floating[Any]]
 
 
 @kernel
 def moving_mean(values: Floats, width: int) -> Floats:
-    """The mean over `width` blocks around each of `values` [blocks]; beyond an end the values come back in reverse order.
+    """The mean over `width` blocks around each of `values` [blocks]; beyond an end the values continue in reverse order.
 
-    Bit by bit what scipy's filter gives in its mode "reflect".
+    Bit by bit the result of scipy's filter in its mode "reflect".
     """
     count = len(values)
     before = width // 2

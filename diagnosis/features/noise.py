@@ -1,21 +1,20 @@
 """The noise of a run, taken from the run: the part faster than 20 ms where the slide sticks, in pieces as measured.
 
-The pieces keep hum, colour and quantisation, and no spectrum has to be assumed. Slower noise cannot be told from motion; it is
-drawn as a small drift of the force. An accelerometer shows no motion where the slide sticks: its whole signal there is noise,
-slow or fast.
+The pieces keep hum, colour and quantisation, and no spectrum has to be assumed. Slower noise cannot be separated from motion;
+it is drawn as a small drift of the force. An accelerometer shows no motion where the slide sticks: its whole signal there is
+noise, slow or fast.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from scipy.signal import savgol_coeffs, savgol_filter
 
+from bridge.arrays import Floats
 from diagnosis.features.feature import Scales, Signals
-from diagnosis.features.segments import Commands
+from diagnosis.features.segments import CommandedRun
 
-Floats = npt.NDArray[np.floating[Any]]
 _WINDOW = 21  # blocks of the mean that is taken off. Too small: noise is lost; too large: motion counts as noise
 _FEWEST = 500  # blocks of a piece; a shorter piece would repeat too often within a run
 _FEWEST_STILL = 100  # blocks of a piece of acceleration: a short one is better than one with remains of a vibration
@@ -26,11 +25,11 @@ _SLOW_WAVES = 6  # half waves over a run that the drift is made of
 _POSITION_WINDOW, _FORCE_WINDOW = 41, 5  # blocks of the cubic that is taken off, with a force drive
 
 
-class Noise(NamedTuple):
+class RunNoise(NamedTuple):
     """The noise of one run."""
 
     pieces: dict[str, Floats]  # by signal: a stretch of measured noise, [blocks of the piece]
-    shake_mps2: dict[str, float]  # by shake signal: what an accelerometer shows without a vibration
+    shake_mps2: dict[str, float]  # by shake signal: rms of an accelerometer without a vibration
     slow_force_N: float  # size of the force sensor's drift
 
     def drawn(self, name: str, blocks: int, random: np.random.Generator) -> Floats:
@@ -48,7 +47,7 @@ class Noise(NamedTuple):
         return result
 
 
-def noise_of(signals: Signals, commands: Commands, scales: Scales) -> Noise:
+def noise_of(signals: Signals, commands: CommandedRun, scales: Scales) -> RunNoise:
     """The noise of a reduced run; `signals` [blocks] each."""
     if commands.motion is not None:
         return _axis_noise(signals, scales)
@@ -76,11 +75,11 @@ def noise_of(signals: Signals, commands: Commands, scales: Scales) -> Noise:
         else:
             rest = values - uniform_filter1d(values, _WINDOW)
             pieces[name] = rest[quiet] * (_WINDOW / (_WINDOW - 1.0)) ** 0.5
-    return Noise(pieces, shake, _SLOW_SHARE * scales.force_N)
+    return RunNoise(pieces, shake, _SLOW_SHARE * scales.force_N)
 
 
-def _axis_noise(signals: Signals, scales: Scales) -> Noise:
-    """Noise with a force drive, where the slide hardly ever rests: the remainder of a cubic, without ends and reversals.
+def _axis_noise(signals: Signals, scales: Scales) -> RunNoise:
+    """Noise with a force drive, where the slide rarely rests: the remainder of a cubic, without ends and reversals.
 
     Of the position it is the part that the measured force does not explain, 12 Hz and above, so mains hum stays in. The force is
     an input and may move in any way, so only its fastest part is noise; the noise that this misses does not move the mass.
@@ -96,4 +95,4 @@ def _axis_noise(signals: Signals, scales: Scales) -> Noise:
         calm[:_POSITION_WINDOW] = calm[-_POSITION_WINDOW:] = False
         pieces[name] = rest[calm] if calm.sum() >= _FEWEST else rest
     shake = {name: float(np.median(values)) for name, values in signals.items() if name.endswith("shake_mps2")}
-    return Noise(pieces, shake, _SLOW_SHARE * scales.force_N)
+    return RunNoise(pieces, shake, _SLOW_SHARE * scales.force_N)

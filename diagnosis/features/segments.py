@@ -6,18 +6,17 @@ command follows the measured position.
 """
 
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.signal import savgol_filter
 
-from diagnosis.evidence.folder import Run
+from bridge.arrays import Floats
+from diagnosis.evidence.folder import MeasuredRun
 from diagnosis.evidence.manifest import RigTable
-from diagnosis.features.axis_motion import Motion, motion_of
+from diagnosis.features.axis_motion import SlideMotion, motion_of
 from diagnosis.features.grid import BLOCK_S
 
-Floats = npt.NDArray[np.floating[Any]]
 # Blocks (0.1 s) over which a velocity is read from a position. Too small: noise; too large: changes of speed are smeared.
 _WINDOW = 100
 # Smallest change of speed, as a share of the faster speed. Too small: the ripple of a screw splits segments.
@@ -25,8 +24,12 @@ _WINDOW = 100
 _SMALLEST_CHANGE = 0.35
 SHORTEST_S = 0.3  # of a segment; shorter stretches of constant command are not compared
 _SHORTEST_WINDOWS = 3  # of a piece of constant velocity; with fewer windows a ripple counts as a change
-_SLOWEST = 0.01  # share of the run's fastest speed below which a drive stands: its slope is the sensor's noise
-_STILL_M = 1e-9  # travel of a whole run below which a drive stands (or its noise, if larger): the rest is rounding
+_SLOWEST = (
+    0.01  # share of the run's fastest speed below which a drive counts as at rest: its slope is the sensor's noise
+)
+_STILL_M = (
+    1e-9  # travel of a whole run below which a drive counts as at rest (or its noise, if larger): less is rounding
+)
 # Deviation of a window from the velocity of its piece, as a share of the change of speed, up to which the drive has arrived.
 # Too small: noise and ripple count as a drive under way. Too large: the end of a ramp counts as constant speed.
 _ON_THE_WAY = 0.1
@@ -34,14 +37,14 @@ _QUICK = 2  # windows up to which a change of speed counts as a step; `_SETTLING
 _LONGEST_RAMP = 20  # windows up to which a rise of speed counts as a change; a longer rise is a piece with a gap
 _RATE_WINDOW = 41  # blocks over which the velocity of a change is read: 1 um of noise gives 13 um/s
 # Blocks (0.1 s) left out after a change of command and at the start of a run, while drive and piezo settle.
-# Too small: the settling shows as a gap; too large: short segments lose their slips. Counted: docs/method/features.md.
+# Too small: the settling shows as a gap; too large: short segments lose their slips. Counted: docs/method/diagnosis.md.
 _SETTLING = 100
 
 
 class Segment(NamedTuple):
     """Blocks [first, last) of constant drive and vibration.
 
-    What is compared in a segment follows from the measured slips, so it is the same for every model.
+    The compared features of a segment follow from the measured slips, so they are the same for every model.
     """
 
     first: int
@@ -65,18 +68,18 @@ class Segment(NamedTuple):
         return -1.0 if self.drive_velocity_mps < 0.0 else 1.0
 
 
-class Commands(NamedTuple):
+class CommandedRun(NamedTuple):
     """The commands of a run, [blocks] each, and its segments in time order."""
 
     drive: Floats  # velocity [m/s], or force [N] with a force drive
     frequency_Hz: Floats
     amplitude_m: Floats
     segments: tuple[Segment, ...]
-    motion: Motion | None = None  # measured motion of the slide, with a force drive only
+    motion: SlideMotion | None = None  # measured motion of the slide, with a force drive only
     changing_s: float = 0.0  # sum of the stretches that are too short to be a segment
 
 
-def commands_of(run: Run, rig: RigTable, reduced: dict[str, Floats]) -> Commands:
+def commands_of(run: MeasuredRun, rig: RigTable, reduced: dict[str, Floats]) -> CommandedRun:
     """The commands of a run, from its columns and the velocity that the manifest states.
 
     Args:
@@ -96,14 +99,14 @@ def commands_of(run: Run, rig: RigTable, reduced: dict[str, Floats]) -> Commands
     if rig.drive == "force":
         drive = reduced["drive_force_N"]
         motion = motion_of(reduced, len(run.t_s) / blocks, rig)
-        return Commands(drive, frequency_Hz, amplitude_m, (Segment(0, blocks, 0.0, 0.0, 0.0),), motion)
+        return CommandedRun(drive, frequency_Hz, amplitude_m, (Segment(0, blocks, 0.0, 0.0, 0.0),), motion)
     if run.drive_velocity_mps is not None:
         drive = _stated(run.drive_velocity_mps, blocks, reduced.get("drive_position_m"))
     else:
         drive = _pieces(reduced["drive_position_m"])
         if never_constant(reduced["drive_position_m"], drive):
             rate = np.asarray(savgol_filter(reduced["drive_position_m"], 2 * _WINDOW + 1, 2, deriv=1, delta=BLOCK_S))
-            return Commands(rate, frequency_Hz, amplitude_m, (), changing_s=blocks * BLOCK_S)
+            return CommandedRun(rate, frequency_Hz, amplitude_m, (), changing_s=blocks * BLOCK_S)
     change = (np.diff(drive) != 0.0) | (np.diff(frequency_Hz) != 0.0) | (np.diff(amplitude_m) != 0.0)
     edges = [0, *(np.flatnonzero(change) + 1).tolist(), blocks]
     segments = tuple(
@@ -118,7 +121,7 @@ def commands_of(run: Run, rig: RigTable, reduced: dict[str, Floats]) -> Commands
         if (last - first) * BLOCK_S >= SHORTEST_S
     )
     changing = sum(last - first for first, last in pairwise(edges) if (last - first) * BLOCK_S < SHORTEST_S)
-    return Commands(drive, frequency_Hz, amplitude_m, segments, changing_s=changing * BLOCK_S)
+    return CommandedRun(drive, frequency_Hz, amplitude_m, segments, changing_s=changing * BLOCK_S)
 
 
 def never_constant(position_m: Floats, drive: Floats) -> bool:
@@ -135,11 +138,11 @@ def never_constant(position_m: Floats, drive: Floats) -> bool:
     windows = len(position_m) // _WINDOW
     if windows < _SHORTEST_WINDOWS:
         return False
-    measured = np.array([_slope(one) for one in position_m[: windows * _WINDOW].reshape(windows, _WINDOW)])
-    own = drive[: windows * _WINDOW].reshape(windows, _WINDOW)
+    measured = np.array([_slope(window) for window in position_m[: windows * _WINDOW].reshape(windows, _WINDOW)])
+    commanded = drive[: windows * _WINDOW].reshape(windows, _WINDOW)
     moves = np.abs(measured) > _SLOWEST * float(np.abs(measured).max())
-    constant = np.ptp(own, axis=1) == 0.0
-    edges = np.flatnonzero(np.diff(own[:, 0]) != 0.0) + 1
+    constant = np.ptp(commanded, axis=1) == 0.0
+    edges = np.flatnonzero(np.diff(commanded[:, 0]) != 0.0) + 1
     for first, last in pairwise([0, *edges.tolist(), windows]):
         if _is_bowed(measured[first:last]):
             constant[first:last] = False
@@ -185,11 +188,11 @@ def _pieces(position_m: Floats) -> Floats:
     result = np.asarray(savgol_filter(position_m, _RATE_WINDOW, 2, deriv=1, delta=BLOCK_S))
     done, lines = 0, list[tuple[float, float]]()
     for number, (first, last) in enumerate(pieces):
-        before, own, after = speeds[number : number + 3]
+        before, speed, after = speeds[number : number + 3]
         # the outer windows of a piece may hold the change of speed
-        begin = first + max(_windows_under_way(velocity[first:last], own, before, first == 0), int(first > 0))
+        begin = first + max(_windows_under_way(velocity[first:last], speed, before, first == 0), int(first > 0))
         end = last - max(
-            _windows_under_way(velocity[first:last][::-1], own, after, last == windows), int(last < windows)
+            _windows_under_way(velocity[first:last][::-1], speed, after, last == windows), int(last < windows)
         )
         inner = slice(begin * _WINDOW, end * _WINDOW if end < windows else blocks)
         slope, offset = np.polyfit(np.arange(blocks)[inner], position_m[inner], 1)
@@ -207,14 +210,14 @@ def _pieces(position_m: Floats) -> Floats:
     return result
 
 
-def _windows_under_way(velocity: Floats, own: float, other: float, at_the_end: bool) -> int:
-    """Number of windows, from the first, in which a piece has not reached its velocity `own`; `other` is the neighbour's.
+def _windows_under_way(velocity: Floats, speed: float, other: float, at_the_end: bool) -> int:
+    """Number of windows, from the first, in which a piece has not reached its velocity `speed`; `other` is the neighbour's.
 
     At an end of the run no neighbour is known; there a drive that starts or stops is below half of its velocity.
     """
-    if at_the_end and own * velocity[0] >= 0.5 * own * own:
+    if at_the_end and speed * velocity[0] >= 0.5 * speed * speed:
         return 0
-    on_the_way = np.abs(velocity - own) > _ON_THE_WAY * abs(own - other)
+    on_the_way = np.abs(velocity - speed) > _ON_THE_WAY * abs(speed - other)
     most = len(velocity) - _SHORTEST_WINDOWS
     return min(int(np.argmin(on_the_way)), max(most, 0))
 

@@ -1,23 +1,22 @@
 """The slips of a segment, found in the force, or in the acceleration where no force was measured."""
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from scipy.signal import lfilter
 
+from bridge.arrays import Floats
 from diagnosis.features.falls import half_fallen, turning_points
 from diagnosis.features.feature import Scales, Signals
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.features.segments import Segment
 
-Floats = npt.NDArray[np.floating[Any]]
-
 # instants at which the shape of a slip is read, in slip durations (half periods of the mass on its spring) after mid-fall
 SHAPE_AT = np.array([-1.5, -1.0, -0.75, -0.5, -0.35, -0.2, 0.0, 0.2, 0.35, 0.5, 0.75, 1.0, 1.5, 2.0])
-# Sum of the weights of its slips from which a segment slips. Too small: a slip at the edge of a segment decides what is
-# compared. Too large: short segments are not compared.
+# Sum of the weights of its slips from which a segment slips. Too small: a slip at the edge of a segment decides which
+# features are compared. Too large: short segments are not compared.
 _ENOUGH_SLIPS = 0.5
 # Change of the force over the second half of a segment, as a share of the static friction, up to which the slide slides evenly.
 # Too small: a friction wave counts as a climb. Too large: a first climb counts as sliding.
@@ -27,7 +26,7 @@ _LEVEL = 0.15
 _TAPER = 0.12
 
 
-class Slips(NamedTuple):
+class SegmentSlips(NamedTuple):
     """The slips of a segment, [slips] each, in blocks from the start of the segment.
 
     The weight of a slip falls to 0 towards the ends of its segment. A slip that enters or leaves the segment as a parameter
@@ -45,12 +44,12 @@ class Slips(NamedTuple):
         return float(self.weights.sum()) > 0.1
 
 
-def slip_pairs(slips: Slips) -> Floats:
+def slip_pairs(slips: SegmentSlips) -> Floats:
     """Weight of each stick between two slips, [slips - 1]."""
     return np.minimum(slips.weights[:-1], slips.weights[1:])
 
 
-NO_SLIPS = Slips(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
+NO_SLIPS = SegmentSlips(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
 
 
 def settled(signals: Signals, segment: Segment, scales: Scales) -> Segment:
@@ -82,7 +81,7 @@ def _climbs(force_N: Floats, scales: Scales) -> bool:
     return float(np.ptp(level_N)) > _LEVEL * scales.force_N
 
 
-def find_slips(cut: Signals, scales: Scales) -> Slips:
+def find_slips(cut: Signals, scales: Scales) -> SegmentSlips:
     """The slips of a segment.
 
     Args:
@@ -107,4 +106,4 @@ def find_slips(cut: Signals, scales: Scales) -> Slips:
     middles = half_fallen(falling, tops, bottoms)
     width = scales.slip_s / BLOCK_S
     margin = np.minimum(middles + SHAPE_AT[0] * width, len(falling) - 1 - middles - SHAPE_AT[-1] * width)
-    return Slips(tops, bottoms, middles, np.clip(margin / (_TAPER * len(falling)), 0.0, 1.0))
+    return SegmentSlips(tops, bottoms, middles, np.clip(margin / (_TAPER * len(falling)), 0.0, 1.0))

@@ -8,27 +8,24 @@ model. A measured and a predicted run pass through the same code; a feature that
 import math
 from functools import lru_cache
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.fft import dct
 
+from bridge.arrays import Floats
 from diagnosis.features.feature import DRIVE_WAVES, HIGH, LOW, MIDDLE, RESOLVED_M, Features, Scales, Signals
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.features.moving_mean import moving_mean
-from diagnosis.features.segments import Commands, Segment
-from diagnosis.features.slips import NO_SLIPS, SHAPE_AT, Slips, find_slips, slip_pairs
+from diagnosis.features.segments import CommandedRun, Segment
+from diagnosis.features.slips import NO_SLIPS, SHAPE_AT, SegmentSlips, find_slips, slip_pairs
 from diagnosis.features.spring_law import spring_bend, spring_law
-
-Floats = npt.NDArray[np.floating[Any]]
 
 _LOW_AND_HIGH = np.array([0.05, 0.95])
 _LEVELS = 8  # bins over a segment without slips
 _BREAKAWAY_WAVES = 5  # half waves of the breakaway force over a segment; more follow shorter friction waves and noise
 
 
-def spring_features(signals: Signals, commands: Commands, scales: Scales, labelled: bool = True) -> Features:
+def spring_features(signals: Signals, commands: CommandedRun, scales: Scales, labelled: bool = True) -> Features:
     """All features of a run with a spring drive; commands and channels alone decide which features there are.
 
     Args:
@@ -38,27 +35,27 @@ def spring_features(signals: Signals, commands: Commands, scales: Scales, labell
         labelled: whether the labels are wanted; without them it takes a tenth less time.
 
     """
-    found = Features(labelled)
+    features = Features(labelled)
     for number, segment in enumerate(commands.segments):
-        own = slice(segment.first, segment.last)
+        inside = slice(segment.first, segment.last)
         cut = {
-            name: values[own] if name.endswith("shake_mps2") else segment.sign * values[own]
+            name: values[inside] if name.endswith("shake_mps2") else segment.sign * values[inside]
             for name, values in signals.items()
         }
         slips = find_slips(cut, scales) if segment.slips > 0 else NO_SLIPS
         if "drive_force_N" in cut:
             travel_m = abs(segment.drive_velocity_mps) * (segment.last - segment.first) * BLOCK_S
             expected = travel_m * scales.stiffness_N_per_m / scales.fall_N
-            _cycles(found, number, cut["drive_force_N"], slips, segment, expected)
-            _level(found, number, cut["drive_force_N"], slips, segment)
-        _period(found, number, slips, segment)
-        _shapes(found, number, cut, slips, scales, segment.frequency_Hz)
+            _cycles(features, number, cut["drive_force_N"], slips, segment, expected)
+            _level(features, number, cut["drive_force_N"], slips, segment)
+        _period(features, number, slips, segment)
+        _shapes(features, number, cut, slips, scales, segment.frequency_Hz)
         if segment.frequency_Hz > 0.0:
-            _vibration(found, number, cut)
-    _parity(found, signals, commands, scales)
+            _vibration(features, number, cut)
+    _parity(features, signals, commands, scales)
     if "drive_position_m" in signals:
-        _drive(found, signals["drive_position_m"], commands)
-    return found
+        _drive(features, signals["drive_position_m"], commands)
+    return features
 
 
 _CYCLE_WAVES = {"breakaway": _BREAKAWAY_WAVES, "restick": 3}
@@ -70,14 +67,16 @@ _MOMENTS = {
 _RATES = tuple((f"rate {part}", "stick") for part in ("early", "middle", "late"))
 
 
-def _cycles(found: Features, number: int, force_N: Floats, slips: Slips, segment: Segment, expected: float) -> None:
+def _cycles(
+    features: Features, number: int, force_N: Floats, slips: SegmentSlips, segment: Segment, expected: float
+) -> None:
     name = "drive_force_N"
     for regime, at in (("breakaway", slips.tops), ("restick", slips.bottoms)):
         waves = _CYCLE_WAVES[regime]
         carried = min(waves, max(int(expected / 2.0) - 1, 0)) if expected >= 5.0 else 0
         moments, scatter = _moments(force_N[at], at / len(force_N), slips.weights, carried)
         values = [*moments, *_LACKING[carried:waves], scatter]
-        found.add_all(_MOMENTS[regime], name, LOW, number, values)
+        features.add_all(_MOMENTS[regime], name, LOW, number, values)
     # the climb between a re-stick and the next breakaway, in three parts
     rates = np.full(3, np.nan)
     weights = slip_pairs(slips)
@@ -89,7 +88,7 @@ def _cycles(found: Features, number: int, force_N: Floats, slips: Slips, segment
         parts = zip(level[:-1], level[1:], (0.3, 0.3, 0.25), strict=True)
         rates = np.array([float(weights @ ((high - low) / (share * length))) for low, high, share in parts])
         rates /= weights.sum()
-    found.add_all(_RATES, name, LOW, number, rates.tolist())
+    features.add_all(_RATES, name, LOW, number, rates.tolist())
 
 
 def _moments(values: Floats, at: Floats, weights: Floats, carried: int) -> tuple[list[float], float]:
@@ -114,12 +113,12 @@ def _moments(values: Floats, at: Floats, weights: Floats, carried: int) -> tuple
     return moments, float(weights @ (left * left)) / free if free > 1.0 else math.nan
 
 
-def _period(found: Features, number: int, slips: Slips, segment: Segment) -> None:
+def _period(features: Features, number: int, slips: SegmentSlips, segment: Segment) -> None:
     weights = slip_pairs(slips)
     periods_s = np.diff(slips.middles) * BLOCK_S
     known = segment.sticks and weights.sum() > 0.1
     value = math.log(float(weights @ periods_s) / float(weights.sum())) if known else math.nan
-    found.add("period", "drive_force_N", "stick", LOW, number, value)
+    features.add("period", "drive_force_N", "stick", LOW, number, value)
 
 
 _LEVEL_NAMES = tuple(
@@ -128,11 +127,11 @@ _LEVEL_NAMES = tuple(
 )
 
 
-def _level(found: Features, number: int, force_N: Floats, slips: Slips, segment: Segment) -> None:
+def _level(features: Features, number: int, force_N: Floats, slips: SegmentSlips, segment: Segment) -> None:
     """Add levels of the force: over whole cycles, weighted as their slips are; over the segment where nothing slips.
 
     A jump of the force at the start of a segment, as a late force sensor makes it, looks like a slip. It has weight 0, and its
-    cycle must not count in the level (docs/method/features.md).
+    cycle must not count in the level (docs/method/diagnosis.md).
     """
     name = "drive_force_N"
     still = segment.still and not segment.at_the_edge
@@ -154,18 +153,18 @@ def _level(found: Features, number: int, force_N: Floats, slips: Slips, segment:
         bins = [_mean(force_N[first:last]) for first, last in pairwise(edges)]
         short = moving_mean(force_N, 5)
         middle, fast = float(np.var(short - moving_mean(force_N, 100))), float(np.var(force_N - short))
-    found.add_all(_LEVEL_NAMES, name, LOW, number, [*levels.tolist(), *bins])
-    found.add("ripple", name, "steady", MIDDLE, number, middle)
-    found.add("ripple", name, "steady", HIGH, number, fast)
+    features.add_all(_LEVEL_NAMES, name, LOW, number, [*levels.tolist(), *bins])
+    features.add("ripple", name, "steady", MIDDLE, number, middle)
+    features.add("ripple", name, "steady", HIGH, number, fast)
 
 
 def _quantiles(values: Floats, weights: Floats) -> Floats:
-    """What `numpy.quantile` finds at 5 and 95 % by the inverted distribution, in a fifth of its time."""
+    """The result of `numpy.quantile` at 5 and 95 % by the inverted distribution, in a fifth of its time."""
     order = np.argsort(values)
     share = weights[order].cumsum()
     share /= share[-1]
-    found = values[order[np.minimum(np.searchsorted(share, _LOW_AND_HIGH), len(values) - 1)]]
-    return np.full(2, np.nan) if np.isnan(values[order[-1]]) else found  # of a model that diverges
+    quantiles = values[order[np.minimum(np.searchsorted(share, _LOW_AND_HIGH), len(values) - 1)]]
+    return np.full(2, np.nan) if np.isnan(values[order[-1]]) else quantiles  # of a model that diverges
 
 
 def _mean(values: Floats) -> float:
@@ -180,7 +179,9 @@ def _regime(at: float) -> str:
 _SHAPES = tuple((f"shape {instant:g}", _regime(instant)) for instant in SHAPE_AT.tolist())
 
 
-def _shapes(found: Features, number: int, cut: Signals, slips: Slips, scales: Scales, frequency_Hz: float) -> None:
+def _shapes(
+    features: Features, number: int, cut: Signals, slips: SegmentSlips, scales: Scales, frequency_Hz: float
+) -> None:
     width = scales.slip_s / BLOCK_S
     shaken = frequency_Hz > 0.0  # a vibration that the sampling folds to low frequencies would pass for a ring
     names = [name for name in ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m") if name in cut]
@@ -197,7 +198,7 @@ def _shapes(found: Features, number: int, cut: Signals, slips: Slips, scales: Sc
         before = np.minimum(at.astype(np.int64), last - 1)
         low = signals[:, before]
         shapes = weights @ (low + (at - before) * (signals[:, before + 1] - low))
-        fast = np.array([one - moving_mean(one, 5) for one in signals])
+        fast = np.array([signal - moving_mean(signal, 5) for signal in signals])
         rings = fast[:, np.minimum((middles + np.arange(int(3.0 * width))).astype(np.int64), last)]
         powers = np.einsum("nij,nij,i->n", rings, rings, weights) / rings.shape[2]
     for i, name in enumerate(names):
@@ -206,29 +207,29 @@ def _shapes(found: Features, number: int, cut: Signals, slips: Slips, scales: Sc
             shape = shape - shape.mean()
         if name == "mass_position_m":
             shape = shape - shape[0]
-        found.add_all(_SHAPES, name, MIDDLE, number, shape.tolist())
-        found.add("ring", name, "restick", HIGH, number, ring)
+        features.add_all(_SHAPES, name, MIDDLE, number, shape.tolist())
+        features.add("ring", name, "restick", HIGH, number, ring)
 
 
-def _vibration(found: Features, number: int, cut: Signals) -> None:
+def _vibration(features: Features, number: int, cut: Signals) -> None:
     for name, source in (("base_shake_mps2", "base_accel_mps2"), ("mass_shake_mps2", "mass_accel_mps2")):
         if name not in cut:
             continue
         shake = cut[name]
         mean = float(shake.mean())
-        found.add("vibration", source, "steady", HIGH, number, math.log(mean + 1e-9))
+        features.add("vibration", source, "steady", HIGH, number, math.log(mean + 1e-9))
         if source == "base_accel_mps2":
             time = _line(len(shake))
             shaken = mean > 0.0  # a dead sensor or a tripped amplifier shows 0, and 0 cannot divide
             over_time = float(shake @ time) / (mean * len(shake) / 3.0) if shaken else math.nan
-            found.add("vibration over time", source, "steady", HIGH, number, over_time)
+            features.add("vibration over time", source, "steady", HIGH, number, over_time)
             if "drive_force_N" in cut:
                 force = cut["drive_force_N"] - cut["drive_force_N"].mean()
                 over_force = float(shake @ force) / (mean * (float(force @ force) + 1e-9)) if shaken else math.nan
-                found.add("vibration over force", source, "steady", HIGH, number, over_force)
+                features.add("vibration over force", source, "steady", HIGH, number, over_force)
 
 
-def _parity(found: Features, signals: Signals, commands: Commands, scales: Scales) -> None:
+def _parity(features: Features, signals: Signals, commands: CommandedRun, scales: Scales) -> None:
     """Add the relations between channels of a run that hold for any friction."""
     if not {"drive_force_N", "mass_position_m", "drive_position_m"} <= signals.keys():
         return
@@ -236,22 +237,22 @@ def _parity(found: Features, signals: Signals, commands: Commands, scales: Scale
     law = spring_law(force_N, extension_m, commands.segments, scales.force_N, scales.stiffness_N_per_m)
     law["bend"] = spring_bend(force_N, extension_m, commands.segments, scales.slip_s)
     for name, value in law.items():
-        found.add(f"spring {name}", "drive_force_N", "stick", MIDDLE if name == "rest" else LOW, -1, value)
+        features.add(f"spring {name}", "drive_force_N", "stick", MIDDLE if name == "rest" else LOW, -1, value)
 
 
 _DRIVE_WAVES = tuple((f"wave {wave}", "steady") for wave in range(1, DRIVE_WAVES + 1))
 
 
-def _drive(found: Features, position_m: Floats, commands: Commands) -> None:
+def _drive(features: Features, position_m: Floats, commands: CommandedRun) -> None:
     """Add waves and power of the drive position's deviation from a line and a bow in each segment."""
     rest_m = np.zeros_like(position_m)
     for segment in commands.segments:
         rows = slice(segment.first, segment.last)
         rest_m[rows] = _without_line(position_m[rows], segment)
     waves = np.asarray(dct(rest_m))[1 : DRIVE_WAVES + 1] / len(rest_m)
-    found.add_all(_DRIVE_WAVES, "drive_position_m", LOW, -1, waves.tolist())
+    features.add_all(_DRIVE_WAVES, "drive_position_m", LOW, -1, waves.tolist())
     fast = rest_m - moving_mean(rest_m, 100)
-    found.add("rest", "drive_position_m", "steady", MIDDLE, -1, float(fast.var()) + RESOLVED_M**2)
+    features.add("rest", "drive_position_m", "steady", MIDDLE, -1, float(fast.var()) + RESOLVED_M**2)
 
 
 def _without_line(position_m: Floats, segment: Segment) -> Floats:

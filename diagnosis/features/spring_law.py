@@ -2,20 +2,19 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Floats
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.features.moving_mean import moving_mean
 from diagnosis.features.segments import Segment
 
-Floats = npt.NDArray[np.floating[Any]]
 _ENTRY_MARGIN = 10  # blocks left out around the start of a segment: longer than the delays of a measuring chain
 # Moving means, in slip durations, between which the bend is read. Shorter short mean: noise of the displacement sensors, which
 # grows with the square of frequency; longer: it smears the slip. Longer long mean: a sensor's bow passes for a bend; shorter: the
-# slip is removed. Counted on 60 rigs without a gap (docs/method/features.md).
+# slip is removed. Counted on 60 rigs without a gap (docs/method/diagnosis.md).
 _SHORT, _LONG = 0.25, 8.0
 
 
@@ -54,9 +53,9 @@ def spring_law(
 def spring_bend(force_N: Floats, extension_m: Floats, segments: Sequence[Segment], slip_s: float) -> float:
     """The force [N] for each m/s2 of the extension's second derivative, read where slips are fast.
 
-    A force that is late by T is F - T F' + T^2 F'' / 2. Behind n equal low-passes with the same total delay, the factor of
-    T^2 F'' is (n + 1) / (2 n) instead of 1/2. A swinging frame bends the force without making it late. So the bend tells a delay,
-    a low-pass and a frame apart.
+    A force that is late by T is F - T F' + T^2 F'' / 2. Behind n equal low-passes with the same total delay, the factor of T^2
+    F'' is (n + 1) / (2 n) instead of 1/2. A swinging frame bends the force without making it late. So the bend separates a
+    delay, a low-pass and a frame.
     """
     short, long = (max(round(slips * slip_s / BLOCK_S), 1) for slips in (_SHORT, _LONG))
     level_m = moving_mean(extension_m, short)

@@ -2,15 +2,12 @@
 
 from collections.abc import Generator, Iterator, Sequence
 from itertools import chain
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
-import numpy as np
-import numpy.typing as npt
-
+from bridge.arrays import Floats
 from diagnosis.model.rig import Effects
 from plant.four_rigs_step import LANES
 
-Floats = npt.NDArray[np.floating[Any]]
 R = TypeVar("R")
 # Works that proceed at the same time. Fewer leave lanes of the prediction empty, as most works ask for one point at a time;
 # more hold more predictions in memory.
@@ -57,9 +54,9 @@ def together(predicted: Predicts, works: Sequence[Work[R]]) -> list[R]:
             waiting[number] = work
             on(number, None)
         asked, wanted = wanted, {}
-        perhaps = list(chain.from_iterable(one.perhaps for one in asked.values()))
-        found = predicted(list(chain.from_iterable(one.points for one in asked.values())), perhaps)
-        for number, one in asked.items():
-            answer, found = found[: len(one.points)], found[len(one.points) :]
+        perhaps = list(chain.from_iterable(question.perhaps for question in asked.values()))
+        answers = predicted(list(chain.from_iterable(question.points for question in asked.values())), perhaps)
+        for number, question in asked.items():
+            answer, answers = answers[: len(question.points)], answers[len(question.points) :]
             on(number, answer)
     return [results[number] for number in range(len(works))]

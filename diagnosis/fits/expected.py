@@ -1,16 +1,17 @@
-"""The chi2 that a right model leaves, and whether noise hides the slips. Case histories: docs/method/fits.md."""
+"""The chi2 that a right model leaves, and whether noise hides the slips. Case histories: docs/method/diagnosis.md."""
 
 from diagnosis.fits.fit import Fit
 
 # Both limits below are multiples of the chi2 that a perfect model leaves on this evidence.
 # Beyond this limit all of the baseline's chi2 counts against "no gap", however badly every model fits.
-# Too small: rigs without a gap get one. Too large: a gap that no model explains becomes uncertain. Counted: docs/method/fits.md.
+# Too small: rigs without a gap get one. Too large: a gap that no model explains becomes uncertain.
+# Counted: docs/method/diagnosis.md.
 NEVER_WITHOUT_GAP = 1.8
 # A fit beyond this limit leaves more than a right model would. Too small: right effects are called unexplained.
-# Too large: an effect outside the library passes for one inside. Counted: docs/method/fits.md.
+# Too large: an effect outside the library passes for one inside. Counted: docs/method/diagnosis.md.
 MUCH = 1.6
 # Chi2 of a perfect model, per compared feature, from which noise is said to hide the slips; the floor is doubtful there.
-# Too small: ordinary evidence is called hidden. Too large: scatter is searched for effects. Counted: docs/method/fits.md.
+# Too small: ordinary evidence is called hidden. Too large: scatter is searched for effects. Counted: docs/method/diagnosis.md.
 _HIDDEN_BY_NOISE = 0.4
 
 

@@ -1,14 +1,13 @@
 """A fit: values of nuisances and effect, how well the model matches the runs there, and the Newton step from there."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Floats
 from diagnosis.hypotheses.hypothesis import Hypothesis
 from diagnosis.model.rig import Effects
-
-Floats = npt.NDArray[np.floating[Any]]
 
 
 class Fit(NamedTuple):
@@ -58,9 +57,9 @@ def step_within(normal: Floats, gradient: Floats, at: Floats, most: Floats) -> t
     Raises numpy.linalg.LinAlgError where the normal equations are singular.
 
     """
-    own = len(most)
+    nuisances = len(most)
     edge = np.zeros(len(at), np.bool_)
-    edge[:own] = np.abs(at[:own]) >= most
+    edge[:nuisances] = np.abs(at[:nuisances]) >= most
     free = np.ones(len(at), np.bool_)
     while True:
         step = np.zeros(len(at))

@@ -2,15 +2,15 @@
 
 The method is Gauss-Newton on whitened, compressed differences. The derivatives of the nuisances are computed once, at the
 baseline, and again only where no step gains. The derivatives of an effect are computed at every step, as effects are strongly
-nonlinear: a clearance opens, a wave passes. Case histories of the constants: docs/method/fits.md.
+nonlinear: a clearance opens, a wave passes. Case histories of the constants: docs/method/diagnosis.md.
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from diagnosis.fits.batch import At, Question, Work, together
 from diagnosis.fits.fit import Fit, prior_of, step_within
 from diagnosis.gap.floor import KNEE, Floor
@@ -20,12 +20,11 @@ from diagnosis.hypotheses.hypothesis import LEVELS, NOTHING, Hypothesis
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.model.rig import Effects
 
-Floats = npt.NDArray[np.floating[Any]]
 # Coordinates with a prior below this take the short derivative step of `_coordinate_steps`. Too small: the common step leaves
 # the narrow line of a wave's period. Too large: coarser coordinates get derivatives of mere grid noise.
 _NARROW = 0.1
 # Bounds of the rig's numbers, in tolerances: a deviation beyond is a gap, not a tolerance.
-# Too small: a right rig is held back. Too large: the rig takes what an effect causes. Counted: docs/method/fits.md.
+# Too small: a right rig is held back. Too large: the rig takes what an effect causes. Counted: docs/method/diagnosis.md.
 _MOST_TOLERANCES = 3.3
 # The same for lags and corners of the sensors, in their assumed spreads: wider, as no tolerance is stated for them.
 _MOST_OF_CHAIN = 5.0
@@ -34,14 +33,14 @@ _WORTH_A_STEP = 0.5
 # The same as a share of chi2, but for the baseline, which every fit is compared with: creeping on costs time and changes no name.
 _WORTH_OF_CHI2 = 0.01
 # Shares of the Newton step that are tried, until one gains. Without the small share a curved valley stops the fit; each further
-# share costs a prediction where nothing gains. Counted: docs/method/fits.md.
+# share costs a prediction where nothing gains. Counted: docs/method/diagnosis.md.
 _SHARES = (1.0, 0.3, 0.1)
 # `going_further` refits at most so often, and while a refit leaves this share of chi2 or less. A larger share, or more refits,
-# gains little for more time; a smaller one stops fits that still move. Counted: docs/method/fits.md, `going_further`.
+# gains little for more time; a smaller one stops fits that still move. Counted: docs/method/diagnosis.md, `going_further`.
 _MORE_REFITS, _GAINED = 5, 0.9
 
 
-class Stage(NamedTuple):
+class FitStage(NamedTuple):
     """One stage of a fit: how many steps, and under which compression."""
 
     steps: int  # at most
@@ -55,16 +54,16 @@ class Stage(NamedTuple):
 # Knee of the compression for a start far from the runs, in noise floors. Too small: far differences are cut flat and give no
 # direction. Too large: single differences from slips that come or go outweigh all others.
 FAR_KNEE = 60.0
-_FAR = Stage(4, 1, FAR_KNEE)
-_NEAR = Stage(6, 1, KNEE)
+_FAR = FitStage(4, 1, FAR_KNEE)
+_NEAR = FitStage(6, 1, KNEE)
 # of the baseline: more steps and renewals than other fits, as every fit is compared with it
-_RETUNE = Stage(9, 3, KNEE, worth=0.0)
-_QUICK = Stage(2, 0, FAR_KNEE, columns=False)
+_RETUNE = FitStage(9, 3, KNEE, worth=0.0)
+_QUICK = FitStage(2, 0, FAR_KNEE, columns=False)
 # Largest difference, in noise floors, from which a refit begins with the far stage. Too small: fits that are near lose time
 # there. Too large: fits start where the compression is nearly flat.
 _FAR_OFF = 3.0 * KNEE
 # A trial ends after its first steps when its chi2 lies between these shares of the baseline's chi2: it then gains nothing.
-# A narrower range costs time; a wider one drops trials that would still improve. Counted: docs/method/fits.md.
+# A narrower range costs time; a wider one drops trials that would still improve. Counted: docs/method/diagnosis.md.
 _NO_LESS, _ASTRAY = 0.97, 1.5
 # Steps for the nuisances' derivatives, in tolerances, for the first, second and third renewal. Too small: the grid of the
 # features shows. Too large: curvature does. The second goes the other way and further, across slips that come or go.
@@ -103,9 +102,9 @@ class Fitter:
         self.problem = problem
         self.floor = floor
         self.nuisances = nuisances
-        own = len(nuisances.rig_names)
+        rig_numbers = len(nuisances.rig_names)
         # bounds of the nuisances, the same in both directions [nuisances]
-        self.most = np.where(np.arange(len(nuisances)) < own, _MOST_TOLERANCES, _MOST_OF_CHAIN)
+        self.most = np.where(np.arange(len(nuisances)) < rig_numbers, _MOST_TOLERANCES, _MOST_OF_CHAIN)
         self._rates = np.zeros((int(floor.compared.sum()), len(nuisances)))
 
     def for_problem(self, problem: Problem) -> "Fitter":
@@ -116,11 +115,11 @@ class Fitter:
 
     def of_runs(self, files: set[str]) -> "Fitter":
         """A fitter for some of the runs, given by the names of their files."""
-        own = np.array([file in files for file, _ in self.problem.labels])
+        mask = np.array([file in files for file, _ in self.problem.labels])
         problem = Problem(self.problem.rig, [run for run in self.problem.runs if run.file in files])
         problem.until_s = self.problem.until_s
-        other = Fitter(problem, self.floor.of_features(own), self.nuisances)
-        other._rates = self._rates[own[self.floor.compared]]
+        other = Fitter(problem, self.floor.of_features(mask), self.nuisances)
+        other._rates = self._rates[mask[self.floor.compared]]
         return other
 
     def predicted(self, deviations: Floats, effects: Effects) -> Floats:
@@ -129,16 +128,16 @@ class Fitter:
 
     def predicted_many(self, at: Sequence[At], perhaps: Sequence[At] = ()) -> list[Floats]:
         """As `predicted`, for many points side by side; `perhaps` are points that the caller may ask for next."""
-        points, soon = ([self.nuisances.point(*one) for one in some] for some in (at, perhaps))
+        points, soon = ([self.nuisances.point(*pair) for pair in pairs] for pairs in (at, perhaps))
         return self.problem.predicted_many(points, perhaps=soon)
 
     def whitened(self, predicted: Floats, knee: float = KNEE) -> tuple[Floats, Floats]:
         """Whitened compressed differences [compared], and the derivative of the compression there."""
         return whitened(self.floor, self.problem, predicted, knee)
 
-    def column(self, here: Floats, there: Floats, slope: Floats) -> Floats:
+    def column(self, base: Floats, moved: Floats, slope: Floats) -> Floats:
         """The change from one prediction [features] to another, in whitened compressed differences [compared]."""
-        z = (self.floor.expected(there) - self.floor.expected(here))[self.floor.compared]
+        z = (self.floor.expected(moved) - self.floor.expected(base))[self.floor.compared]
         z *= slope / self.floor.scatter[self.floor.compared]
         return self.floor.whitening @ np.where(np.isfinite(z), z, 0.0)
 
@@ -146,10 +145,10 @@ class Fitter:
         """Fit the baseline; later fits start with the derivatives that the nuisances have there."""
         fit = yield from self.refitting(NOTHING, deviations, np.zeros(0))
         fit = yield from self.fitting(NOTHING, fit.deviations, fit.w, _RETUNE)
-        (here,) = yield Question([(fit.deviations, {})])
+        (base,) = yield Question([(fit.deviations, {})])
         aside = self._aside(fit.deviations, _STEPS[0])
-        there = yield Question([(one, {}) for one in aside])
-        self._rates = self._nuisance_rates(fit.deviations, here, aside, there)
+        moved = yield Question([(deviations, {}) for deviations in aside])
+        self._rates = self._nuisance_rates(fit.deviations, base, aside, moved)
         return fit
 
     def refit(self, hypothesis: Hypothesis, deviations: Floats, w: Floats) -> Fit:
@@ -165,8 +164,8 @@ class Fitter:
 
     def quick(self, hypothesis: Hypothesis, starts: Sequence[tuple[Floats, Floats]]) -> Work[Fit]:
         """Fit a hypothesis in two steps, from the best of some starts; chi2 is under the compression of the gap."""
-        there = yield Question([(deviations, hypothesis.tables(w)) for deviations, w in starts])
-        far = [self.far_chi2(hypothesis, *one) for one in zip(starts, there, strict=True)]
+        predicted = yield Question([(deviations, hypothesis.tables(w)) for deviations, w in starts])
+        far = [self.far_chi2(hypothesis, *start) for start in zip(starts, predicted, strict=True)]
         fit = yield from self.fitting(hypothesis, *starts[far.index(min(far))], _QUICK)
         return (yield from self._judging(fit))
 
@@ -212,59 +211,64 @@ class Fitter:
                 break
             again = yield from self.refitting(fit.hypothesis, fit.deviations, fit.w)
             gains = again.chi2 < _GAINED * fit.chi2
-            fit = min(fit, again, key=lambda one: one.chi2)
+            fit = min(fit, again, key=lambda other: other.chi2)
             if not gains:
                 break
         return fit._replace(finished=True)
 
-    def fitting(self, hypothesis: Hypothesis, deviations: Floats, w: Floats, stage: Stage) -> Work[Fit]:
+    def fitting(self, hypothesis: Hypothesis, deviations: Floats, w: Floats, stage: FitStage) -> Work[Fit]:
         """Fit a hypothesis from a start, by the rules of one stage."""
-        own = len(deviations)
+        nuisances = len(deviations)
         prior = prior_of(hypothesis, deviations)
         most = np.concatenate([self.most, np.full(len(w), np.inf)])
         (predicted,) = yield Question([(deviations, hypothesis.tables(w))], _beside(hypothesis, deviations, w))
-        here = self._placed(hypothesis, np.concatenate([deviations, w]), predicted, stage.knee)
+        place = self._placed(hypothesis, np.concatenate([deviations, w]), predicted, stage.knee)
         nuisance_rates = self._rates
         renewed = without_gain = 0
         finished = False
-        columns = np.zeros((len(here.residual), len(here.at)))
+        columns = np.zeros((len(place.residual), len(place.at)))
         for step in range(stage.steps + 1):
             if step == stage.steps and not stage.columns:
                 break
-            effect_rates = yield from self._effect_rates(hypothesis, here.at[:own], here.at[own:], here.predicted)
-            rates = np.column_stack(
-                [self._with_levels(nuisance_rates, effect_rates, hypothesis, here.at), effect_rates]
+            effect_rates = yield from self._effect_rates(
+                hypothesis, place.at[:nuisances], place.at[nuisances:], place.predicted
             )
-            columns = self.floor.whitening @ (rates * here.slope[:, None])
+            rates = np.column_stack(
+                [self._with_levels(nuisance_rates, effect_rates, hypothesis, place.at), effect_rates]
+            )
+            columns = self.floor.whitening @ (rates * place.slope[:, None])
             if step == stage.steps:
                 break
             normal = columns.T @ columns + np.diag(prior**2)
-            change, _ = step_within(normal, columns.T @ here.residual - prior**2 * here.at, here.at, self.most)
-            tried = [np.clip(here.at + share * change, -most, most) for share in _SHARES]
-            points = [(ahead[:own], hypothesis.tables(ahead[own:])) for ahead in tried]
+            change, _ = step_within(normal, columns.T @ place.residual - prior**2 * place.at, place.at, self.most)
+            tried = [np.clip(place.at + share * change, -most, most) for share in _SHARES]
+            points = [(ahead[:nuisances], hypothesis.tables(ahead[nuisances:])) for ahead in tried]
             gain = 0.0
             for number, ahead in enumerate(tried):
                 (predicted,) = yield Question(
-                    [points[number]], [*_beside(hypothesis, ahead[:own], ahead[own:]), *points[number + 1 :]]
+                    [points[number]],
+                    [*_beside(hypothesis, ahead[:nuisances], ahead[nuisances:]), *points[number + 1 :]],
                 )
-                there = self._placed(hypothesis, ahead, predicted, stage.knee)
-                if there.chi2 < here.chi2:
-                    gain = here.chi2 - there.chi2
-                    here = there
+                candidate = self._placed(hypothesis, ahead, predicted, stage.knee)
+                if candidate.chi2 < place.chi2:
+                    gain = place.chi2 - candidate.chi2
+                    place = candidate
                     break
-            worth = max(_WORTH_A_STEP, stage.worth * here.chi2)
+            worth = max(_WORTH_A_STEP, stage.worth * place.chi2)
             if gain < worth:
                 if without_gain == stage.renewals:
                     finished = without_gain > 0  # no step gains, not even with renewed derivatives
                     break
                 size = _STEPS[renewed % len(_STEPS)]
-                nuisance_rates, there = yield from self._renewed(hypothesis, here, stage.knee, size)
+                nuisance_rates, candidate = yield from self._renewed(hypothesis, place, stage.knee, size)
                 renewed += 1
-                if there.chi2 < here.chi2 - worth:
-                    here = there
+                if candidate.chi2 < place.chi2 - worth:
+                    place = candidate
                 else:
                     without_gain += 1
-        return Fit(hypothesis, here.at[:own], here.at[own:], here.chi2, here.residual, columns, finished)
+        return Fit(
+            hypothesis, place.at[:nuisances], place.at[nuisances:], place.chi2, place.residual, columns, finished
+        )
 
     def _placed(self, hypothesis: Hypothesis, at: Floats, predicted: Floats, knee: float) -> _Place:
         """A point, nuisances then coordinates, with the prediction there [features]."""
@@ -272,27 +276,29 @@ class Fitter:
         prior = prior_of(hypothesis, at[: len(self.nuisances)])
         return _Place(at, predicted, residual, slope, self._chi2(prior, residual, at))
 
-    def _renewed(self, hypothesis: Hypothesis, here: _Place, knee: float, size: float) -> Work[tuple[Floats, _Place]]:
-        """Renew the nuisances' derivatives, and go where single moves of nuisances gain; otherwise stay at `here`.
+    def _renewed(self, hypothesis: Hypothesis, place: _Place, knee: float, size: float) -> Work[tuple[Floats, _Place]]:
+        """Renew the nuisances' derivatives, and go where single moves of nuisances gain; otherwise stay at `place`.
 
         Where slips come and go, a step of all numbers by their derivatives leads astray, and moving a single number does not.
-        The place returned is the best of all single moves and of all gaining moves at once (docs/method/fits.md).
+        The place returned is the best of all single moves and of all gaining moves at once (docs/method/diagnosis.md).
         """
-        own = len(self.nuisances)
-        aside = self._aside(here.at[:own], size)
-        predicted = yield Question([(one, hypothesis.tables(here.at[own:])) for one in aside])
-        rates = self._nuisance_rates(here.at[:own], here.predicted, aside, predicted)
+        nuisances = len(self.nuisances)
+        aside = self._aside(place.at[:nuisances], size)
+        predicted = yield Question([(moved, hypothesis.tables(place.at[nuisances:])) for moved in aside])
+        rates = self._nuisance_rates(place.at[:nuisances], place.predicted, aside, predicted)
         alone = [
-            self._placed(hypothesis, np.concatenate([one, here.at[own:]]), there, knee)
-            for one, there in zip(aside, predicted, strict=True)
-            if (np.abs(one) <= self.most).all()
+            self._placed(hypothesis, np.concatenate([moved, place.at[nuisances:]]), features, knee)
+            for moved, features in zip(aside, predicted, strict=True)
+            if (np.abs(moved) <= self.most).all()
         ]
-        better = [one for one in alone if one.chi2 < here.chi2 - _WORTH_A_STEP]
+        better = [candidate for candidate in alone if candidate.chi2 < place.chi2 - _WORTH_A_STEP]
         if not better:
-            return rates, here
-        all_at_once = here.at + sum(one.at - here.at for one in better)
-        (there,) = yield Question([(all_at_once[:own], hypothesis.tables(all_at_once[own:]))])
-        return rates, min(*better, self._placed(hypothesis, all_at_once, there, knee), key=lambda one: one.chi2)
+            return rates, place
+        all_at_once = place.at + sum(candidate.at - place.at for candidate in better)
+        (features_at_once,) = yield Question([(all_at_once[:nuisances], hypothesis.tables(all_at_once[nuisances:]))])
+        return rates, min(
+            *better, self._placed(hypothesis, all_at_once, features_at_once, knee), key=lambda candidate: candidate.chi2
+        )
 
     def _with_levels(self, nuisance_rates: Floats, effect_rates: Floats, hypothesis: Hypothesis, now: Floats) -> Floats:
         """The nuisances' derivatives; a rig number that an effect changes takes the derivative of that effect."""
@@ -316,19 +322,19 @@ class Fitter:
         """For every nuisance a point that differs by `size` tolerances towards the description [nuisances, nuisances]."""
         return deviations + np.diag(np.where(deviations > 0.0, -size, size))
 
-    def _nuisance_rates(self, deviations: Floats, here: Floats, aside: Floats, there: Sequence[Floats]) -> Floats:
+    def _nuisance_rates(self, deviations: Floats, base: Floats, aside: Floats, moved: Sequence[Floats]) -> Floats:
         steps = np.diag(aside - deviations)
-        return np.column_stack([self._rate(here, *one) for one in zip(there, steps.tolist(), strict=True)])
+        return np.column_stack([self._rate(base, *pair) for pair in zip(moved, steps.tolist(), strict=True)])
 
-    def _effect_rates(self, hypothesis: Hypothesis, deviations: Floats, w: Floats, here: Floats) -> Work[Floats]:
+    def _effect_rates(self, hypothesis: Hypothesis, deviations: Floats, w: Floats, base: Floats) -> Work[Floats]:
         steps = _coordinate_steps(hypothesis, w)
         columns = np.zeros((int(self.floor.compared.sum()), len(w)))
-        there = yield Question(_beside(hypothesis, deviations, w))
-        for i, one in enumerate(there):
-            columns[:, i] = self._rate(here, one, float(steps[i]))
+        moved = yield Question(_beside(hypothesis, deviations, w))
+        for i, features in enumerate(moved):
+            columns[:, i] = self._rate(base, features, float(steps[i]))
         return columns
 
-    def _rate(self, here: Floats, there: Floats, step: float) -> Floats:
-        change = (self.floor.expected(there) - self.floor.expected(here))[self.floor.compared]
+    def _rate(self, base: Floats, moved: Floats, step: float) -> Floats:
+        change = (self.floor.expected(moved) - self.floor.expected(base))[self.floor.compared]
         z = change / (self.floor.scatter[self.floor.compared] * step)
         return np.where(np.isfinite(z), z, 0.0)

@@ -6,18 +6,16 @@ chi2 958 from all runs at once, to 5.38 ms from the runs without, and to 181 fro
 """
 
 import math
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.fits.refits import Start, refits
 from diagnosis.hypotheses.starts import Trial
 from diagnosis.processes import each
 
-Floats = npt.NDArray[np.floating[Any]]
 EFFECT = "frictional-lag"
 _LATER = (1.0, 3.0, 10.0)  # times the longest lag that the library begins with: up to longer than a slip
 _SPAN = (0.85, 1.15)  # times the dead time of the runs without vibration; three of them told it to within 7 %
@@ -27,12 +25,10 @@ _TEETH = 2  # of every fit that get a refit
 
 def late_fits(fitter: Fitter, trials: list[Trial], jobs: int = 1) -> list[Fit]:
     """Fits of friction that lags by much, best first; none where every run vibrates, or none does."""
-    found = _refits(fitter, late_starts(fitter, trials, jobs), jobs)
-    for fit in [fit for fit in found if _is_late_in_time(fit)][
-        :1
-    ]:  # from the numbers of all runs other teeth stand out
-        found += _refits(fitter, _teeth(fitter, fit, jobs), jobs)
-    return sorted(found, key=_chi2)
+    fits = _refits(fitter, late_starts(fitter, trials, jobs), jobs)
+    for fit in [fit for fit in fits if _is_late_in_time(fit)][:1]:  # from the numbers of all runs other teeth stand out
+        fits += _refits(fitter, _teeth(fitter, fit, jobs), jobs)
+    return sorted(fits, key=_chi2)
 
 
 def late_starts(fitter: Fitter, trials: list[Trial], jobs: int = 1) -> list[Start]:
@@ -48,15 +44,15 @@ def late_starts(fitter: Fitter, trials: list[Trial], jobs: int = 1) -> list[Star
         for trial in longest.values()
         for later in _LATER
     ]
-    found: list[Start] = []
+    result: list[Start] = []
     unvibrated = fitter.of_runs(still)
     if not unvibrated.floor.compared.any():  # a climb without a slip, whose force alone is known
         return []
     # the best of each form: fits of one form from several starts end in one valley, and chi2 of two forms may differ by rounding
     best = {fit.hypothesis.forms[EFFECT]: fit for fit in reversed(_refits(unvibrated, starts, jobs))}
     for fit in best.values():
-        found += _teeth(fitter, fit, jobs) if _is_late_in_time(fit) else [(fit.hypothesis, fit.deviations, fit.w)]
-    return found
+        result += _teeth(fitter, fit, jobs) if _is_late_in_time(fit) else [(fit.hypothesis, fit.deviations, fit.w)]
+    return result
 
 
 def _refits(fitter: Fitter, starts: list[Start], jobs: int) -> list[Fit]:
@@ -79,7 +75,9 @@ def _teeth(fitter: Fitter, fit: Fit, jobs: int) -> list[Start]:
     highest_Hz = max(float(run.commands.frequency_Hz.max()) for run in fitter.problem.runs)
     low_s, high_s = (share * delay_s for share in _SPAN)
     count = max(math.ceil((high_s - low_s) * 2.0 * highest_Hz * _PER_HALF_PERIOD), _TEETH)
-    tried = [np.array([math.log(one / axis.scale), *fit.w[1:]]) for one in np.linspace(low_s, high_s, count).tolist()]
+    tried = [
+        np.array([math.log(lag_s / axis.scale), *fit.w[1:]]) for lag_s in np.linspace(low_s, high_s, count).tolist()
+    ]
     chi2 = np.full(count + 2, math.inf)
     for i, share in enumerate(each(jobs, _chi2s, fitter, [(fit, tried[i::jobs]) for i in range(jobs)])):
         chi2[1 + i : 1 + count : jobs] = share
@@ -92,5 +90,5 @@ def _chi2s(fitter: Fitter, share: tuple[Fit, list[Floats]]) -> list[float]:
     """Of the differences alone: the priors hardly change along a dead time."""
     fit, tried = share
     predicted = fitter.predicted_many([(fit.deviations, fit.hypothesis.tables(w)) for w in tried])
-    residuals = [fitter.whitened(one)[0] for one in predicted]
-    return [float(one @ one) for one in residuals]
+    residuals = [fitter.whitened(features)[0] for features in predicted]
+    return [float(residual @ residual) for residual in residuals]

@@ -2,15 +2,14 @@
 
 Slips come and go as a wave moves, so a refit ends near the phases that it started with. Where a wave turns as fast as slips
 follow each other, the breakaways say little about its phase. Each run has its own share of chi2, so eight predictions of all
-runs give eight phases for each run, in any combination (docs/method/fits.md).
+runs give eight phases for each run, in any combination (docs/method/diagnosis.md).
 """
 
 import math
 from itertools import chain
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import FAR_KNEE, Fitter
@@ -20,7 +19,6 @@ from diagnosis.hypotheses.waves import Wave
 from diagnosis.model.per_run import PHASE, phase_of
 from diagnosis.processes import each
 
-Floats = npt.NDArray[np.floating[Any]]
 EFFECT, FORM = "normal-load-fluctuation", "sine"
 _PHASES_RAD = 2.0 * math.pi * np.arange(8) / 8.0  # that a run may begin in
 _RATIOS = (0.007, 0.02, 0.06)  # amplitudes that are tried, over the mean load: from hardly visible to large
@@ -45,20 +43,20 @@ def starts_by_run(fitter: Fitter, origin: Fit, trials: list[Trial], jobs: int = 
             slowest_Hz = frequency.low
             waves[frequency.scale] = Wave(1.0 / frequency.scale, 0.0, 0.0, spread=frequency.prior)
     shares = each(jobs, _in_best_phases, fitter, [(origin, list(waves.values())[i::jobs]) for i in range(jobs)])
-    best = sorted(chain.from_iterable(shares), key=lambda one: one.chi2)[:_MOST]
-    found = [wave_trial(EFFECT, FORM, one.wave, slowest_Hz) for one in best]
-    return [(trial.hypothesis, origin.deviations, trial.w) for trial in found]
+    best = sorted(chain.from_iterable(shares), key=lambda tried: tried.chi2)[:_MOST]
+    wave_trials = [wave_trial(EFFECT, FORM, tried.wave, slowest_Hz) for tried in best]
+    return [(trial.hypothesis, origin.deviations, trial.w) for trial in wave_trials]
 
 
 def _in_best_phases(fitter: Fitter, share: tuple[Fit, list[Wave]]) -> list[_TriedWave]:
     origin, waves = share
     files = [run.file for run in fitter.problem.runs]
     run_of = np.array([files.index(run) for *_, run in fitter.floor.cells])
-    found: list[_TriedWave] = []
+    tried_waves: list[_TriedWave] = []
     for wave in waves:
         tried = [_table(wave, ratio, phase_rad) for ratio in _RATIOS for phase_rad in _PHASES_RAD.tolist()]
         predicted = fitter.predicted_many([(origin.deviations, table) for table in tried])
-        squares = np.array([fitter.whitened(one, FAR_KNEE)[0] ** 2 for one in predicted])
+        squares = np.array([fitter.whitened(features, FAR_KNEE)[0] ** 2 for features in predicted])
         by_run = np.stack([squares[:, run_of == i].sum(axis=1) for i in range(len(files))], axis=1)
         by_run = by_run.reshape(len(_RATIOS), len(_PHASES_RAD), len(files))
         chi2 = by_run.min(axis=1).sum(axis=1)
@@ -66,8 +64,8 @@ def _in_best_phases(fitter: Fitter, share: tuple[Fit, list[Wave]]) -> list[_Trie
         first_rad, *others_rad = _PHASES_RAD[by_run[best].argmin(axis=0)].tolist()
         phases_of = {phase_of(file): phase_rad for file, phase_rad in zip(files[1:], others_rad, strict=True)}
         in_phase = wave._replace(ratio=_RATIOS[best], phase_rad=first_rad, phases_of=phases_of)
-        found.append(_TriedWave(float(chi2[best]), in_phase))
-    return found
+        tried_waves.append(_TriedWave(float(chi2[best]), in_phase))
+    return tried_waves
 
 
 def _table(wave: Wave, ratio: float, phase_rad: float) -> dict[str, dict[str, float | str]]:

@@ -8,15 +8,15 @@ the path costs is in the determinant: a random effect (Rasmussen & Williams, Gau
 
 import copy
 import math
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve
 
+from bridge.arrays import Floats
 from diagnosis.features.force_drive import friction_share
 from diagnosis.features.grid import BLOCK_S
-from diagnosis.features.segments import Commands
+from diagnosis.features.segments import CommandedRun
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.gap.measure import whitened
@@ -24,7 +24,6 @@ from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.hypothesis import Coordinate, Hypothesis
 from diagnosis.hypotheses.waves import friction_series
 
-Floats = npt.NDArray[np.floating[Any]]
 RANDOM: Final = "random"  # form
 LOAD: Final = "normal-load-fluctuation"
 TRACK: Final = "position-dependent-friction"
@@ -91,13 +90,13 @@ class RandomFriction:
         self._paths = [self._drawn(fitter, base, {"ratio": ratio} | length) for length in lengths]
 
     def _drawn(self, fitter: Fitter, base: Fit, table: dict[str, float]) -> _Paths:
-        here = fitter.predicted(base.deviations, base.effects)
+        base_features = fitter.predicted(base.deviations, base.effects)
         paths = [{self.effect: {"form": RANDOM, "seed": seed, **table}} for seed in range(1, _DRAWS + 1)]
         shown: list[Floats] = []
         for measured in fitter.predicted_many([(base.deviations, base.effects | path) for path in paths]):
             varied = copy.copy(fitter.problem)
             varied.measured = measured + fitter.floor.bias
-            shown.append(whitened(fitter.floor, varied, here)[0])
+            shown.append(whitened(fitter.floor, varied, base_features)[0])
         drawn = np.array(shown)
         covariance = np.cov(drawn, rowvar=False)
         independent = np.diag(_INDEPENDENT * np.diag(covariance))
@@ -111,10 +110,10 @@ class RandomFriction:
             noise: variance of whitened differences under a model that is right.
 
         """
-        own = len(fit.deviations)
-        spread = np.concatenate([np.ones(own), [axis.prior for axis in fit.hypothesis.coordinates]])
+        nuisances = len(fit.deviations)
+        spread = np.concatenate([np.ones(nuisances), [axis.prior for axis in fit.hypothesis.coordinates]])
         # the nuisances are free about their described values, the effects about where they were fitted
-        residual = fit.residual + fit.columns[:, :own] @ fit.deviations
+        residual = fit.residual + fit.columns[:, :nuisances] @ fit.deviations
         scaled = fit.columns * spread
         without = scaled @ scaled.T + noise * np.eye(len(residual))
         tried: list[_TriedLoad] = []
@@ -123,7 +122,7 @@ class RandomFriction:
                 shift = size * min(size, 1.0) * paths.mean  # what adds to powers, which count as logarithms
                 tried.append(_TriedLoad(*_likelihood(without + size**2 * paths.covariance, residual - shift), size, i))
         best = max(tried)
-        mean = float(np.logaddexp.reduce([one.likelihood for one in tried])) - math.log(len(tried))
+        mean = float(np.logaddexp.reduce([attempt.likelihood for attempt in tried])) - math.log(len(tried))
         table = dict(self._paths[best.paths].table)
         table["ratio"] *= best.size
         axes = tuple(
@@ -150,9 +149,16 @@ def is_random(hypothesis: Hypothesis) -> bool:
 
 def in_bursts(problem: Problem) -> bool:
     """Whether breakaways scatter to one side, or most of them hardly at all; also where they are too few to tell."""
-    series = [one.value for one in friction_series(problem.runs, problem.scales, "time") if one.of_slips]
+    series = [
+        friction_sery.value
+        for friction_sery in friction_series(problem.runs, problem.scales, "time")
+        if friction_sery.of_slips
+    ]
     # its own mean takes from the scatter of so few
-    values = np.concatenate([own * math.sqrt(len(own) / (len(own) - 1)) for own in series] or [np.zeros(0)])
+    values = np.concatenate(
+        [values_of_run * math.sqrt(len(values_of_run) / (len(values_of_run) - 1)) for values_of_run in series]
+        or [np.zeros(0)]
+    )
     if len(values) < _FEWEST or not values.any():
         return True
     values = values / values.std()
@@ -168,11 +174,11 @@ def _scatter(problem: Problem, over: str) -> float:
             share, valid = friction_share(run.signals["drive_force_N"], run.commands.motion)
             shares.append(share[valid])
     else:
-        shares = [one.value for one in friction_series(problem.runs, problem.scales, over)]
+        shares = [friction_sery.value for friction_sery in friction_series(problem.runs, problem.scales, over)]
     return float(np.std(np.concatenate(shares))) if shares else 0.0
 
 
-def _way_m(commands: Commands) -> float:
+def _way_m(commands: CommandedRun) -> float:
     """How much of the track a run covers."""
     at_m = np.cumsum(commands.drive) * BLOCK_S if commands.motion is None else commands.motion.position_m
     return float(np.ptp(at_m))

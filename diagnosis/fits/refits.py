@@ -1,11 +1,9 @@
 """Many refits spread over processes, and the best of each."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+from typing import TypeVar
 
-import numpy as np
-import numpy.typing as npt
-
+from bridge.arrays import Floats
 from diagnosis.fits.batch import Work, together
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
@@ -13,8 +11,6 @@ from diagnosis.fits.screening import Screened
 from diagnosis.hypotheses.hypothesis import Hypothesis
 from diagnosis.hypotheses.starts import Trial
 from diagnosis.processes import each
-
-Floats = npt.NDArray[np.floating[Any]]
 
 # start of a refit: the hypothesis, its nuisances in tolerances [nuisances], its coordinates [coordinates]
 Start = tuple[Hypothesis, Floats, Floats]
@@ -44,13 +40,13 @@ def _share(fitter: Fitter, share: tuple[Callable[[Fitter, T], Work[Fit]], Sequen
     return together(fitter.predicted_many, [work(fitter, item) for item in items])
 
 
-def best_of_each(found: list[_Formed], by_form: bool = False) -> list[_Formed]:
-    """The first of every set of effects, in the order of `found`; with `by_form`, the first of every form of the effects."""
+def best_of_each(formed: list[_Formed], by_form: bool = False) -> list[_Formed]:
+    """The first of every set of effects, in the order of `formed`; with `by_form`, the first of every form of the effects."""
     seen: set[frozenset[tuple[str, str]]] = set()
     result: list[_Formed] = []
-    for one in found:
-        key = frozenset((name, form if by_form else "") for name, form in one.hypothesis.forms.items())
+    for candidate in formed:
+        key = frozenset((name, form if by_form else "") for name, form in candidate.hypothesis.forms.items())
         if key not in seen:
             seen.add(key)
-            result.append(one)
+            result.append(candidate)
     return result

@@ -43,8 +43,8 @@ def on_floor_of(best: Fit, first: Retuned, singles: list[Fit], pairs: list[Fit],
     (retuned,) = together(fitter.predicted_many, [fitter.retuning(first.fit.deviations)])
     beside = first.fit._replace(deviations=best.deviations)
     starts = [(fit.hypothesis, fit.deviations, fit.w) for fit in (beside, *singles[:_FITS], *pairs[:_FITS])]
-    found = best_of_each(sorted((retuned, *refits(fitter, starts, jobs)), key=lambda fit: fit.chi2))
-    without, single, double = ([fit for fit in found if len(fit.hypothesis.effects) == count] for count in range(3))
-    nearest = next(fit for fit in found if fit.hypothesis.effects)
+    leaders = best_of_each(sorted((retuned, *refits(fitter, starts, jobs)), key=lambda fit: fit.chi2))
+    without, single, double = ([fit for fit in leaders if len(fit.hypothesis.effects) == count] for count in range(3))
+    nearest = next(fit for fit in leaders if fit.hypothesis.effects)
     expected = expected_chi2(fitter, nearest, first.roughness, jobs)
     return Again(Retuned(fitter, without[0], first.roughness, expected), single, double)

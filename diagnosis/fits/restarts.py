@@ -12,9 +12,13 @@ def alone(pairs: list[Fit]) -> list[Start]:
     best = min(pairs, key=lambda fit: fit.chi2)
     starts: list[Start] = []
     for name, form in best.hypothesis.forms.items():
-        own = [i for i, coordinate in enumerate(best.hypothesis.coordinates) if coordinate.effect == name]
+        indices = [i for i, coordinate in enumerate(best.hypothesis.coordinates) if coordinate.effect == name]
         starts.append(
-            (Hypothesis({name: form}, tuple(best.hypothesis.coordinates[i] for i in own)), best.deviations, best.w[own])
+            (
+                Hypothesis({name: form}, tuple(best.hypothesis.coordinates[i] for i in indices)),
+                best.deviations,
+                best.w[indices],
+            )
         )
     return starts
 

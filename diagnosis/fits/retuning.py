@@ -3,11 +3,11 @@
 import math
 from collections.abc import Callable
 from itertools import chain
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.faults import Fault
 from diagnosis.evidence.folder import Evidence
 from diagnosis.features.grid import BLOCK_S
@@ -23,7 +23,6 @@ from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.model.rig import Roughness
 from diagnosis.processes import each
 
-Floats = npt.NDArray[np.floating[Any]]
 ROUGHNESS = Roughness(0.003, 1.5e-4, 0)  # before the breakaways of the evidence say more
 _MARGIN = 1.2  # on the roughness: too small a floor makes causes out of scatter
 # What surfaces lie within, a factor of two of 0.3 %, says as much as this many slips; breakaway and re-stick count twice. Pooled
@@ -34,7 +33,8 @@ _SLIPS_OF_OTHERS = 8.0
 _SMOOTHEST, _ROUGHEST = 0.002, 0.005
 FIRST_REPLICATES, REPLICATES = 12, 32  # for the roughness, and for the floor
 _NEW_REPLICATES = 24  # that the floor does not know
-# Predictions of all fitted runs that a diagnosis takes: counted on 9 made rigs (docs/method/fits.md); for an estimate of the time
+# Predictions of all fitted runs that a diagnosis takes: counted on 9 made rigs (docs/method/diagnosis.md); for an
+# estimate of the time
 _FEW, _MANY = 600, 1500
 # of chi2 a compared feature: what the least floors promise is not held against a rig that is better
 _LEAST_EXPECTED = 0.2
@@ -63,7 +63,7 @@ def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, f
     if not floor.compared.any():
         raise Fault(
             "BAD_EVIDENCE",
-            f"{evidence.folder}: the rig as described shows nothing of what was measured: check the friction and the stiffness "
+            f"{evidence.folder}: the rig as described shows none of the measured features: check the friction and the stiffness "
             "of [rig] against the runs, and that the drive moves in them",
         )
     apart = gap(floor, differences(floor, problem, problem.predicted(point)))
@@ -74,7 +74,7 @@ def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, f
     # where slips come and go chi2 is jagged: from half the way 166 was found instead of 410
     starts = [fit.deviations, 0.5 * fit.deviations]
     shares = each(jobs, _retuned, Fitter(problem, floor, nuisances), [starts[i::jobs] for i in range(jobs)])
-    fitter, fit = min(chain.from_iterable(shares), key=lambda one: one[1].chi2)
+    fitter, fit = min(chain.from_iterable(shares), key=lambda pair: pair[1].chi2)
     expected = expected_chi2(fitter, fit, roughness, jobs)
     left = differences(floor, problem, fitter.predicted(fit.deviations, {}))
     progress(f"refitted inside its tolerances, {gap(floor, left):.1f} noise floors are left", 0.25)
@@ -84,7 +84,7 @@ def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, f
 def _retuned(fitter: Fitter, starts: list[Floats]) -> list[tuple[Fitter, Fit]]:
     """The rig refitted from every start, and a fitter with the derivatives there."""
     fitters = [fitter.for_problem(fitter.problem) for _ in starts]
-    works = [own.retuning(deviations) for own, deviations in zip(fitters, starts, strict=True)]
+    works = [fitter.retuning(deviations) for fitter, deviations in zip(fitters, starts, strict=True)]
     return list(zip(fitters, together(fitter.predicted_many, works), strict=True))
 
 

@@ -5,18 +5,16 @@ of every pair of trials; no further prediction is needed.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from diagnosis.fits.fit import Fit, step_within
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.hypotheses.hypothesis import Hypothesis
 from diagnosis.hypotheses.starts import Trial
 from diagnosis.processes import each
-
-Floats = npt.NDArray[np.floating[Any]]
 
 # Bounds of a screened start: times the trial's own size, and tolerances of a nuisance. Too small: large effects look too small
 # to matter. Too large: starts lie where the derivatives no longer hold.
@@ -55,7 +53,7 @@ class Column(NamedTuple):
 class Directions:
     """The columns of a fit's nuisances and coordinates, which may move along with a further direction.
 
-    A nuisance at its bound stays there; if it went beyond, it would take what an effect causes (docs/method/fits.md).
+    A nuisance at its bound stays there; if it went beyond, it would take what an effect causes (docs/method/diagnosis.md).
     """
 
     def __init__(self, fit: Fit, most: Floats) -> None:
@@ -93,33 +91,33 @@ def screened(fitter: Fitter, base: Fit, trials: list[Trial], jobs: int = 1, pair
     # in the order of the trials: otherwise `jobs` would decide which of two equal trials comes first
     changes = (shares[number % jobs][number // jobs] for number in range(len(trials)))
     columns = [Column(trial, change, directions.freed(change)) for trial, change in zip(trials, changes, strict=True)]
-    columns = [one for one in columns if float(one.direction @ one.direction) >= _LEAST_POWER]
+    columns = [column for column in columns if float(column.direction @ column.direction) >= _LEAST_POWER]
     if not columns:
         return Screening([], [])
-    inner = np.stack([one.direction for one in columns])
+    inner = np.stack([column.direction for column in columns])
     towards = inner @ directions.left
     inner = inner @ inner.T
-    low, high = np.array([_bounds(one.trial) for one in columns]).T
+    low, high = np.array([_bounds(column.trial) for column in columns]).T
     left = float(directions.left @ directions.left)
     sizes = np.clip(towards / np.diag(inner), low, high)
     alone = left - 2.0 * sizes * towards + sizes**2 * np.diag(inner)
     singles = [
-        _start(base, directions, [one], [size], chi2)
-        for one, size, chi2 in zip(columns, sizes.tolist(), alone.tolist(), strict=True)
+        _start(base, directions, [column], [size], chi2)
+        for column, size, chi2 in zip(columns, sizes.tolist(), alone.tolist(), strict=True)
     ]
     best = best_pairs(columns, inner, towards, (low, high), left) if paired else []
-    pairs = [_start(base, directions, [columns[i], columns[j]], own, chi2) for i, j, own, chi2 in best]
-    return Screening(sorted(singles, key=lambda one: one.chi2), pairs)
+    pairs = [_start(base, directions, [columns[i], columns[j]], sizes, chi2) for i, j, sizes, chi2 in best]
+    return Screening(sorted(singles, key=lambda single: single.chi2), pairs)
 
 
 def _columns(fitter: Fitter, work: tuple[Fit, list[Trial]]) -> list[Floats]:
     base, trials = work
-    here = fitter.predicted(base.deviations, base.effects)
-    slope = fitter.whitened(here)[1]
-    there = fitter.predicted_many(
+    base_features = fitter.predicted(base.deviations, base.effects)
+    slope = fitter.whitened(base_features)[1]
+    moved = fitter.predicted_many(
         [(base.deviations, base.effects | trial.hypothesis.tables(trial.w)) for trial in trials]
     )
-    return [fitter.column(here, one, slope) for one in there]
+    return [fitter.column(base_features, features, slope) for features in moved]
 
 
 def _bounds(trial: Trial) -> tuple[float, float]:
@@ -139,27 +137,27 @@ def best_pairs(
     )
     low, high = bounds
     sizes = np.clip(sizes, np.stack([low[first], low[second]]), np.stack([high[first], high[second]]))
-    one, other = sizes
-    chi2 = left - 2.0 * (one * towards[first] + other * towards[second])
-    chi2 += one**2 * a + other**2 * b + 2.0 * one * other * c
+    first_size, other = sizes
+    chi2 = left - 2.0 * (first_size * towards[first] + other * towards[second])
+    chi2 += first_size**2 * a + other**2 * b + 2.0 * first_size * other * c
     names = [column.trial.hypothesis.effects[0] for column in columns]
     seen: set[frozenset[str]] = set()
-    found: list[tuple[int, int, list[float], float]] = []
+    pairs: list[tuple[int, int, list[float], float]] = []
     for k in np.argsort(chi2, kind="stable").tolist():
         i, j = int(first[k]), int(second[k])
         both = frozenset((names[i], names[j]))
         if len(both) == 2 and both not in seen:
             seen.add(both)
-            found.append((i, j, sizes[:, k].tolist(), float(chi2[k])))
-            if len(found) == _PAIRS:
+            pairs.append((i, j, sizes[:, k].tolist(), float(chi2[k])))
+            if len(pairs) == _PAIRS:
                 break
-    return found
+    return pairs
 
 
 def _start(base: Fit, directions: Directions, columns: list[Column], sizes: list[float], chi2: float) -> Screened:
     """Trials at these sizes on top of a fit."""
     change = np.zeros_like(columns[0].change)
-    hypothesis, own = base.hypothesis, [base.w]
+    hypothesis, coordinates = base.hypothesis, [base.w]
     for column, size in zip(columns, sizes, strict=True):
         w = column.trial.w.copy()
         first = column.trial.hypothesis.coordinates[0]
@@ -169,11 +167,11 @@ def _start(base: Fit, directions: Directions, columns: list[Column], sizes: list
             w[0] *= size
         change += size * column.change
         hypothesis = added(hypothesis, column.trial.hypothesis)
-        own.append(w)
+        coordinates.append(w)
     moved = directions.moved(change)
     count = len(base.deviations)
     deviations = np.clip(moved[:count], -_FURTHEST_TOLERANCES, _FURTHEST_TOLERANCES)
-    unmoved = np.concatenate(own)
+    unmoved = np.concatenate(coordinates)
     # a large effect may have pulled the nuisances into a valley of their own: where the rig is described is a start as well
     others = ((base.deviations, unmoved), (np.zeros_like(base.deviations), unmoved))
-    return Screened(hypothesis, deviations, np.concatenate([moved[count:], *own[1:]]), chi2, others)
+    return Screened(hypothesis, deviations, np.concatenate([moved[count:], *coordinates[1:]]), chi2, others)

@@ -6,11 +6,10 @@ and only the refit counts.
 """
 
 from collections import Counter
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from diagnosis.fits.batch import Work
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
@@ -19,7 +18,6 @@ from diagnosis.fits.screening import Screened, Screening, screened
 from diagnosis.hypotheses.hypothesis import LEVELS, NOTHING, Hypothesis
 from diagnosis.hypotheses.starts import Trial
 
-Floats = npt.NDArray[np.floating[Any]]
 # Starts of a screening that get two steps of a refit, of different effects first; `_OF_ONE` of an effect at most. Fewer: a right
 # effect is passed over, as what a trial promises is linear. More: time.
 _QUICK, _OF_ONE = 8, 3
@@ -63,7 +61,9 @@ def refitted_rest(fitter: Fitter, base: Fit, seen: list[Fit], trials: list[Trial
     known = {effect for fit in seen for effect in fit.hypothesis.effects}
     others = [trial for trial in trials if not known & set(trial.hypothesis.effects) and not _is_wave(trial.hypothesis)]
     described = np.zeros_like(base.deviations)
-    starts = [((one.hypothesis, described, one.w), base.chi2) for one in best_of_each(others, by_form=True)]
+    starts = [
+        ((screened.hypothesis, described, screened.w), base.chi2) for screened in best_of_each(others, by_form=True)
+    ]
     return best_of_each(sorted(each_beside(jobs, _trying, fitter, starts), key=lambda fit: fit.chi2))
 
 
@@ -84,7 +84,7 @@ def pairs_of_effects(
     """
     best = singles[0].chi2
     beside = best_of_each(screened(fitter, singles[0], trials, jobs, paired=False).singles)[:_PAIRS]
-    starts = [one for one in (*screening.pairs[:_PAIRS], *beside) if one.chi2 < best - _LEAST_OF_SECOND]
+    starts = [start for start in (*screening.pairs[:_PAIRS], *beside) if start.chi2 < best - _LEAST_OF_SECOND]
     return _refitted(fitter, best, starts, _FULL_PAIRS, jobs)
 
 
@@ -103,28 +103,28 @@ def middle_fits(fitter: Fitter, none: Fit, singles: list[Fit], named: Fit, jobs:
     return middle(NOTHING, np.zeros(0)), middle(named.hypothesis, named.w)
 
 
-def _shortlist(found: list[Screened], hinted: frozenset[str]) -> list[Screened]:
+def _shortlist(screened: list[Screened], hinted: frozenset[str]) -> list[Screened]:
     """The best start of the leading effects and of those hinted, then their next starts."""
-    best = best_of_each(found)
-    chosen = best[: _QUICK - 2] + [one for one in best[_QUICK - 2 :] if hinted & set(one.hypothesis.effects)]
-    count = Counter(one.hypothesis.effects for one in chosen)
-    taken = {id(one) for one in chosen}
-    for one in found:
+    best = best_of_each(screened)
+    chosen = best[: _QUICK - 2] + [start for start in best[_QUICK - 2 :] if hinted & set(start.hypothesis.effects)]
+    count = Counter(start.hypothesis.effects for start in chosen)
+    taken = {id(start) for start in chosen}
+    for start in screened:
         if len(chosen) >= _QUICK + len(hinted):
             break
-        if id(one) not in taken and 0 < count[one.hypothesis.effects] < _OF_ONE:
-            count[one.hypothesis.effects] += 1
-            chosen.append(one)
+        if id(start) not in taken and 0 < count[start.hypothesis.effects] < _OF_ONE:
+            count[start.hypothesis.effects] += 1
+            chosen.append(start)
     return chosen
 
 
-def _levels(found: list[Screened]) -> list[Screened]:
+def _levels(screened: list[Screened]) -> list[Screened]:
     """Effects that are a number of the rig table, from where the rig is described, to begin at the best of some sizes."""
     starts: list[Screened] = []
-    for one in best_of_each(found):
-        if set(one.hypothesis.effects) <= LEVELS.keys():
-            first, *others = [(np.zeros_like(one.deviations), np.array([size])) for size in _SIZES]
-            starts.append(Screened(one.hypothesis, *first, one.chi2, tuple(others)))
+    for start in best_of_each(screened):
+        if set(start.hypothesis.effects) <= LEVELS.keys():
+            first, *others = [(np.zeros_like(start.deviations), np.array([size])) for size in _SIZES]
+            starts.append(Screened(start.hypothesis, *first, start.chi2, tuple(others)))
     return starts
 
 
@@ -146,8 +146,8 @@ def _is_wave(hypothesis: Hypothesis) -> bool:
     return any(axis.name == "phase_rad" for axis in hypothesis.coordinates)
 
 
-def _quick(fitter: Fitter, one: Screened) -> Work[Fit]:
-    return fitter.quick(one.hypothesis, ((one.deviations, one.w), *one.others))
+def _quick(fitter: Fitter, start: Screened) -> Work[Fit]:
+    return fitter.quick(start.hypothesis, ((start.deviations, start.w), *start.others))
 
 
 def _trying(fitter: Fitter, work: tuple[Start, float]) -> Work[Fit]:

@@ -1,7 +1,7 @@
-"""What of long records is simulated: an excerpt, as the fits learn little from the hundredth slip and pay for each."""
+"""The excerpt of long records that is simulated: the hundredth slip adds little to a fit and costs as much as the first."""
 
 from bridge.log.finding import Finding
-from diagnosis.evidence.run import Evidence, Run
+from diagnosis.evidence.run import Evidence, MeasuredRun
 from diagnosis.evidence.split import cut
 
 # Seconds that are simulated in all, of the fitted and of the held-out runs. Less: few slips. More: minutes of work.
@@ -10,7 +10,7 @@ _SHORTEST_S = 5.0  # of a run
 
 
 def excerpt(evidence: Evidence) -> Evidence:
-    """The evidence with every run shortened alike where all of them are too long, and a finding that says so."""
+    """The evidence with every run shortened alike where all together are too long, and a finding about it."""
     allowed = {
         holdout: most_s / max(sum(_seconds(run) for run in evidence.runs if run.holdout == holdout), most_s)
         for holdout, most_s in ((False, _FITTED_S), (True, _HELD_OUT_S))
@@ -21,12 +21,12 @@ def excerpt(evidence: Evidence) -> Evidence:
         run if allowed[run.holdout] == 1.0 else cut(run, 0.0, max(_seconds(run) * allowed[run.holdout], _SHORTEST_S))
         for run in evidence.runs
     )
-    kept_s, whole_s = (sum(_seconds(run) for run in some) for some in (runs, evidence.runs))
+    kept_s, whole_s = (sum(_seconds(run) for run in group) for group in (runs, evidence.runs))
     text = (
         f"{kept_s:.3g} of {whole_s:.4g} s are simulated, from the start of every run; relations and shares are of all"
     )
     return evidence._replace(runs=runs, findings=(*evidence.findings, Finding("excerpt", "fits", text)))
 
 
-def _seconds(run: Run) -> float:
+def _seconds(run: MeasuredRun) -> float:
     return float(run.t_s[-1] - run.t_s[0])

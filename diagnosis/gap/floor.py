@@ -2,25 +2,24 @@
 
 from collections.abc import Sequence
 from itertools import chain
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Floats
 from diagnosis.features.feature import DRIVE_WAVES, POWERS, Feature
 from diagnosis.gap.problem import Draw, Point, Problem
 from diagnosis.model.rig import Roughness
 from diagnosis.processes import each
 
-Floats = npt.NDArray[np.floating[Any]]
-
 # Noise floors up to which a difference counts in full; beyond, it counts as its logarithm.
 # Too small: large differences, which name the effect, hardly count. Too large: one signal that is far off hides all others.
 KNEE = 6.0
 _LEAST_POWER = 1e-30  # squared unit of the signal: keeps the logarithm of a power finite; far below any sensor's noise
-# Smallest scatter of "spring bend" [s2 x stiffness]: what sensors alone bend the force over the extension.
-# Too small: rigs without a gap show a bend. Too large: a slow force sensor is not told from a late one.
-# Counted on 20 rigs without a gap (docs/method/gap.md).
+# Smallest scatter of "spring bend" [s2 x stiffness]: the bend of the force over the extension by sensors alone.
+# Too small: rigs without a gap show a bend. Too large: a slow and a late force sensor are not separated.
+# Counted on 20 rigs without a gap (docs/method/diagnosis.md).
 _SENSORS_BEND_S2 = 1e-7
 _SHORT_WAVES = frozenset(f"wave {number}" for number in range(5, DRIVE_WAVES + 1))  # shorter than a sensor's bow
 # Share of the replicates in which a feature must be finite to be compared.
@@ -32,7 +31,7 @@ CellKey = tuple[str, str, tuple[float, float], str]
 class Floor(NamedTuple):
     """The difference that a perfect model would still show, by feature.
 
-    The features are those of one `Problem`. Arrays are [features], in the unit of each feature, where nothing else is said.
+    The features belong to one `Problem`. Arrays are [features], in the unit of each feature, unless stated otherwise.
     """
 
     bias: Floats  # mean of the replicates less the noise-free prediction; 0 or more for powers
@@ -50,17 +49,17 @@ class Floor(NamedTuple):
         """
         return logarithms(predicted + self.bias, self.powers)
 
-    def of_features(self, own: npt.NDArray[np.bool_]) -> "Floor":
-        """The floor of the features marked in `own` [features], which must be all features of some runs.
+    def of_features(self, mask: npt.NDArray[np.bool_]) -> "Floor":
+        """The floor of the features marked in `mask` [features], which must be all features of some runs.
 
         Runs are independent of each other, so the whitening may be cut at their borders.
         """
-        rows = own[self.compared]
+        rows = mask[self.compared]
         return Floor(
-            bias=self.bias[own],
-            powers=self.powers[own],
-            scatter=self.scatter[own],
-            compared=self.compared[own],
+            bias=self.bias[mask],
+            powers=self.powers[mask],
+            scatter=self.scatter[mask],
+            compared=self.compared[mask],
             whitening=self.whitening[rows][:, rows],
             cells=tuple(cell for cell, is_own in zip(self.cells, rows, strict=True) if is_own),
             level=self.level,
@@ -131,11 +130,11 @@ def floor_of(problem: Problem, point: Point, drawn: Floats, before: Floor | None
     mean = np.where(finite, drawn, 0.0).sum(axis=0) / count
     bias = np.where(compared, mean - np.where(compared, plain, 0.0), 0.0)
     # Noise only adds to a power, so a bias below 0 is chance. Added to the prediction of a weaker ring, such a bias would give
-    # a negative power, whose logarithm is far off (docs/method/gap.md).
+    # a negative power, whose logarithm is far off (docs/method/diagnosis.md).
     bias[powers] = np.maximum(bias[powers], 0.0)
     about = np.where(finite, logarithms(drawn, powers) - logarithms(mean, powers), 0.0)
     # Under vibration the phase at which a slip begins decides how the slip goes. So the prediction scatters as the measured
-    # run does, and the variance of their difference is twice that of the replicates.
+    # run does, and the variance of their difference is twice the variance of the replicates.
     about *= np.where(_slips_under_vibration(problem), 2.0**0.5, 1.0)
     spread = np.sqrt((about * about).sum(axis=0) / np.maximum(count - 1, 1))
     least = np.array([_least(label, problem) for _, label in labels])
@@ -156,7 +155,7 @@ def floor_of(problem: Problem, point: Point, drawn: Floats, before: Floor | None
     # A further run differs from the mean of `count` replicates by a little more than the replicates do among themselves.
     others = (len(drawn) + 1.0) / (len(drawn) - 1.0)
     squares = np.where(lost[compared], 1.0, z * z)
-    # no cell: the model shows nothing of what was measured, which has no mean; who asked for the floor says so
+    # no cell: the model shows none of the measured features, so there is no mean; the caller reports it
     level = np.sqrt(others * np.mean([cell_means(row, cells).mean() for row in squares])) if cells else np.nan
     segments = [(file, label.segment) for (file, label), use in zip(labels, compared, strict=True) if use]
     return Floor(bias, powers, scatter, compared, _whitening(z, promised, segments), cells, float(level))
@@ -190,20 +189,20 @@ def cell_means(squares: Floats, cells: tuple[CellKey, ...]) -> Floats:
 def _whitening(z: Floats, promised: Floats, segments: list[tuple[str, int]]) -> Floats:
     """Inverse root of the covariance of the replicates `z` [count, compared], segment by segment.
 
-    Each segment runs on its own piece of the track. With so few replicates, a correlation of two segments is chance, and a
-    shrinkage strong enough to remove this chance would also remove what a slip does to all features of its segment.
+    Each segment runs on another piece of the track. With so few replicates, a correlation of two segments is chance, and a
+    shrinkage strong enough to remove this chance would also remove the common effect of a slip on all features of its segment.
     """
     result = np.zeros((len(segments), len(segments)))
     for segment in dict.fromkeys(segments):
-        own = np.array([one == segment for one in segments])
-        result[np.outer(own, own)] = _inverse_root(z[:, own], promised[own]).ravel()
+        mask = np.array([label == segment for label in segments])
+        result[np.outer(mask, mask)] = _inverse_root(z[:, mask], promised[mask]).ravel()
     return result
 
 
 def _inverse_root(z: Floats, promised: Floats) -> Floats:
     """Inverse root of the covariance of the replicates `z` [count, features], shrunk towards independence.
 
-    The intensity of the shrinkage is that of Ledoit and Wolf (2004). `promised` [features] is added to the variances.
+    The intensity of the shrinkage follows Ledoit and Wolf (2004). `promised` [features] is added to the variances.
     """
     count, features = z.shape
     sample = z.T @ z / count
@@ -223,7 +222,7 @@ def _least(label: Feature, problem: Problem) -> float:
     """Smallest scatter of a feature, in the unit of the feature: resolution of the grid and accuracy of ordinary sensors.
 
     A smaller value raises false gaps from sensors as they are sold; a larger value hides small effects in that feature. A
-    number without a reason beside it was set so that synthetic evidence without a gap differs by one to two noise floors (rms
+    number without a comment was set so that synthetic evidence without a gap differs by one to two noise floors (rms
     over eight evidences of the protocol "ladder").
     """
     force_N, slip_s, _, stiffness, _ = problem.scales

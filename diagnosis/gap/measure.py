@@ -6,39 +6,37 @@ cycles, while every cycle looks the same.
 
 Each difference is divided by its noise floor. The floor is the scatter that the feature shows among replicates of the model:
 they differ by sensor noise as measured, by the rough surface, and by the age of the contact at the start. The floor is never
-below what the 1 ms grid resolves and ordinary sensors hold. The gap is the root of the mean square of the differences over
-cells of signal x regime x band x run. Each cell counts alike, so a shape of 14 points weighs no more than one mean level:
+below the resolution of the 1 ms grid and the accuracy of ordinary sensors. The gap is the root of the mean square of the
+differences over cells of signal x regime x band x run. Each cell counts alike, so a shape of 14 points weighs no more than one
+mean level:
 
     gap = sqrt(mean over cells of mean over the cell's features of T(difference / floor)^2) / level,  T(z) = 6 asinh(z / 6)
 
 The level is the same root for the replicates themselves, so a perfect model has the gap 1.0. T is the identity up to a few
-floors and a logarithm beyond. A ripple of 500 floors in a very accurate drive position says no more than a ripple of 50 floors,
+floors and a logarithm beyond. A ripple of 500 floors in a very accurate drive position proves no more than a ripple of 50 floors,
 and must not hide all other differences.
 """
 
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from diagnosis.gap.floor import KNEE, CellKey, Floor, cell_means, compress, logarithms, slope_of_compress
 from diagnosis.gap.problem import Problem
 
-Floats = npt.NDArray[np.floating[Any]]
 DEFINITION = (
     "root mean square, over cells of signal x regime x band x run, of the differences between measured and predicted "
     "features (cycle means and trends, slip shapes, levels, vibration, parity relations), each in units of the scatter of "
     "replicates of the model with measured noise and a rough surface; beyond 6 units logarithmic; 1.0 is a perfect model"
 )
 # Difference, in noise floors, of every feature of a rig that cannot be simulated: larger than any other difference.
-# Too small: an impossible rig, which only pays for missing features, beats the possible ones (docs/method/gap.md).
+# Too small: an impossible rig, which only pays for missing features, beats the possible ones (docs/method/diagnosis.md).
 _IMPOSSIBLE = 1e4
 # Difference, in noise floors, of one feature that the rig shows and the model does not; only for the gap that is reported.
 # Too small: a model without slips seems near. Too large: the logarithm of T takes the rest away.
 _LACKING = 8.0
 # Penalty, in noise floors, for one measured slip that the model does not show (after whitening, so one slip counts once).
 # Too small: models that lose slips win. Too large: a fit that starts with late slips cannot find its way back.
-# Counted on one late slip (docs/method/gap.md).
+# Counted on one late slip (docs/method/diagnosis.md).
 _LACKING_SLIP = 5.0
 
 
@@ -76,9 +74,9 @@ def whitened(floor: Floor, problem: Problem, predicted: Floats, knee: float = KN
     if lacking.any():
         places = problem.place[floor.compared]
         for place in np.unique(places[lacking]).tolist():
-            own = lacking & (places == place)
+            mask = lacking & (places == place)
             slips = max(problem.slips[place], 1)
-            z[own] = _LACKING_SLIP * slips**0.5 / np.linalg.norm(floor.whitening[:, own].sum(axis=1))
+            z[mask] = _LACKING_SLIP * slips**0.5 / np.linalg.norm(floor.whitening[:, mask].sum(axis=1))
     return floor.whitening @ compress(z, knee), slope_of_compress(z, knee)
 
 

@@ -5,16 +5,16 @@ from typing import NamedTuple
 import numpy as np
 
 from bridge.faults import Fault
-from diagnosis.evidence.folder import Evidence, Run
+from diagnosis.evidence.folder import Evidence, MeasuredRun
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.feature import Signals, scales_of
 from diagnosis.features.force_drive import moving_s
 from diagnosis.features.grid import BLOCK_S, SHAKEN, averaged, block_means, reduce_run, without_vibration
-from diagnosis.features.noise import Noise, noise_of
-from diagnosis.features.segments import Commands, commands_of
+from diagnosis.features.noise import RunNoise, noise_of
+from diagnosis.features.segments import CommandedRun, commands_of
 from diagnosis.features.slips import settled
 from diagnosis.model.predict import predict
-from diagnosis.model.rig import Entry, Start, rig_config
+from diagnosis.model.rig import Start, StartState, rig_config
 from diagnosis.model.segment_starts import entries_of
 
 # Seconds that an axis must move in a run. Too small: the mean friction is noise. Too large: short strokes are refused.
@@ -28,13 +28,13 @@ class Prepared(NamedTuple):
     file: str
     holdout: bool  # held out: not fitted, only predicted
     signals: Signals
-    commands: Commands
+    commands: CommandedRun
     start: Start
-    entries: tuple[Entry, ...]  # state at the start of each segment, with the force as the sensor read it
+    entries: tuple[StartState, ...]  # state at the start of each segment, with the force as the sensor read it
     before_s: float  # sum of the durations of the runs before this one, in the manifest's order
-    noise: Noise
+    noise: RunNoise
     clipped: dict[str, tuple[float, float]]  # by signal: lowest and highest value that the sensor can show
-    beside: Signals = {}  # what is measured besides and no model predicts: normal load, another force
+    beside: Signals = {}  # measured channels that no model predicts: normal load, another force
 
 
 def prepare(evidence: Evidence) -> list[Prepared]:
@@ -50,7 +50,7 @@ def prepare(evidence: Evidence) -> list[Prepared]:
     return prepared
 
 
-def _prepare(rig: RigTable, run: Run, before_s: float) -> Prepared:
+def _prepare(rig: RigTable, run: MeasuredRun, before_s: float) -> Prepared:
     signals = reduce_run(run)
     for shake, source in SHAKEN.items():  # a model is clipped in its block means only: its vibration would differ
         if source in run.clipped:
@@ -58,12 +58,12 @@ def _prepare(rig: RigTable, run: Run, before_s: float) -> Prepared:
     commands = commands_of(run, rig, signals)
     if rig.drive == "spring":
         scales = scales_of(rig)
-        commands = commands._replace(segments=tuple(settled(signals, one, scales) for one in commands.segments))
+        commands = commands._replace(segments=tuple(settled(signals, segment, scales) for segment in commands.segments))
     if commands.motion is not None and (seconds := moving_s(commands.motion, rig)) < _SHORTEST_MOTION_S:
-        told = "mass_position_m" if "mass_position_m" in signals else "mass_accel_mps2"
+        channel = "mass_position_m" if "mass_position_m" in signals else "mass_accel_mps2"
         line = (
-            f"{run.file}: {told}: moves for {seconds:.3g} s: must be {_SHORTEST_MOTION_S:g} s at "
-            f"least, or there is no friction to compare; leave the run out, or check channels.{told}.scale"
+            f"{run.file}: {channel}: moves for {seconds:.3g} s: must be {_SHORTEST_MOTION_S:g} s at "
+            f"least, as a shorter motion shows no friction; leave the run out, or check channels.{channel}.scale"
         )
         raise Fault("BAD_EVIDENCE", line)
     start = _start(rig, signals, commands)
@@ -79,12 +79,12 @@ def _prepare(rig: RigTable, run: Run, before_s: float) -> Prepared:
     )
 
 
-def _start(rig: RigTable, signals: Signals, commands: Commands) -> Start:
+def _start(rig: RigTable, signals: Signals, commands: CommandedRun) -> Start:
     first = slice(0, 10)
     if rig.drive == "force":
         assert commands.motion is not None, "a force drive has a motion"  # noqa: S101
         at_m, velocity_mps = (float(values[0]) for values in commands.motion[:2])
-        # friction at the start: that of steady sliding, or, at rest, the force that the contact holds
+        # friction at the start: of steady sliding, or, at rest, the force that the contact holds
         sliding = abs(velocity_mps) > rig.stribeck_velocity_mps
         force_N = float(signals["drive_force_N"][first].mean())
         return Start(np.sign(velocity_mps) * rig.coulomb_force_N if sliding else force_N, at_m, velocity_mps)

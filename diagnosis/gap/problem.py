@@ -7,27 +7,26 @@ from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import ValidationError
 
+from bridge.arrays import Floats
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.feature import Features, Signals, scales_of
 from diagnosis.features.force_drive import axis_features
 from diagnosis.features.grid import BLOCK_S, averaged, without_vibration
-from diagnosis.features.segments import Commands
+from diagnosis.features.segments import CommandedRun
 from diagnosis.features.spring_drive import spring_features
 from diagnosis.gap.prepare import Prepared
 from diagnosis.model.per_run import in_run, of_run
 from diagnosis.model.predict import predict_many
-from diagnosis.model.rig import AGE_BEFORE_S, AGE_SPREAD, Effects, Entry, Roughness, Start, rig_config
+from diagnosis.model.rig import AGE_BEFORE_S, AGE_SPREAD, Effects, Roughness, Start, StartState, rig_config
 from diagnosis.model.segment_starts import misread
-from diagnosis.model.sensor_chain import SENSOR_EFFECTS, Chain, sensed, true_force_N
+from diagnosis.model.sensor_chain import SENSOR_EFFECTS, SensorChain, sensed, true_force_N
 from diagnosis.model.true_force import relative, true_commands
 from plant.config import RigConfig
 from plant.effects.library import EFFECTS
 from plant.four_rigs_step import LANES, NARROW
 
-Floats = npt.NDArray[np.floating[Any]]
 AGEING, AGE_BEFORE = "static-friction-ageing", "age_before_s"  # an effect, and the contact's age when a run begins
 PIEZO_EFFECTS = frozenset(name for name, effect in EFFECTS.items() if effect.acts_on == "piezo")
 # Spread of the position channels' scale from one piece of track to another (relative, standard deviation of the replicates).
@@ -40,14 +39,14 @@ _DIVERGED = 1e100  # SI units: a feature beyond counts as missing, as its square
 
 
 class OutOfTimeError(Exception):
-    """The time that a person allows is over; what is known so far is the answer."""
+    """The time budget is used up; the best answer so far is the result."""
 
 
 class Point(NamedTuple):
     """A model to evaluate: rig numbers, sensor chain and effects."""
 
     values: dict[str, float]  # rig numbers by name, only those that differ from the rig table
-    chain: Chain
+    chain: SensorChain
     effects: Effects
 
 
@@ -65,8 +64,8 @@ class _Request(NamedTuple):
     draw: Draw | None
     effects: Effects  # those that move the rig; sensor effects are applied afterwards
     start: Start
-    entries: tuple[Entry, ...]
-    chain: Chain
+    entries: tuple[StartState, ...]
+    chain: SensorChain
 
 
 class Problem:
@@ -85,9 +84,9 @@ class Problem:
         self._simulated: dict[object, Signals | None] = {}
         self._averaged = {run.file: averaged(run.commands.frequency_Hz) for run in runs}
         measured = [self._features(run, run.signals, labelled=True) for run in runs]
-        self.measured = np.concatenate([np.array(found.values) for found in measured])
+        self.measured = np.concatenate([np.array(features.values) for features in measured])
         self.labels = [
-            (run.file, label) for run, found in zip(runs, measured, strict=True) for label in found.labels
+            (run.file, label) for run, features in zip(runs, measured, strict=True) for label in features.labels
         ]  # file and feature of every entry, [features]
         places = [(file, label.segment) for file, label in self.labels]
         numbers = {place: number for number, place in enumerate(dict.fromkeys(places))}
@@ -118,12 +117,14 @@ class Problem:
         """
         if math.isfinite(self.until_s) and len(points) > LANES:  # time is looked at between batches
             batches = [slice(first, first + LANES) for first in range(0, len(points), LANES)]
-            return [one for own in batches for one in self.predicted_many(points[own], draws[own], perhaps)]
+            return [
+                features for batch in batches for features in self.predicted_many(points[batch], draws[batch], perhaps)
+            ]
         parts: list[list[float]] = [[] for _ in points]
         with np.errstate(over="ignore", invalid="ignore"):  # a refit may start so far away that the model diverges
             for run in self.runs:
-                found = self._signals(run, points, draws or [None] * len(points), perhaps)
-                for part, signals in zip(parts, found, strict=True):
+                signals_of_points = self._signals(run, points, draws or [None] * len(points), perhaps)
+                for part, signals in zip(parts, signals_of_points, strict=True):
                     part.extend([math.nan] if signals is None else self._features(run, signals).values)
         result: list[Floats] = []
         for part in parts:
@@ -136,10 +137,10 @@ class Problem:
 
         Raises ValueError when the rig at `point` cannot be simulated.
         """
-        (found,) = self._signals(run, [point], [None])
-        if found is None:
+        (signals,) = self._signals(run, [point], [None])
+        if signals is None:
             raise ValueError(f"no rig is like that: {point}")
-        return found
+        return signals
 
     def _signals(
         self, run: Prepared, points: Sequence[Point], draws: Sequence[Draw | None], perhaps: Sequence[Point] = ()
@@ -183,7 +184,7 @@ class Problem:
     def _raw(
         self,
         run: Prepared,
-        commands: Commands,
+        commands: CommandedRun,
         requests: Sequence[_Request],
         inputs: object = None,
         perhaps: Sequence[Point] = (),
@@ -196,28 +197,28 @@ class Problem:
             number if request.draw is not None else _key(run, request, inputs)
             for number, request in enumerate(requests)
         ]
-        found = {key: self._simulated.pop(key) for key in set(keys) if key in self._simulated}
-        todo = {key: request for key, request in zip(keys, requests, strict=True) if key not in found}
+        cached = {key: self._simulated.pop(key) for key in set(keys) if key in self._simulated}
+        todo = {key: request for key, request in zip(keys, requests, strict=True) if key not in cached}
         spare: dict[object, _Request] = {}
         if len(todo) % NARROW:
             soon = [_request(run, point, None) for point in perhaps]
-            known = todo.keys() | found.keys() | self._simulated.keys()
+            known = todo.keys() | cached.keys() | self._simulated.keys()
             spare = {key: request for request in soon if (key := _key(run, request, inputs)) not in known}
         simulated = self._simulate(commands, [*todo.values(), *spare.values()], len(todo))
         for key, signals in zip([*todo, *spare], simulated, strict=True):
             if key in todo:
-                found[key] = signals
+                cached[key] = signals
             elif signals is not None:
                 self._simulated[key] = signals
-        # What was used last moves to the end and is dropped last: the common start of all trials is needed often.
+        # The entries used last move to the end and are dropped last: the common start of all trials is needed often.
         self._simulated |= {
-            key: found[key] for key, request in zip(keys, requests, strict=True) if request.draw is None
+            key: cached[key] for key, request in zip(keys, requests, strict=True) if request.draw is None
         }
         for key in list(self._simulated)[:-_KEPT]:
             del self._simulated[key]
-        return [found[key] for key in keys]
+        return [cached[key] for key in keys]
 
-    def _simulate(self, commands: Commands, requests: Sequence[_Request], wanted: int) -> list[Signals | None]:
+    def _simulate(self, commands: CommandedRun, requests: Sequence[_Request], wanted: int) -> list[Signals | None]:
         """Signals of each model, before the sensors.
 
         The first `wanted` are all simulated, and None means that such a rig cannot be; the others only where a lane is free.
@@ -235,10 +236,10 @@ class Problem:
         simulated_s = possible * len(commands.drive) * BLOCK_S
         if began + self.pace * simulated_s > self.until_s:
             raise OutOfTimeError
-        found = predict_many(list(configs.values()), self.rig.drive == "force", commands, starts, entries, possible)
+        predicted = predict_many(list(configs.values()), self.rig.drive == "force", commands, starts, entries, possible)
         if possible:
             self.pace = (time.monotonic() - began) / simulated_s
-        by_number = dict(zip(configs, found, strict=True))
+        by_number = dict(zip(configs, predicted, strict=True))
         return [by_number.get(number) for number in range(len(requests))]
 
     def _features(self, run: Prepared, signals: Signals, labelled: bool = False) -> Features:
@@ -322,7 +323,7 @@ def _hashable(tables: Mapping[str, Mapping[str, float | str]]) -> object:
 def _with_paths(effects: Effects, run: Prepared, draw: Draw | None) -> Effects:
     """The effects with a path for each random effect.
 
-    The path is that of the effect's seed; with seed 0, that of the draw. Without seed and draw the effect is left out, as its
+    The path follows from the effect's seed; with seed 0, from the draw. Without seed and draw the effect is left out, as its
     mean is 0. An effect over time takes another path in every run, an effect over place the same path in all runs.
     """
     result: Effects = {}

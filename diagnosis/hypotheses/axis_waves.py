@@ -9,7 +9,7 @@ from scipy.ndimage import uniform_filter1d
 from diagnosis.features.force_drive import friction_share
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.gap.prepare import Prepared
-from diagnosis.hypotheses.waves import Series, Wave, fitted, wave_of
+from diagnosis.hypotheses.waves import Wave, WaveSeries, fitted, wave_of
 
 _EVERY = 8  # blocks that make one sample
 _MOST_TURNS = 200  # of a wave within the longest run
@@ -18,7 +18,7 @@ _STEPS_PER_TURN = 3  # a line is as narrow as the run is long
 
 def axis_waves(runs: list[Prepared], over: str, most: int) -> list[Wave]:
     """The strongest waves of the friction over `position` [m] or `time` [s], strongest first."""
-    series: list[Series] = []
+    series: list[WaveSeries] = []
     for run in runs:
         motion = run.commands.motion
         if motion is None:
@@ -26,8 +26,8 @@ def axis_waves(runs: list[Prepared], over: str, most: int) -> list[Wave]:
         share, valid = friction_share(run.signals["drive_force_N"], motion)
         time_s = np.arange(len(share)) * BLOCK_S
         at = motion.position_m if over == "position" else time_s
-        series.append(Series(at[valid][::_EVERY], uniform_filter1d(share, _EVERY)[valid][::_EVERY]))
-    span = max((float(np.ptp(one.at)) for one in series), default=0.0)
+        series.append(WaveSeries(at[valid][::_EVERY], uniform_filter1d(share, _EVERY)[valid][::_EVERY]))
+    span = max((float(np.ptp(part.at)) for part in series), default=0.0)
     if span <= 0.0:
         return []
     periods = span * _STEPS_PER_TURN / np.arange(1, _MOST_TURNS * _STEPS_PER_TURN)

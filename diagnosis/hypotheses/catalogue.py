@@ -1,7 +1,7 @@
-"""Every effect in the diagnosis, one row each: words, what shows it, how each form is tried, the check by hand.
+"""Every effect in the diagnosis, one row each: words, the residual that shows it, how each form is tried, the check by hand.
 
-Its physics is in `plant.effects`. A form that stands there and not here is not tried: no prediction follows the path of a random
-one, which `diagnosis.fits.random_friction` looks for by itself.
+Its physics is in `plant.effects`. A form that is listed there and not here is not tried: no prediction follows the path of a
+random form, which `diagnosis.fits.random_friction` searches for.
 """
 
 from typing import Final
@@ -22,7 +22,7 @@ from diagnosis.hypotheses.catalogue_row import (
     TRACK,
     WEIGHT,
     ZERO,
-    Row,
+    EffectRow,
     Tried,
 )
 from diagnosis.hypotheses.scales import Scale, Sizes
@@ -62,8 +62,8 @@ def _by_waves(_: Sizes) -> dict[str, Scale]:
     return {}
 
 
-CATALOGUE: Final[dict[str, Row]] = {
-    "static-friction-ageing": Row(
+CATALOGUE: Final[dict[str, EffectRow]] = {
+    "static-friction-ageing": EffectRow(
         words="the longer the contact rests, the more force it takes to break it away",
         shown_by=((BREAKAWAY, "dwell_s"),),
         forms={
@@ -79,7 +79,7 @@ CATALOGUE: Final[dict[str, Row]] = {
         },
         check_against={"static-level": SPEEDS},
     ),
-    "frictional-lag": Row(
+    "frictional-lag": EffectRow(
         words="friction follows a change of speed a little late",
         shown_by=OVER_SPEED,
         forms={
@@ -94,7 +94,7 @@ CATALOGUE: Final[dict[str, Row]] = {
             ),
         },
     ),
-    "viscous-friction": Row(
+    "viscous-friction": EffectRow(
         words="friction grows with speed, as with thick oil",
         shown_by=OVER_SPEED,
         forms={
@@ -104,7 +104,7 @@ CATALOGUE: Final[dict[str, Row]] = {
             ),
         },
     ),
-    "position-dependent-friction": Row(
+    "position-dependent-friction": EffectRow(
         words="friction changes along the way, and is the same again at the same place",
         shown_by=(("friction", "position_m"), (BREAKAWAY, "position_m"), (BREAKAWAY, "time_s")),
         forms={
@@ -115,20 +115,20 @@ CATALOGUE: Final[dict[str, Row]] = {
         check=TRACK,
         check_against={"normal-load-fluctuation": TRACK, "drive-speed-ripple": DRIVE, "friction-drift": REPEAT},
     ),
-    "direction-dependent-friction": Row(
+    "direction-dependent-friction": EffectRow(
         words="friction differs between forward and backward",
         shown_by=((BREAKAWAY, "direction"), *OVER_SPEED),
         forms={"backward": Tried(_level), "both": Tried(_level), "kinetic": Tried(_level)},
         check=REVERSE,
     ),
-    "normal-load-fluctuation": Row(
-        words="what presses the surfaces together goes up and down",
+    "normal-load-fluctuation": EffectRow(
+        words="the force that presses the surfaces together goes up and down",
         shown_by=(("friction", "time_s"), (BREAKAWAY, "time_s")),
         forms={"sine": Tried(lambda _: _OVER_TIME, waves_of_time)},
         check=TRACK,
         check_against={"drive-speed-ripple": DRIVE},
     ),
-    "friction-drift": Row(
+    "friction-drift": EffectRow(
         words="friction wanders slowly over the run, as with running in or warming up",
         shown_by=((BREAKAWAY, "time_s"), ("friction", "time_s")),
         forms={
@@ -140,22 +140,22 @@ CATALOGUE: Final[dict[str, Row]] = {
         },
         check=REPEAT,
     ),
-    "coulomb-level": Row(
+    "coulomb-level": EffectRow(
         words="sliding friction is further from the described value than its tolerance allows",
         shown_by=OVER_SPEED,
         forms={"": Tried(_level)},
     ),
-    "static-level": Row(
+    "static-level": EffectRow(
         words="breakaway friction is further from the described value than its tolerance allows",
         shown_by=((BREAKAWAY, "dwell_s"),),
         forms={"": Tried(_level)},
     ),
-    "stribeck-velocity": Row(
+    "stribeck-velocity": EffectRow(
         words="the speed over which friction falls is further from the described value than its tolerance allows",
         shown_by=OVER_SPEED,
         forms={"": Tried(lambda _: {"ratio": Scale(0.5, False)})},
     ),
-    "drive-damping": Row(
+    "drive-damping": EffectRow(
         words="the drive damps its own oscillation, as a rubber coupling does",
         shown_by=OF_RATE,
         forms={
@@ -168,12 +168,12 @@ CATALOGUE: Final[dict[str, Row]] = {
             ),
         },
     ),
-    "drive-stiffness": Row(
+    "drive-stiffness": EffectRow(
         words="the drive is stiffer or softer than its tolerance allows",
         shown_by=OF_EXTENSION,
         forms={"": Tried(_level)},
     ),
-    "drive-hardening": Row(
+    "drive-hardening": EffectRow(
         words="the drive becomes stiffer or softer the further it is loaded",
         shown_by=OF_EXTENSION,
         forms={
@@ -181,12 +181,12 @@ CATALOGUE: Final[dict[str, Row]] = {
             "bilinear": Tried(lambda rig: {"ratio": Scale(0.2, False), "knee_m": Scale(0.75 * rig.reach_m, True, 0.3)}),
         },
     ),
-    "drive-backlash": Row(
+    "drive-backlash": EffectRow(
         words="play in the drive: it moves a little without any force when the load changes sign",
         shown_by=OF_EXTENSION,
         forms={"": Tried(lambda rig: {"gap_m": Scale(0.05 * rig.reach_m, True, 1.5)})},
     ),
-    "drive-speed-ripple": Row(
+    "drive-speed-ripple": EffectRow(
         words="the drive runs unevenly, for example once a turn of its screw",
         shown_by=(("drive", "drive_position_m"), (BREAKAWAY, "time_s")),
         forms={
@@ -196,8 +196,8 @@ CATALOGUE: Final[dict[str, Row]] = {
         },
         check=DRIVE,
     ),
-    "frame-compliance": Row(
-        words="what holds the drive yields and swings",
+    "frame-compliance": EffectRow(
+        words="the mount of the drive yields and swings",
         shown_by=OF_RATE,
         forms={
             "": Tried(
@@ -208,8 +208,8 @@ CATALOGUE: Final[dict[str, Row]] = {
         check=FRAME,
         check_against={"drive-damping": FRAME, "base-compliance": FRAME, "drive-stiffness": FRAME},
     ),
-    "base-compliance": Row(
-        words="what holds the base yields and swings",
+    "base-compliance": EffectRow(
+        words="the mount of the base yields and swings",
         shown_by=OVER_SPEED,
         forms={
             "": Tried(
@@ -225,10 +225,10 @@ CATALOGUE: Final[dict[str, Row]] = {
         },
         check=FRAME,
     ),
-    "piezo-roll-off": Row(
+    "piezo-roll-off": EffectRow(
         words="the piezo moves less than commanded at high frequency",
         shown_by=OF_EXCITER,
-        # beside a drift, a corner of 4 kHz came to chi2 860 from 9 kHz, to 201 from 4
+        # with a drift, the fit of a corner of 4 kHz ends at chi2 860 if it starts at 9 kHz, at 201 if it starts at 4 kHz
         forms={
             "first-order": Tried(
                 lambda rig: {"corner_Hz": Scale(2.0 * max(rig.highest_Hz, 1.0), True, 1.5)},
@@ -240,7 +240,7 @@ CATALOGUE: Final[dict[str, Row]] = {
             ),
         },
     ),
-    "piezo-resonance": Row(
+    "piezo-resonance": EffectRow(
         words="the piezo moves more than commanded near its own resonance",
         shown_by=OF_EXCITER,
         forms={
@@ -251,7 +251,7 @@ CATALOGUE: Final[dict[str, Row]] = {
             ),
         },
     ),
-    "piezo-sag": Row(
+    "piezo-sag": EffectRow(
         words="the piezo moves less than commanded under load or when warm",
         shown_by=(("exciter", "force_N"), ("exciter", "time_s")),
         forms={
@@ -260,21 +260,21 @@ CATALOGUE: Final[dict[str, Row]] = {
         },
         shown_twice=True,
     ),
-    "force-sensor-gain": Row(
+    "force-sensor-gain": EffectRow(
         words="the force sensor reads too much or too little by a constant share",
         shown_by=OF_EXTENSION,
         forms={"": Tried(_gain)},
         check=WEIGHT,
         check_against={"coulomb-level": WEIGHT, "static-level": WEIGHT, "drive-stiffness": WEIGHT},
     ),
-    "force-sensor-bias": Row(
+    "force-sensor-bias": EffectRow(
         words="the force sensor reads too much or too little by a constant force",
         shown_by=OVER_SPEED,
         forms={"": Tried(lambda rig: {"bias_N": Scale(0.03 * rig.static_N, False)})},
         check=WEIGHT,
         check_against={"direction-dependent-friction": WEIGHT},
     ),
-    "force-sensor-drift": Row(
+    "force-sensor-drift": EffectRow(
         words="the zero of the force sensor wanders",
         shown_by=(("spring", "time_s"), (BREAKAWAY, "time_s")),
         forms={
@@ -289,7 +289,7 @@ CATALOGUE: Final[dict[str, Row]] = {
         check=ZERO,
         check_against={"friction-drift": ZERO},
     ),
-    "force-sensor-lag": Row(
+    "force-sensor-lag": EffectRow(
         words="the force sensor smooths: its reading creeps after the force",
         shown_by=OF_RATE,
         forms={
@@ -300,14 +300,14 @@ CATALOGUE: Final[dict[str, Row]] = {
         check=TAP,
         check_against={"drive-damping": TAP, "force-sensor-delay": TAP, "frictional-lag": TAP},
     ),
-    "force-sensor-delay": Row(
+    "force-sensor-delay": EffectRow(
         words="the force reading comes late but unchanged",
         shown_by=OF_RATE,
         forms={"": Tried(lambda rig: {"delay_s": Scale(0.02 * rig.slip_s, True, 1.5)})},
         check=TAP,
         check_against={"drive-damping": TAP},
     ),
-    "accelerometer-gain": Row(
+    "accelerometer-gain": EffectRow(
         words="the accelerometer reads too much or too little by a constant share",
         shown_by=(("motion", "acceleration_mps2"), ("curvature", "acceleration_mps2"), *OF_EXCITER),
         forms={"both": Tried(_gain), "mass": Tried(_gain), "base": Tried(_gain)},

@@ -1,4 +1,4 @@
-"""What the diagnosis has to know of an effect beside its physics, and the words that several rows share."""
+"""The fields of an effect's row in the catalogue, and the texts that several rows share."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from diagnosis.hypotheses.starts import Starts, at_scale
 
 @dataclass(frozen=True)
 class Tried:
-    """How a form is tried. What `scale` leaves out stays at its default."""
+    """How a form is tried. Parameters without a scale stay at their default."""
 
     scale: Callable[[Sizes], dict[str, Scale]]  # of the free parameters, on a rig of these sizes
     starts: Starts = at_scale
@@ -19,14 +19,16 @@ class Tried:
 Over = tuple[str, str]  # a residual, and the variable that it is drawn over: names of `pictures.axes`
 
 
-class Row(NamedTuple):
+class EffectRow(NamedTuple):
     """An effect in the diagnosis."""
 
-    words: str  # what it means on a machine
-    shown_by: tuple[Over, ...]  # what shows it best; the next where its channels are missing
+    words: str  # its meaning on a machine
+    shown_by: tuple[Over, ...]  # the residuals that show it, the best first; the next where channels are missing
     forms: dict[str, Tried]
-    check: str = ""  # by hand; else that of the place where it acts
-    check_against: dict[str, str] = {}  # what tells it from another effect by hand; stands in the row of one of the two
+    check: str = ""  # by hand; empty: the check for the place where it acts
+    check_against: dict[
+        str, str
+    ] = {}  # check by hand that separates it from another effect; in the row of one of the two
     shown_twice: bool = False  # its formulas show over different variables: the first two are drawn
 
 
@@ -43,18 +45,18 @@ TAP: Final = (
     "accelerometer, damping and compliance of the drive as ringing."
 )
 FRAME: Final = (
-    "Put an accelerometer on what holds the drive, then on the base, and tap: what swings there is seen directly."
+    "Put an accelerometer on the mount of the drive, then on the base, and tap: a part that swings is seen directly."
 )
 SHAKER: Final = "Put both accelerometers on one calibrated shaker, or turn them over: gravity makes 2 g of difference."
 SWEEP: Final = (
-    "Sweep the piezo from 0.5 to 5 kHz at rest and look at the base accelerometer: it shows what is delivered."
+    "Sweep the piezo from 0.5 to 5 kHz at rest and look at the base accelerometer: it shows the delivered motion."
 )
 DRIVE: Final = (
     "Measure the drive position with a second sensor, unloaded: an uneven drive is uneven without the mass, too."
 )
 TRACK: Final = (
-    "Drag along the same track twice, the second time at another speed: what belongs to the place comes back there."
+    "Drag along the same track twice, the second time at another speed: an effect of the place returns there."
 )
 SPEEDS: Final = "Drag at 0.2, 1 and 5 times the present speed, and hold the drive for 1, 10 and 60 s in between."
 REVERSE: Final = "Drag to and fro over the same track."
-REPEAT: Final = "Repeat one run unchanged after a pause of ten minutes: what drifts does not come back."
+REPEAT: Final = "Repeat one run unchanged after a pause of ten minutes: a drift does not repeat."

@@ -1,18 +1,15 @@
 """A model to be fitted: effects in given formulas, and their free parameters as coordinates."""
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
+from bridge.arrays import Floats
 from diagnosis.model.per_run import is_phase
 from diagnosis.model.rig import Effects
 from plant.effects.library import EFFECTS
 
-Floats = npt.NDArray[np.floating[Any]]
-# Effects that change a number of the rig table alone: it and the effect are one direction. With a derivative of its own for each,
-# the number stayed at its bound and the effect at 3 of 10 %: chi2 196, where 133 was to be had, and another effect was named.
+# Effects that change a number of the rig table alone: number and effect are one direction of the fit. With a separate derivative
+# for each, the number stays at its bound and the effect at 3 of 10 %: chi2 196 in place of 133, and another effect is named.
 LEVELS = {
     "coulomb-level": "coulomb_force_N",
     "static-level": "static_force_N",

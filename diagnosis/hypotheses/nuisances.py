@@ -1,24 +1,19 @@
-"""What may differ from the description without being a gap: the rig's numbers within their tolerances, and ordinary sensors.
+"""Nuisances, which may differ from the description without being a gap: rig numbers within tolerances, and ordinary sensors.
 
-All of it is refitted before any effect is judged. An incomplete set makes every effect look alike: what a missing nuisance
-would have taken up, each effect takes up in its own way.
+All of them are refitted before any effect is judged. An incomplete set makes all effects look alike: each effect takes up the
+difference of a missing nuisance in another way.
 """
 
-from typing import Any
-
-import numpy as np
-import numpy.typing as npt
-
+from bridge.arrays import Floats
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.gap.problem import Point
 from diagnosis.model.rig import Effects
-from diagnosis.model.sensor_chain import Chain
+from diagnosis.model.sensor_chain import SensorChain
 from diagnosis.result import RigNumber
 
-Floats = npt.NDArray[np.floating[Any]]
-# Mean and standard deviation of what no manifest states. A 2 kHz force channel lags by 80 us, an 800 Hz displacement by 200 us,
-# an open one by nothing; displacement sensors are linear to 0.2 % of their range: up to 0.8 % in slope, and of 40 mm 0.2 / m;
-# accelerometers of the bench begin at 0 to 0.5 Hz and end at 10 kHz or well above.
+# Mean and standard deviation of sensor numbers that no manifest states. A 2 kHz force channel lags by 80 us, an 800 Hz
+# displacement by 200 us, an unfiltered one by nothing; displacement sensors are linear to 0.2 % of their range: up to 0.8 % in
+# slope, and of 40 mm 0.2 / m; accelerometers of the bench begin at 0 to 0.5 Hz and end at 10 kHz or well above.
 _CHAIN = {
     "force_delay_s": (4e-5, 4e-5),
     "position_delay_s": (1e-4, 1e-4),
@@ -53,28 +48,28 @@ class Nuisances:
         return described * max(1.0 + self._tolerance[name] * deviation, 0.1)
 
     def growth(self, name: str, deviation: float) -> float:
-        """By what share of its value a number of the rig table grows per tolerance, at a deviation."""
+        """The share by which a number of the rig table grows per tolerance, at a deviation."""
         return self._tolerance[name] * self._described[name] / self.value(name, deviation)
 
     def parameters(self, deviations: Floats) -> tuple[RigNumber, ...]:
         """The rig's numbers at these deviations, as the model has them, the shape of its Stribeck curve included."""
-        own = len(self.rig_names)
+        count = len(self.rig_names)
         values = {name: self.value(name, float(deviations[i])) for i, name in enumerate(self.rig_names)}
         values = self._described | values
         values["static_force_N"] = max(values["static_force_N"], values["coulomb_force_N"])
         numbers = [
             RigNumber(name, self._described[name], values[name], self._tolerance[name]) for name in self.rig_names
         ]
-        return (*numbers, RigNumber("stribeck_tail", 0.0, _TAIL * float(deviations[own]), _TAIL))
+        return (*numbers, RigNumber("stribeck_tail", 0.0, _TAIL * float(deviations[count]), _TAIL))
 
     def point(self, deviations: Floats, effects: Effects) -> Point:
         """The model at these deviations, with these effects."""
-        own = len(self.rig_names)
+        count = len(self.rig_names)
         values = {name: self.value(name, float(deviations[i])) for i, name in enumerate(self.rig_names)}
-        values["stribeck_tail"] = _TAIL * float(deviations[own])
+        values["stribeck_tail"] = _TAIL * float(deviations[count])
         chain: dict[str, float] = {}
-        for (name, (mean, spread)), deviation in zip(_CHAIN.items(), deviations[own + 1 :].tolist(), strict=True):
+        for (name, (mean, spread)), deviation in zip(_CHAIN.items(), deviations[count + 1 :].tolist(), strict=True):
             chain[name] = mean + spread * deviation
             if name in _NOT_NEGATIVE:
                 chain[name] = max(chain[name], 0.0)
-        return Point(values, Chain(**chain), effects)
+        return Point(values, SensorChain(**chain), effects)

@@ -17,7 +17,7 @@ class Scale(NamedTuple):
 
 
 class Sizes(NamedTuple):
-    """What is large and what is small on a rig, and in its runs."""
+    """Typical sizes of a rig and its runs."""
 
     static_N: float
     stiffness_N_per_m: float  # of the drive, or where a force drives of the contact
@@ -41,7 +41,7 @@ def sizes(rig: RigTable, runs: list[Prepared], highest_Hz: float) -> Sizes:
     critical = 2.0 * math.sqrt(stiffness * rig.mass_kg)
     slip_s = math.pi * math.sqrt(rig.mass_kg / stiffness)
     slip_mps = 0.3 * static_N / math.sqrt(stiffness * rig.mass_kg)
-    if rig.drive == "force":  # no spring: speeds and times are those of the motion
+    if rig.drive == "force":  # no spring: speeds and times come from the motion
         slip_mps = max(20.0 * rig.stribeck_velocity_mps, 0.05)
         critical = static_N / slip_mps
         slip_s = 0.05

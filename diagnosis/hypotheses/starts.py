@@ -6,11 +6,11 @@ Only starting points come from here, never a verdict.
 import math
 from collections.abc import Callable, Iterable
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from diagnosis.gap.problem import AGE_BEFORE, Problem
 from diagnosis.hypotheses.axis_waves import axis_waves
 from diagnosis.hypotheses.hypothesis import Coordinate, Hypothesis
@@ -30,16 +30,15 @@ from diagnosis.model.per_run import OTHER_PHASE, PHASE, of_run
 from diagnosis.model.rig import AGE_BEFORE_S, AGE_SPREAD
 from plant.effects.library import EFFECTS
 
-Floats = npt.NDArray[np.floating[Any]]
 _WAVES = 4  # ranges of periods that are searched
 # of waves with a harmonic: bumps of 3.14 mm had 0.38 of the breakaways' sum of squares as sines, 0.90 with it
 _STEEP_WAVES = 2
-# Of bumps the longest pitches are tried, and a quarter of their spread to either side: bumps of 1.30 mm came to chi2 641 from
-# 1.306 mm, to 131 from 1.295.
+# Bumps: the longest pitches are tried, and a quarter of their spread to either side: a fit of bumps of 1.30 mm ends at chi2 641
+# from a start at 1.306 mm, at 131 from 1.295 mm.
 _LOBES_OF_BUMPS, _BESIDE = 2, (-0.25, 0.0, 0.25)
 _STUCK = (1.05, 1.13)  # own frequency of a base over the one at which it rings with the slide stuck to it
 _AGE_LIMITS_S = (1e-3, 1e5)  # a block, a day
-_AXIS_WAVES = 3  # of a force-driven axis, where a line stands out
+_AXIS_WAVES = 3  # of a force-driven axis, whose strong waves are clear lines
 
 
 class Trial(NamedTuple):
@@ -49,7 +48,7 @@ class Trial(NamedTuple):
     w: Floats
 
 
-class Asked(NamedTuple):
+class TrialRequest(NamedTuple):
     """A form of an effect that is to be tried on an evidence."""
 
     name: str
@@ -59,14 +58,14 @@ class Asked(NamedTuple):
     highest_Hz: float  # of the vibration
 
     def trial(self, start: dict[str, float], further: Iterable[Coordinate] = ()) -> Trial:
-        """From these values, from its scales where there is none; `further` coordinates stand behind."""
+        """A trial from these values, or from the scales where a value is missing; `further` coordinates come last."""
         return _trial(self.name, self.form, self.scale, start, list(further))
 
 
-Starts = Callable[[Asked], list[Trial]]
+Starts = Callable[[TrialRequest], list[Trial]]
 
 
-def at_scale(asked: Asked) -> list[Trial]:
+def at_scale(asked: TrialRequest) -> list[Trial]:
     """One start, every parameter at its scale."""
     return [asked.trial({})]
 
@@ -78,15 +77,15 @@ def at_values(parameter: str, *values: float) -> Starts:
 
 def at_times_its_scale(parameter: str, *times: float) -> Starts:
     """A start at so many times the parameter's scale each."""
-    return lambda asked: [asked.trial({parameter: one * asked.scale[parameter].scale}) for one in times]
+    return lambda asked: [asked.trial({parameter: time * asked.scale[parameter].scale}) for time in times]
 
 
 def at_times_the_vibration(parameter: str, *times: float) -> Starts:
     """A start at so many times the highest frequency of the vibration each."""
-    return lambda asked: [asked.trial({parameter: one * asked.highest_Hz}) for one in times]
+    return lambda asked: [asked.trial({parameter: time * asked.highest_Hz}) for time in times]
 
 
-def aged_before(asked: Asked) -> list[Trial]:
+def aged_before(asked: TrialRequest) -> list[Trial]:
     """One start, with the age of the contact at the beginning of every run free."""
     of_runs = [
         Coordinate(asked.name, of_run(AGE_BEFORE, run.file), AGE_BEFORE_S, True, AGE_SPREAD, *_AGE_LIMITS_S)
@@ -96,7 +95,7 @@ def aged_before(asked: Asked) -> list[Trial]:
     return [asked.trial({}, of_runs)]
 
 
-def where_the_base_rings(asked: Asked) -> list[Trial]:
+def where_the_base_rings(asked: TrialRequest) -> list[Trial]:
     """At the frequencies of the base's own ringing, or else spread."""
     rings_Hz = [times * f for f in ringing_Hz(asked.problem.runs, "base_accel_mps2", 2) for times in _STUCK]
     if not rings_Hz:
@@ -106,7 +105,7 @@ def where_the_base_rings(asked: Asked) -> list[Trial]:
     return at_values("frequency_Hz", *rings_Hz)(asked._replace(scale=asked.scale | near))
 
 
-def waves_of_track(asked: Asked) -> list[Trial]:
+def waves_of_track(asked: TrialRequest) -> list[Trial]:
     """Waves of the friction along the track."""
     runs, scales = asked.problem.runs, asked.problem.scales
     if asked.problem.rig.drive == "force":
@@ -115,8 +114,8 @@ def waves_of_track(asked: Asked) -> list[Trial]:
     return _waves(asked, waves + friction_waves(runs, scales, "position", _STEEP_WAVES, harmonics=2))
 
 
-def waves_of_time(asked: Asked) -> list[Trial]:
-    """Waves of the friction over time, which begin anew in every run or go on."""
+def waves_of_time(asked: TrialRequest) -> list[Trial]:
+    """Waves of the friction over time, which restart in every run or continue."""
     runs, scales = asked.problem.runs, asked.problem.scales
     if asked.problem.rig.drive == "force":
         return _waves(asked, axis_waves(runs, "time", _AXIS_WAVES))
@@ -124,14 +123,14 @@ def waves_of_time(asked: Asked) -> list[Trial]:
     return _waves(asked, waves + waves_apart(friction_series(runs, scales, "time"), runs, _WAVES))
 
 
-def waves_of_screw(asked: Asked) -> list[Trial]:
+def waves_of_screw(asked: TrialRequest) -> list[Trial]:
     """Waves of the drive's velocity along its way, or else of the friction along the track."""
     runs, scales = asked.problem.runs, asked.problem.scales
     waves = drive_waves(runs, "position", _WAVES) or friction_waves(runs, scales, "position", _WAVES)
     return _waves(asked, waves)
 
 
-def waves_of_motor(asked: Asked) -> list[Trial]:
+def waves_of_motor(asked: TrialRequest) -> list[Trial]:
     """Waves of the drive's velocity over time, or else of the friction."""
     runs, scales = asked.problem.runs, asked.problem.scales
     waves = drive_waves(runs, "time", _WAVES) or friction_waves(runs, scales, "time", _WAVES)
@@ -139,7 +138,7 @@ def waves_of_motor(asked: Asked) -> list[Trial]:
     return _waves(asked, waves + waves_apart(series, runs, _WAVES))
 
 
-def two_waves_of_track(asked: Asked) -> list[Trial]:
+def two_waves_of_track(asked: TrialRequest) -> list[Trial]:
     """Pairs of waves of the friction along the track."""
     runs = asked.problem.runs
     if asked.problem.rig.drive == "force":
@@ -149,7 +148,7 @@ def two_waves_of_track(asked: Asked) -> list[Trial]:
     return [_two_waves_trial(asked.name, *pair) for pair in pairs]
 
 
-def bumps_of_track(asked: Asked) -> list[Trial]:
+def bumps_of_track(asked: TrialRequest) -> list[Trial]:
     """Bumps and dips where the friction along the track has its longest waves."""
     runs, scales = asked.problem.runs, asked.problem.scales
     if asked.problem.rig.drive == "force":
@@ -160,7 +159,7 @@ def bumps_of_track(asked: Asked) -> list[Trial]:
     return [_bumps_trial(asked.name, wave, sign) for wave in waves for sign in (1.0, -1.0)]
 
 
-def _waves(asked: Asked, waves: list[Wave]) -> list[Trial]:
+def _waves(asked: TrialRequest, waves: list[Wave]) -> list[Trial]:
     slowest_Hz = 1.0 / longest_run_s(asked.problem.runs)
     return [wave_trial(asked.name, asked.form, wave, slowest_Hz) for wave in waves]
 
@@ -173,23 +172,23 @@ def _trial(name: str, form: str, scale: dict[str, Scale], start: dict[str, float
             size = start.get(row.name, unit.scale)
             axes.append(Coordinate(name, row.name, size, unit.logarithmic, unit.prior, row.low, row.high))
     axes += of_runs
-    # a coordinate that may have either sign starts at half a unit; one that stays positive at its scale
+    # a coordinate of either sign starts at half a unit; a positive coordinate at its scale
     w = np.array([0.0 if axis.logarithmic else 0.5 for axis in axes])
     return Trial(Hypothesis({name: form}, tuple(axes)), w)
 
 
 def wave_trial(name: str, form: str, wave: Wave, slowest_Hz: float) -> Trial:
-    """A form of one wave, from where the wave is. What turns slower than `slowest_Hz` is no wave over time."""
+    """A form of one wave, started at the found wave. A wave slower than `slowest_Hz` does not count as a wave over time."""
     axes: list[Coordinate] = []
     for row in EFFECTS[name].forms[form].parameters:
         if row.name == PHASE:
-            axes += [Coordinate(name, one, 1.0, False, 3.0, -20.0, 20.0) for one in (PHASE, *wave.phases_of)]
+            axes += [Coordinate(name, phase, 1.0, False, 3.0, -20.0, 20.0) for phase in (PHASE, *wave.phases_of)]
         elif row.name == "ratio":
             axes.append(Coordinate(name, row.name, max(wave.ratio, 1e-4), True, 1.5, row.low, row.high))
         elif row.name in {"second_sin", "second_cos"}:
             axes.append(Coordinate(name, row.name, 0.4, False, 1.0, row.low, row.high))
         elif row.name == "frequency_Hz":
-            # in a phase of its own in every run it would be any trend: a tilted track was named a load of 0.06 Hz in runs of 10 s
+            # a free phase in every run could imitate any trend: in runs of 10 s a tilted track is named a load of 0.06 Hz
             axes.append(
                 Coordinate(name, row.name, 1.0 / wave.period, True, wave.spread, max(row.low, slowest_Hz), row.high)
             )

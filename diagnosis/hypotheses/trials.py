@@ -1,6 +1,6 @@
-"""What is tried on an evidence: every effect of the plant in each of its formulas, with the coordinates and starts of its refit.
+"""The trials on an evidence: every effect of the plant in each of its formulas, with the coordinates and starts of its refit.
 
-Scales come from the rig, so that a step of 1 in a coordinate is an effect that one would notice, on any rig.
+Scales derive from the rig, so that a step of 1 in a coordinate is a noticeable effect on any rig.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.catalogue import CATALOGUE
 from diagnosis.hypotheses.hypothesis import LEVELS
 from diagnosis.hypotheses.scales import sizes
-from diagnosis.hypotheses.starts import Asked, Trial
+from diagnosis.hypotheses.starts import Trial, TrialRequest
 from plant.effects.library import EFFECTS
 
 
@@ -23,15 +23,15 @@ def trials(problem: Problem) -> list[Trial]:
     frequencies = np.concatenate([run.commands.frequency_Hz for run in runs])
     highest_Hz = float(frequencies.max())
     of_rig = sizes(rig, runs, highest_Hz)
-    found: list[Trial] = []
+    result: list[Trial] = []
     for name, effect in EFFECTS.items():
         if not _shows(name, rig, highest_Hz):
             continue
         for form in effect.forms:
             tried = CATALOGUE[name].forms.get(form)
             if tried is not None:
-                found += tried.starts(Asked(name, form, tried.scale(of_rig), problem, highest_Hz))
-    return found
+                result += tried.starts(TrialRequest(name, form, tried.scale(of_rig), problem, highest_Hz))
+    return result
 
 
 def cannot_show(rig: RigTable, runs: Sequence[Prepared], assumed: Sequence[str]) -> tuple[str, ...]:

@@ -6,18 +6,17 @@ Only starting points for a refit come from here, never a verdict.
 from collections.abc import Mapping
 from itertools import combinations, pairwise
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from diagnosis.features.falls import turning_points
 from diagnosis.features.feature import Scales
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.gap.prepare import Prepared
 from diagnosis.model.per_run import phase_of
 
-Floats = npt.NDArray[np.floating[Any]]
 _GRID = 1500  # periods that are tried for a wave
 _LOBES = 2  # peaks in every range: pieces of track apart from each other leave the period ambiguous
 _LOBE = 10  # grid points within which peaks are one
@@ -39,7 +38,7 @@ class Wave(NamedTuple):
     )  # in the runs after the first, where it begins in another phase there
 
 
-class Series(NamedTuple):
+class WaveSeries(NamedTuple):
     """A quantity along a coordinate; its mean is free."""
 
     at: Floats
@@ -55,45 +54,45 @@ def friction_waves(runs: list[Prepared], scales: Scales, over: str, most: int, h
 
 
 def friction_waves_beside(runs: list[Prepared], scales: Scales, waves: list[Wave], at: tuple[float, ...]) -> list[Wave]:
-    """Waves along the track with their harmonic, at periods `at` so many spreads from those of `waves`, each in its own phase."""
+    """Waves along the track with their harmonic and best phase, at periods `at` spreads away from the periods of `waves`."""
     series = friction_series(runs, scales, "position")
-    found: list[Wave] = []
+    result: list[Wave] = []
     for wave in waves:
         periods = wave.period * (1.0 + wave.spread * np.array(at))
         _, shares = fitted(series, periods, 2)
         beside = zip(periods.tolist(), shares, strict=True)
-        found += [wave_of(period, own)._replace(spread=wave.spread) for period, own in beside]
-    return found
+        result += [wave_of(period, share)._replace(spread=wave.spread) for period, share in beside]
+    return result
 
 
 def two_friction_waves(runs: list[Prepared], scales: Scales, most: int) -> list[tuple[Wave, Wave]]:
     """The two waves of the friction along the track that take most together, of the strongest of each range of periods."""
     series = friction_series(runs, scales, "position")
     together = [_both(series, *two) for two in combinations(_strongest(series, most), 2)]
-    together.sort(key=lambda one: -one[0])
+    together.sort(key=lambda pair: -pair[0])
     return [two for _, two in together[:_TWO_WAVES]]
 
 
-def _both(series: list[Series], first: Wave, second: Wave) -> tuple[float, tuple[Wave, Wave]]:
-    """What two waves take of the sum of squares together, and both as they are then."""
+def _both(series: list[WaveSeries], first: Wave, second: Wave) -> tuple[float, tuple[Wave, Wave]]:
+    """The part of the sum of squares that two waves explain together, and the two waves refitted."""
     columns: list[Floats] = []
-    for one in series:
-        turns = [2.0 * np.pi * one.at / wave.period for wave in (first, second)]
-        own = np.column_stack([part(angle) for angle in turns for part in (np.sin, np.cos)])
-        columns.append(own - own.mean(axis=0))
-    stacked, value = np.concatenate(columns), np.concatenate([one.value for one in series])
+    for part_of_run in series:
+        turns = [2.0 * np.pi * part_of_run.at / wave.period for wave in (first, second)]
+        columns_of_run = np.column_stack([part(angle) for angle in turns for part in (np.sin, np.cos)])
+        columns.append(columns_of_run - columns_of_run.mean(axis=0))
+    stacked, value = np.concatenate(columns), np.concatenate([part_of_run.value for part_of_run in series])
     shares = np.linalg.lstsq(stacked, value)[0]
-    found = [
-        wave_of(wave.period, own)._replace(spread=wave.spread)
-        for wave, own in zip((first, second), (shares[:2], shares[2:]), strict=True)
+    refitted = [
+        wave_of(wave.period, share)._replace(spread=wave.spread)
+        for wave, share in zip((first, second), (shares[:2], shares[2:]), strict=True)
     ]
-    found.sort(key=lambda wave: -wave.ratio)
-    return float(value @ (stacked @ shares)), (found[0], found[1])
+    refitted.sort(key=lambda wave: -wave.ratio)
+    return float(value @ (stacked @ shares)), (refitted[0], refitted[1])
 
 
-def friction_series(runs: list[Prepared], scales: Scales, over: str) -> list[Series]:
+def friction_series(runs: list[Prepared], scales: Scales, over: str) -> list[WaveSeries]:
     """Breakaways, or levels where nothing slips, over `position` [m] or `time` [s]; one series a segment."""
-    series: list[Series] = []
+    series: list[WaveSeries] = []
     for run in runs:
         force = run.signals.get("drive_force_N")
         if force is None:
@@ -107,19 +106,21 @@ def friction_series(runs: list[Prepared], scales: Scales, over: str) -> list[Ser
         else:
             coordinate = (blocks + 0.5) * BLOCK_S
         for segment in run.commands.segments:
-            own = slice(segment.first, segment.last)
-            cut = segment.sign * force[own]
+            inside = slice(segment.first, segment.last)
+            cut = segment.sign * force[inside]
             tops, bottoms = turning_points(cut, scales.drop_N)
             if len(bottoms) >= 2:
                 at = tops[: len(bottoms)]
-                series.append(Series(coordinate[own][at], cut[at] / cut[at].mean() - 1.0, run=run.file, of_slips=True))
+                series.append(
+                    WaveSeries(coordinate[inside][at], cut[at] / cut[at].mean() - 1.0, run=run.file, of_slips=True)
+                )
             elif len(tops) == 0 and len(cut) > 500:
                 # where nothing slips the slide moves evenly, once the climb to that level is over
                 even = cut[len(cut) // 3 :]
                 level = even[: len(even) // 20 * 20].reshape(-1, 20).mean(axis=1)
                 if np.ptp(level) < 0.2 * scales.force_N and level.mean() > 0.5 * scales.force_N:
-                    there = coordinate[own][len(cut) // 3 + 10 :: 20][: len(level)]
-                    series.append(Series(there, level / level.mean() - 1.0, run=run.file))
+                    places = coordinate[inside][len(cut) // 3 + 10 :: 20][: len(level)]
+                    series.append(WaveSeries(places, level / level.mean() - 1.0, run=run.file))
     return series
 
 
@@ -128,59 +129,60 @@ def drive_waves(runs: list[Prepared], over: str, most: int) -> list[Wave]:
     return _strongest(drive_series(runs, over), most, 2)
 
 
-def drive_series(runs: list[Prepared], over: str) -> list[Series]:
+def drive_series(runs: list[Prepared], over: str) -> list[WaveSeries]:
     """The drive's velocity relative to its mean over its `position` [m] or `time` [s]; one series a segment."""
-    series: list[Series] = []
+    series: list[WaveSeries] = []
     for run in runs:
         position = run.signals.get("drive_position_m")
         if position is None:
             continue
         for segment in run.commands.segments:
-            own = position[segment.first : segment.last]
-            whole = len(own) // 20 * 20
+            path = position[segment.first : segment.last]
+            whole = len(path) // 20 * 20
             if whole < 400 or segment.drive_velocity_mps == 0.0:
                 continue
-            mean = own[:whole].reshape(-1, 20).mean(axis=1)
+            mean = path[:whole].reshape(-1, 20).mean(axis=1)
             t_s = (segment.first + 10.0 + 20.0 * np.arange(len(mean))) * BLOCK_S
             slope = np.gradient(mean, 20 * BLOCK_S) / segment.drive_velocity_mps
             # noise of the position is the smaller in a relative velocity the faster the drive
             speed_mm_per_s = 1e3 * abs(segment.drive_velocity_mps)
             series.append(
-                Series(mean if over == "position" else t_s, slope / slope.mean() - 1.0, speed_mm_per_s, run.file)
+                WaveSeries(mean if over == "position" else t_s, slope / slope.mean() - 1.0, speed_mm_per_s, run.file)
             )
     return series
 
 
-def waves_apart(series: list[Series], runs: list[Prepared], most: int) -> list[Wave]:
+def waves_apart(series: list[WaveSeries], runs: list[Prepared], most: int) -> list[Wave]:
     """The strongest waves over time if each run may begin in another phase; none where no two runs show any."""
-    by_run = {run.file: [one for one in series if one.run == run.file] for run in runs}
-    if sum(bool(own) for own in by_run.values()) < 2:
+    by_run = {run.file: [part for part in series if part.run == run.file] for run in runs}
+    if sum(bool(parts) for parts in by_run.values()) < 2:
         return []
     waves: list[Wave] = []
     for wave in _strongest(series, most, apart=True):
         first, *others = (
-            wave_of(wave.period, fitted(own, np.array([wave.period]))[1][0]) if own else wave for own in by_run.values()
+            wave_of(wave.period, fitted(parts, np.array([wave.period]))[1][0]) if parts else wave
+            for parts in by_run.values()
         )
-        ratio = float(np.sqrt(np.mean([one.ratio**2 for one in (first, *others)])))
-        phases_of = {phase_of(run.file): one.phase_rad for run, one in zip(runs[1:], others, strict=True)}
+        ratio = float(np.sqrt(np.mean([other.ratio**2 for other in (first, *others)])))
+        phases_of = {phase_of(run.file): other.phase_rad for run, other in zip(runs[1:], others, strict=True)}
         waves.append(wave._replace(ratio=ratio, phase_rad=first.phase_rad, phases_of=phases_of))
     return waves
 
 
-def _strongest(series: list[Series], most: int, harmonics: int = 1, apart: bool = False) -> list[Wave]:
+def _strongest(series: list[WaveSeries], most: int, harmonics: int = 1, apart: bool = False) -> list[Wave]:
     if not series:
         return []
-    span = max(float(np.ptp(one.at)) for one in series)
-    spacing = min(float(np.median(np.abs(np.diff(one.at)))) for one in series)
+    span = max(float(np.ptp(part.at)) for part in series)
+    spacing = min(float(np.median(np.abs(np.diff(part.at)))) for part in series)
     if span <= 0.0 or spacing <= 0.0:
         return []
-    reach = max(float(one.at.max()) for one in series) - min(float(one.at.min()) for one in series)
-    # what turns less than once is a drift
+    reach = max(float(part.at.max()) for part in series) - min(float(part.at.min()) for part in series)
+    # less than one turn is a drift
     periods = np.geomspace(max(0.3 * spacing, span / 100.0), min(2.0 * span, reach), _GRID)
     power, shares = fitted(series, periods, harmonics)
     if apart:
-        runs = dict.fromkeys(one.run for one in series)
-        power = np.sum([fitted([one for one in series if one.run == run], periods)[0] for run in runs], axis=0)
+        runs = dict.fromkeys(part.run for part in series)
+        power = np.sum([fitted([part for part in series if part.run == run], periods)[0] for run in runs], axis=0)
     # the best of every range of periods: short ones fit the few breakaways best whatever is there
     edges = np.linspace(0, _GRID, most + 1).astype(np.int64)
     best: list[int] = []
@@ -191,21 +193,21 @@ def _strongest(series: list[Series], most: int, harmonics: int = 1, apart: bool 
     return [wave._replace(spread=min(0.5 * wave.period / reach, 0.2)) for wave in waves]
 
 
-def fitted(series: list[Series], periods: Floats, harmonics: int = 1) -> tuple[Floats, Floats]:
+def fitted(series: list[WaveSeries], periods: Floats, harmonics: int = 1) -> tuple[Floats, Floats]:
     """Waves with up to two harmonics, fitted each alone.
 
     Returns:
-        What each takes of the sum of squares [periods], and its shares of sine and cosine [periods, 2 x harmonics].
+        The part of the sum of squares that each explains [periods], and its shares of sine and cosine [periods, 2 x harmonics].
 
     """
     normal = np.zeros((len(periods), 2 * harmonics, 2 * harmonics))
     right = np.zeros((len(periods), 2 * harmonics))
-    for one in series:
-        turns = 2.0 * np.pi * one.at / periods[:, None]
+    for part in series:
+        turns = 2.0 * np.pi * part.at / periods[:, None]
         columns = np.stack([wave(k * turns) for k in range(1, harmonics + 1) for wave in (np.sin, np.cos)], axis=2)
-        columns = one.weight * (columns - columns.mean(axis=1, keepdims=True))
+        columns = part.weight * (columns - columns.mean(axis=1, keepdims=True))
         normal += columns.transpose(0, 2, 1) @ columns
-        right += one.weight * (one.value @ columns)
+        right += part.weight * (part.value @ columns)
     held = 1e-9 * np.trace(normal, axis1=1, axis2=2)
     shares = np.linalg.solve(normal + held[:, None, None] * np.eye(2 * harmonics), right[..., None])[..., 0]
     return np.sum(right * shares, axis=1), shares

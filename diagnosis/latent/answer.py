@@ -9,7 +9,7 @@ from diagnosis.gap.prepare import Prepared
 from diagnosis.latent.axis_rows import axis_rows
 from diagnosis.latent.components import NOISE, SCATTER, model_of
 from diagnosis.latent.reml import fitted
-from diagnosis.latent.rows import BREAKAWAY, SLIDING, Rows, together
+from diagnosis.latent.rows import BREAKAWAY, SLIDING, ExcessRows, together
 from diagnosis.latent.shares import LatentShare, shares_of
 from diagnosis.latent.spring_rows import spring_rows
 
@@ -35,18 +35,18 @@ class LatentSignal(NamedTuple):
 def latent_of(rig: RigTable, runs: list[Prepared]) -> tuple[LatentSignal, ...]:
     """Split the friction of all runs; fitted to those that are not held out. Signals with too few rows are left out."""
     parts = axis_rows(rig, runs) if rig.drive == "force" else spring_rows(rig, runs)
-    found: list[LatentSignal] = []
+    signals: list[LatentSignal] = []
     for signal in (BREAKAWAY, SLIDING):
         rows = together([part for part in parts if part.signal == signal])
         if rows is None:
             continue
         rows = rows.thinned()
         if int((~rows.held_out).sum()) >= _FEWEST:
-            found.append(signal_of(rows))
-    return tuple(found)
+            signals.append(signal_of(rows))
+    return tuple(signals)
 
 
-def signal_of(rows: Rows) -> LatentSignal:
+def signal_of(rows: ExcessRows) -> LatentSignal:
     """One signal, split."""
     fit = np.flatnonzero(~rows.held_out)
     held = np.flatnonzero(rows.held_out)
@@ -55,7 +55,7 @@ def signal_of(rows: Rows) -> LatentSignal:
     best = fitted(model_of(rows), rows.excess_N, fit)
     shares = shares_of(best, rows, fit, held)
     differs = float(rows.excess_N[held].std())
-    explained = sum(one.share for one in shares if one.what not in (SCATTER, NOISE))
+    explained = sum(share.share for share in shares if share.what not in (SCATTER, NOISE))
     return LatentSignal(
         signal=rows.signal,
         shares=shares,

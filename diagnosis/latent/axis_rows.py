@@ -6,7 +6,7 @@ from scipy.signal import savgol_filter
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.gap.prepare import Prepared
-from diagnosis.latent.rows import MOST_ROWS, SLIDING, Floats, Rows, noise_of_force_N
+from diagnosis.latent.rows import MOST_ROWS, SLIDING, ExcessRows, Floats, noise_of_force_N
 from diagnosis.relations.relation import pieces_of
 
 _WINDOW = 31  # blocks: the window that smooths the motion, so force and inertia are filtered alike
@@ -16,7 +16,7 @@ _SHORTEST_CELL = 20  # blocks: a shorter cell is inside the window of the filter
 _BOTH_ENDS = 16  # blocks left out at the ends of a stretch: half the window
 
 
-def axis_rows(rig: RigTable, runs: list[Prepared]) -> list[Rows]:
+def axis_rows(rig: RigTable, runs: list[Prepared]) -> list[ExcessRows]:
     """Sliding friction of every run; a list of the rows of each stretch in one direction."""
     stretches = [(number, *piece) for number, run in enumerate(runs) for piece in _stretches(rig, run)]
     blocks = sum(last - first for _, first, last in stretches)
@@ -41,13 +41,13 @@ def _stretches(rig: RigTable, run: Prepared) -> list[tuple[int, int]]:
     slowest = max(_SLOW_STRIBECK * rig.stribeck_velocity_mps, _SLOW_SHARE * float(speed.max()))
     slowest = min(slowest, 0.5 * float(speed.max()))
     moves = speed > slowest
-    found: list[tuple[int, int]] = []
+    pieces: list[tuple[int, int]] = []
     for way in (-1.0, 1.0):
-        found += pieces_of(moves & (np.sign(motion.velocity_mps) == way), 2 * _BOTH_ENDS + _SHORTEST_CELL)
-    return sorted((first + _BOTH_ENDS, last - _BOTH_ENDS) for first, last in found)
+        pieces += pieces_of(moves & (np.sign(motion.velocity_mps) == way), 2 * _BOTH_ENDS + _SHORTEST_CELL)
+    return sorted((first + _BOTH_ENDS, last - _BOTH_ENDS) for first, last in pieces)
 
 
-def _of_stretch(rig: RigTable, run: Prepared, number: int, piece: list[int], cell: int) -> Rows | None:
+def _of_stretch(rig: RigTable, run: Prepared, number: int, piece: list[int], cell: int) -> ExcessRows | None:
     motion = run.commands.motion
     assert motion is not None, "a force drive has a motion"  # noqa: S101
     force_N = run.signals["drive_force_N"]
@@ -63,7 +63,7 @@ def _of_stretch(rig: RigTable, run: Prepared, number: int, piece: list[int], cel
 
     sign = float(np.sign(motion.velocity_mps[first]))
     load = run.beside.get("normal_load_N")
-    return Rows(
+    return ExcessRows(
         signal=SLIDING,
         excess_N=sign * means(smooth_N - motion.inertia_N) - means(described_N(rig, np.abs(motion.velocity_mps))),
         sign=np.full(cells, sign),

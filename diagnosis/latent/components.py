@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.latent.rows import BREAKAWAY, Floats, Rows
+from diagnosis.latent.rows import BREAKAWAY, ExcessRows, Floats
 
 PLACE, ROUGH, FORCE_PLACE = "position-dependent-friction", "rough track", "place-dependent force"
 DIRECTION, TIME, LOAD = "direction-dependent-friction", "friction-drift", "load-dependent friction"
@@ -44,7 +44,7 @@ class Component(NamedTuple):
     lengths: tuple[str, ...] = ()
 
 
-class Model(NamedTuple):
+class ComponentModel(NamedTuple):
     """The processes of one signal and their lengths."""
 
     components: tuple[Component, ...]
@@ -52,7 +52,7 @@ class Model(NamedTuple):
     revisited: bool  # whether the rows come back to places at other times: only then place and time are two things
 
 
-def model_of(rows: Rows) -> Model:
+def model_of(rows: ExcessRows) -> ComponentModel:
     """The processes that these rows can show."""
     both = len(np.unique(rows.sign)) > 1
     revisited = _revisited(rows)
@@ -97,7 +97,7 @@ def model_of(rows: Rows) -> Model:
     if rows.rate_N_per_s is not None and float(rows.rate_N_per_s.std()) > 0.0:
         components.append(Component(CLOCKS, _fixed(line(rows.rate_N_per_s))))
     components.append(Component(SCATTER, _fixed(unit(np.eye(len(rows.excess_N))))))
-    return Model(tuple(components), tuple(lengths), revisited)
+    return ComponentModel(tuple(components), tuple(lengths), revisited)
 
 
 def matern(apart: Floats, length: float) -> Floats:
@@ -119,8 +119,8 @@ def line(values: Floats) -> Floats:
 
 def centred(covariance: Floats) -> Floats:
     """Without what is the same for all rows."""
-    own = covariance.mean(axis=0)
-    return covariance - own[:, None] - own[None, :] + own.mean()
+    mean = covariance.mean(axis=0)
+    return covariance - mean[:, None] - mean[None, :] + mean.mean()
 
 
 def unit(covariance: Floats) -> Floats:
@@ -136,8 +136,8 @@ def _along(
     """A process over distances; with `sign`, [rows], of a force that does not change its direction with the motion."""
 
     def covariance(at: dict[str, float]) -> Floats:
-        own = shape(apart, math.exp(at[length]))
-        return unit(own if sign is None else np.outer(sign, sign) * centred(own))
+        correlation = shape(apart, math.exp(at[length]))
+        return unit(correlation if sign is None else np.outer(sign, sign) * centred(correlation))
 
     return Component(what, covariance, (length,))
 
@@ -153,7 +153,7 @@ def _spacing(values: Floats) -> float:
     return float(np.median(steps)) if len(steps) else 0.0
 
 
-def _revisited(rows: Rows) -> bool:
+def _revisited(rows: ExcessRows) -> bool:
     """Whether many rows have a neighbour in place that is far away in time."""
     order = np.argsort(rows.place_m, kind="stable")
     gone = np.abs(np.diff(rows.t_s[order]))

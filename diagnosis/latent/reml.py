@@ -10,8 +10,9 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 
-from diagnosis.latent.components import Model
-from diagnosis.latent.rows import Floats, Indices
+from bridge.arrays import Indices
+from diagnosis.latent.components import ComponentModel
+from diagnosis.latent.rows import Floats
 
 _LEAST, _MOST = 1e-5, 30.0  # of a variance, in those of the rows
 _STEP = 0.05  # of the logarithm of a length, for its derivative
@@ -21,14 +22,14 @@ _ROUNDS = 60  # of the search; it ends after 15 to 40
 class Fitted(NamedTuple):
     """The model at its most likely numbers. Variances are in squares of the rows' standard deviation."""
 
-    model: Model
+    model: ComponentModel
     scale_N: float  # standard deviation of the fitted rows
     variances: Floats  # [components]
     lengths: dict[str, float]  # logarithms
     likelihood: float  # natural logarithm, restricted
 
 
-def covariances(model: Model, lengths: dict[str, float]) -> list[Floats]:
+def covariances(model: ComponentModel, lengths: dict[str, float]) -> list[Floats]:
     """The covariance of every component, [rows, rows] each."""
     return [component.covariance(lengths) for component in model.components]
 
@@ -51,26 +52,28 @@ def restricted(kernels: list[Floats], variances: Floats, y: Floats) -> tuple[flo
     return likelihood, np.array(slopes)
 
 
-def fitted(model: Model, excess_N: Floats, own: Indices, without: str = "", start: "Fitted | None" = None) -> Fitted:
+def fitted(
+    model: ComponentModel, excess_N: Floats, rows: Indices, without: str = "", start: "Fitted | None" = None
+) -> Fitted:
     """The most likely variances and lengths.
 
     Args:
         model: the processes over all rows.
         excess_N: what is split, [rows].
-        own: the rows to fit, indices.
+        rows: the rows to fit, indices.
         without: a process whose variance is nothing.
         start: numbers to begin from.
 
     """
-    scale_N = max(float(excess_N[own].std()), 1e-12)
-    y = (excess_N[own] - excess_N[own].mean()) / scale_N
+    scale_N = max(float(excess_N[rows].std()), 1e-12)
+    y = (excess_N[rows] - excess_N[rows].mean()) / scale_N
     free = [i for i, component in enumerate(model.components) if component.what != without]
     names = [length.name for length in model.lengths]
     used = {name for i in free for name in model.components[i].lengths}
     count = len(free)
 
     def kernels_at(lengths: dict[str, float]) -> list[Floats]:
-        return [model.components[i].covariance(lengths)[own[:, None], own] for i in free]
+        return [model.components[i].covariance(lengths)[rows[:, None], rows] for i in free]
 
     def unlikely(x: Floats) -> tuple[float, Floats]:
         lengths = dict(zip(names, x[count:].tolist(), strict=True))
@@ -92,12 +95,14 @@ def fitted(model: Model, excess_N: Floats, own: Indices, without: str = "", star
         first = np.concatenate([np.log(start.variances[free]), [start.lengths[name] for name in names]])
     bounds = [(math.log(_LEAST), math.log(_MOST))] * count + [(length.low, length.high) for length in model.lengths]
     first = np.clip(first, [low for low, _ in bounds], [high for _, high in bounds])
-    found = minimize(unlikely, first, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": _ROUNDS})
+    optimum = minimize(unlikely, first, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": _ROUNDS})
     variances = np.full(len(model.components), _LEAST)
-    variances[free] = np.exp(found.x[:count])
+    variances[free] = np.exp(optimum.x[:count])
     if without:
         variances[[i for i in range(len(variances)) if i not in free]] = 0.0
-    return Fitted(model, scale_N, variances, dict(zip(names, found.x[count:].tolist(), strict=True)), -float(found.fun))
+    return Fitted(
+        model, scale_N, variances, dict(zip(names, optimum.x[count:].tolist(), strict=True)), -float(optimum.fun)
+    )
 
 
 def restricted_value(kernels: list[Floats], variances: Floats, y: Floats) -> float:

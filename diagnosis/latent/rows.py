@@ -5,16 +5,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Floats
 from diagnosis.gap.prepare import Prepared
 
-Floats = npt.NDArray[np.floating[Any]]
-Indices = npt.NDArray[np.int64]
 BREAKAWAY, SLIDING = "breakaway level", "sliding friction"
 # Rows of one signal that are kept, evenly spread: the work grows with their third power. Fewer: short lengths are lost.
 MOST_ROWS = 240
 
 
-class Rows(NamedTuple):
+class ExcessRows(NamedTuple):
     """Excess levels of one signal. Arrays are [rows], in time order within a run."""
 
     signal: str  # BREAKAWAY or SLIDING
@@ -30,17 +29,17 @@ class Rows(NamedTuple):
     rate_N_per_s: Floats | None  # of the force, positive along the motion; of an axis
     noise_N: float  # standard deviation of what the sensors add to a row
 
-    def some(self, own: npt.NDArray[Any]) -> "Rows":
-        """The rows `own`: indices or marks."""
+    def some(self, mask: npt.NDArray[Any]) -> "ExcessRows":
+        """The rows `mask`: indices or marks."""
         return self._replace(
             **{
-                name: values[own]
+                name: values[mask]
                 for name, values in self._asdict().items()
                 if isinstance(values, np.ndarray) and values.ndim == 1
             }
         )
 
-    def thinned(self) -> "Rows":
+    def thinned(self) -> "ExcessRows":
         """At most `MOST_ROWS` rows, evenly spread."""
         count = len(self.excess_N)
         if count <= MOST_ROWS:
@@ -48,7 +47,7 @@ class Rows(NamedTuple):
         return self.some(np.unique(np.linspace(0, count - 1, MOST_ROWS).round().astype(np.int64)))
 
 
-def together(parts: list[Rows]) -> Rows | None:
+def together(parts: list[ExcessRows]) -> ExcessRows | None:
     """The rows of several runs as one; None without any."""
     if not parts:
         return None
@@ -56,11 +55,11 @@ def together(parts: list[Rows]) -> Rows | None:
 
     def joined(name: str) -> Any:
         values = [getattr(part, name) for part in parts]
-        return None if any(one is None for one in values) else np.concatenate(values)
+        return None if any(value is None for value in values) else np.concatenate(values)
 
     arrays = ("excess_N", "sign", "place_m", "t_s", "speed_mps", "run", "held_out", "load_N", "pull_N", "rate_N_per_s")
     noise_N = float(np.mean([part.noise_N for part in parts]))
-    return Rows(first.signal, **{name: joined(name) for name in arrays}, noise_N=noise_N)
+    return ExcessRows(first.signal, **{name: joined(name) for name in arrays}, noise_N=noise_N)
 
 
 def noise_of_force_N(run: Prepared) -> float:

@@ -11,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from bridge.arrays import Indices
 from diagnosis.latent.components import NOISE, SCATTER
 from diagnosis.latent.reml import Fitted, covariances, fitted, restricted_value
-from diagnosis.latent.rows import Floats, Indices, Rows
+from diagnosis.latent.rows import ExcessRows, Floats
 
 _PROPOSED, _DRAWS = 120, 80  # variances and lengths proposed for the interval, and courses drawn
 _WIDEST = 1.5  # standard deviation of a proposal, in the logarithm of a variance or a length
@@ -37,16 +38,16 @@ class LatentShare(NamedTuple):
         return self.null_90 is not None and self.interval_90[0] > self.null_90
 
 
-def shares_of(found: Fitted, rows: Rows, fit: Indices, held: Indices) -> tuple[LatentShare, ...]:
+def shares_of(fitted_model: Fitted, rows: ExcessRows, fit: Indices, held: Indices) -> tuple[LatentShare, ...]:
     """The shares on the rows `held` of a model fitted to the rows `fit` (indices); the largest first, noise last."""
-    y = (rows.excess_N - rows.excess_N[fit].mean()) / found.scale_N
-    kernels = covariances(found.model, found.lengths)
-    at_best = _split(kernels, found.variances, y, held)
+    y = (rows.excess_N - rows.excess_N[fit].mean()) / fitted_model.scale_N
+    kernels = covariances(fitted_model.model, fitted_model.lengths)
+    at_best = _split(kernels, fitted_model.variances, y, held)
     random = np.random.default_rng(1)
-    draws = np.array([_drawn(*one, y, held, random) for one in _numbers(found, y, fit, random)])
+    draws = np.array([_drawn(*number, y, held, random) for number in _numbers(fitted_model, y, fit, random)])
     low, high = np.quantile(np.clip(draws, 0.0, 1.0), _LEVELS, axis=0)
-    names = [component.what for component in found.model.components]
-    noise = min((rows.noise_N / found.scale_N) ** 2 / max(float(y[held].var()), 1e-12), 1.0)
+    names = [component.what for component in fitted_model.model.components]
+    noise = min((rows.noise_N / fitted_model.scale_N) ** 2 / max(float(y[held].var()), 1e-12), 1.0)
     result: list[LatentShare] = []
     for number, what in enumerate(names):
         share, between = float(at_best[number]), (float(low[number]), float(high[number]))
@@ -56,11 +57,11 @@ def shares_of(found: Fitted, rows: Rows, fit: Indices, held: Indices) -> tuple[L
             between = (max(between[0] - noise, 0.0), max(between[1] - noise, 0.0))
             result.append(LatentShare(SCATTER, share - noise, between, None, 0.0))
         elif share > _LEAST_SHARE:
-            null, gain = _null(found, kernels, rows, fit, held, number)
+            null, gain = _null(fitted_model, kernels, rows, fit, held, number)
             result.append(LatentShare(what, share, between, null, gain))
         else:
             result.append(LatentShare(what, share, between, None, 0.0))
-    return tuple(sorted(result, key=lambda one: (one.what == NOISE, one.what == SCATTER, -one.share)))
+    return tuple(sorted(result, key=lambda share: (share.what == NOISE, share.what == SCATTER, -share.share)))
 
 
 def _split(kernels: list[Floats], variances: Floats, y: Floats, held: Indices) -> Floats:
@@ -68,7 +69,7 @@ def _split(kernels: list[Floats], variances: Floats, y: Floats, held: Indices) -
     weights = _weights(kernels, variances, y)
     about = y[held] - y[held].mean()
     courses = [size * (kernel @ weights)[held] for size, kernel in zip(variances, kernels, strict=True)]
-    return np.array([float(about @ (one - one.mean())) for one in courses]) / max(float(about @ about), 1e-30)
+    return np.array([float(about @ (cours - cours.mean())) for cours in courses]) / max(float(about @ about), 1e-30)
 
 
 def _weights(kernels: list[Floats], variances: Floats, y: Floats) -> Floats:
@@ -80,29 +81,33 @@ def _weights(kernels: list[Floats], variances: Floats, y: Floats) -> Floats:
     return both[:, 0] - both[:, 1] * float(both[:, 0].sum()) / float(both[:, 1].sum())
 
 
-def _numbers(found: Fitted, y: Floats, fit: Indices, random: np.random.Generator) -> list[tuple[Floats, list[Floats]]]:
+def _numbers(
+    fitted_model: Fitted, y: Floats, fit: Indices, random: np.random.Generator
+) -> list[tuple[Floats, list[Floats]]]:
     """Draws of the variances, and the covariances at the drawn lengths."""
-    names = list(found.lengths)
-    bounds = {length.name: length for length in found.model.lengths}
-    kernels = [kernel[fit[:, None], fit] for kernel in covariances(found.model, found.lengths)]
-    root = np.linalg.cholesky(_spread(kernels, found.variances))
-    count = len(found.variances)
+    names = list(fitted_model.lengths)
+    bounds = {length.name: length for length in fitted_model.model.lengths}
+    kernels = [kernel[fit[:, None], fit] for kernel in covariances(fitted_model.model, fitted_model.lengths)]
+    root = np.linalg.cholesky(_spread(kernels, fitted_model.variances))
+    count = len(fitted_model.variances)
     fixed = [None if component.lengths else kernel for component, kernel in zip(
-        found.model.components, covariances(found.model, found.lengths), strict=True)]  # fmt: skip
+        fitted_model.model.components, covariances(fitted_model.model, fitted_model.lengths), strict=True)]  # fmt: skip
     drawn: list[tuple[Floats, list[Floats]]] = []
     chances: list[float] = []
     for _ in range(_PROPOSED):
         normal = random.standard_normal(count)
-        variances = found.variances * np.exp(root @ normal)
+        variances = fitted_model.variances * np.exp(root @ normal)
         lengths = {
             name: float(
-                np.clip(found.lengths[name] + 0.4 * random.standard_normal(), bounds[name].low, bounds[name].high)
+                np.clip(
+                    fitted_model.lengths[name] + 0.4 * random.standard_normal(), bounds[name].low, bounds[name].high
+                )
             )
             for name in names
         }
         all_rows = [
             component.covariance(lengths) if known is None else known
-            for component, known in zip(found.model.components, fixed, strict=True)
+            for component, known in zip(fitted_model.model.components, fixed, strict=True)
         ]
         value = restricted_value([kernel[fit[:, None], fit] for kernel in all_rows], variances, y[fit])
         # flat in the standard deviations, against the density that the draw came from
@@ -129,8 +134,8 @@ def _drawn(variances: Floats, kernels: list[Floats], y: Floats, held: Indices, r
     weights = _weights(kernels, variances, y - np.sum(prior, axis=0))
     about = y[held] - y[held].mean()
     shares = []
-    for size, kernel, own in zip(variances, kernels, prior, strict=True):
-        course = (own + size * (kernel @ weights))[held]
+    for size, kernel, mean in zip(variances, kernels, prior, strict=True):
+        course = (mean + size * (kernel @ weights))[held]
         shares.append(float(about @ (course - course.mean())))
     return np.array(shares) / max(float(about @ about), 1e-30)
 
@@ -142,20 +147,22 @@ def _sample(kernel: Floats, random: np.random.Generator) -> Floats:
 
 
 def _null(
-    found: Fitted, kernels: list[Floats], rows: Rows, fit: Indices, held: Indices, number: int
+    fitted_model: Fitted, kernels: list[Floats], rows: ExcessRows, fit: Indices, held: Indices, number: int
 ) -> tuple[float, float]:
     """The share of a process in 9 of 10 records that lack it, and the log likelihood that the rows lose without it."""
-    without = fitted(found.model, rows.excess_N, fit, without=found.model.components[number].what, start=found)
-    others = covariances(found.model, without.lengths)
+    without = fitted(
+        fitted_model.model, rows.excess_N, fit, without=fitted_model.model.components[number].what, start=fitted_model
+    )
+    others = covariances(fitted_model.model, without.lengths)
     whole = np.tensordot(without.variances, np.array(others), axes=1) + 1e-9 * np.eye(len(rows.excess_N))
     random = np.random.default_rng(2)
     records = np.linalg.cholesky(whole) @ random.standard_normal((len(whole), _NULL_DRAWS))
-    both = np.tensordot(found.variances, np.array(kernels), axes=1) + 1e-9 * np.eye(len(whole))
+    both = np.tensordot(fitted_model.variances, np.array(kernels), axes=1) + 1e-9 * np.eye(len(whole))
     factor = cho_factor(both, lower=True, check_finite=False)
     ones = cho_solve(factor, np.ones(len(whole)), check_finite=False)
     weights = cho_solve(factor, records, check_finite=False)
     weights -= np.outer(ones, weights.sum(axis=0)) / float(ones.sum())
-    course = (found.variances[number] * (kernels[number] @ weights))[held]
+    course = (fitted_model.variances[number] * (kernels[number] @ weights))[held]
     about = records[held] - records[held].mean(axis=0)
     share = (about * (course - course.mean(axis=0))).sum(axis=0) / (about * about).sum(axis=0)
-    return float(np.quantile(share, 0.9)), found.likelihood - without.likelihood
+    return float(np.quantile(share, 0.9)), fitted_model.likelihood - without.likelihood

@@ -7,12 +7,13 @@ trough is the sliding friction in a slip, without an acceleration. Peaks and tro
 import numpy as np
 from scipy.signal import savgol_filter
 
+from bridge.arrays import Indices
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.feature import Signals, scales_of
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.features.slips import find_slips
 from diagnosis.gap.prepare import Prepared
-from diagnosis.latent.rows import BREAKAWAY, SLIDING, Floats, Indices, Rows, noise_of_force_N
+from diagnosis.latent.rows import BREAKAWAY, SLIDING, ExcessRows, Floats, noise_of_force_N
 from diagnosis.relations.relation import pieces_of
 
 _SETTLED = 50  # blocks left out at the ends of a stretch in one direction
@@ -23,9 +24,9 @@ _SHORTEST = 300  # blocks of a stretch in one direction
 _OVER_NOISE = 4.0  # standard deviations of the noise that a slip must fall by, or noise has peaks of its own
 
 
-def spring_rows(rig: RigTable, runs: list[Prepared]) -> list[Rows]:
+def spring_rows(rig: RigTable, runs: list[Prepared]) -> list[ExcessRows]:
     """Breakaways and sliding friction of every run that has a force; a list of the rows of each run and signal."""
-    found: list[Rows] = []
+    result: list[ExcessRows] = []
     gone_m = 0.0  # a path that nobody measured goes on from run to run: no place of one is known to be one of another
     for number, run in enumerate(runs):
         force_N = run.signals.get("drive_force_N")
@@ -36,8 +37,8 @@ def spring_rows(rig: RigTable, runs: list[Prepared]) -> list[Rows]:
         if not {"mass_position_m", "drive_position_m"} & run.signals.keys():
             gone_m += float(np.abs(drive_mps).sum()) * BLOCK_S
         for first, last in _stretches(run, drive_mps):
-            found += _of_stretch(rig, run, number, slice(first, last), drive_mps, place_m)
-    return found
+            result += _of_stretch(rig, run, number, slice(first, last), drive_mps, place_m)
+    return result
 
 
 def _drive_mps(run: Prepared) -> Floats:
@@ -53,10 +54,10 @@ def _stretches(run: Prepared, drive_mps: Floats) -> list[tuple[int, int]]:
     """Blocks [first, last) of one direction without vibration."""
     sign = np.sign(drive_mps)
     still = run.commands.frequency_Hz == 0.0
-    found: list[tuple[int, int]] = []
+    pieces: list[tuple[int, int]] = []
     for way in (-1.0, 1.0):
-        found += pieces_of((sign == way) & still, _SHORTEST)
-    return sorted(found)
+        pieces += pieces_of((sign == way) & still, _SHORTEST)
+    return sorted(pieces)
 
 
 def _place_m(rig: RigTable, signals: Signals, drive_mps: Floats, force_N: Floats) -> Floats:
@@ -70,44 +71,44 @@ def _place_m(rig: RigTable, signals: Signals, drive_mps: Floats, force_N: Floats
 
 
 def _of_stretch(
-    rig: RigTable, run: Prepared, number: int, own: slice, drive_mps: Floats, place_m: Floats
-) -> list[Rows]:
-    sign = float(np.sign(drive_mps[own.start]))
-    speed_mps = np.abs(drive_mps[own])
+    rig: RigTable, run: Prepared, number: int, stretch: slice, drive_mps: Floats, place_m: Floats
+) -> list[ExcessRows]:
+    sign = float(np.sign(drive_mps[stretch.start]))
+    speed_mps = np.abs(drive_mps[stretch])
     scales = scales_of(rig)
     noise_N = noise_of_force_N(run)
     scales = scales._replace(drop_N=max(scales.drop_N, _OVER_NOISE * noise_N))
-    cut = {name: sign * values[own] for name, values in run.signals.items() if name == "drive_force_N"}
+    cut = {name: sign * values[stretch] for name, values in run.signals.items() if name == "drive_force_N"}
     slips = find_slips(cut, scales)
-    level_N = cut["drive_force_N"] + sign * run.beside.get("other_force_N", np.zeros(len(drive_mps)))[own]
+    level_N = cut["drive_force_N"] + sign * run.beside.get("other_force_N", np.zeros(len(drive_mps)))[stretch]
     if len(slips.tops) >= 2:
         tops, bottoms = slips.tops[1:], slips.bottoms[1:]
         middle_N = 0.5 * (level_N[tops] + level_N[bottoms]) - rig.coulomb_force_N
         fall_mps = (level_N[tops] - level_N[bottoms]) / scales.stiffness_N_per_m / (2.0 * scales.slip_s / np.pi)
         breaks_N, middle = level_N[tops] - rig.static_force_N, (tops + bottoms) // 2
         return [
-            _rows(BREAKAWAY, run, number, own, sign, tops, breaks_N, place_m, speed_mps[tops], noise_N),
-            _rows(SLIDING, run, number, own, sign, middle, middle_N, place_m, fall_mps, noise_N),
+            _rows(BREAKAWAY, run, number, stretch, sign, tops, breaks_N, place_m, speed_mps[tops], noise_N),
+            _rows(SLIDING, run, number, stretch, sign, middle, middle_N, place_m, fall_mps, noise_N),
         ]
     if len(slips.tops):
         return []
-    inner = np.arange(_SETTLED, own.stop - own.start - _SETTLED)
+    inner = np.arange(_SETTLED, stretch.stop - stretch.start - _SETTLED)
     cells = len(inner) // _CELL
     if cells == 0:
         return []
     at = inner[: cells * _CELL].reshape(cells, _CELL)
     mean_N = level_N[at].mean(axis=1) - rig.coulomb_force_N
     speed = speed_mps[at].mean(axis=1)
-    return [_rows(SLIDING, run, number, own, sign, at[:, _CELL // 2], mean_N, place_m, speed, noise_N / _CELL**0.5)]
+    return [_rows(SLIDING, run, number, stretch, sign, at[:, _CELL // 2], mean_N, place_m, speed, noise_N / _CELL**0.5)]
 
 
 def _rows(
-    signal: str, run: Prepared, number: int, own: slice, sign: float, at: Indices, excess_N: Floats,
+    signal: str, run: Prepared, number: int, stretch: slice, sign: float, at: Indices, excess_N: Floats,
     place_m: Floats, speed_mps: Floats, noise_N: float,
-) -> Rows:  # fmt: skip
-    count, index = len(at), at + own.start
+) -> ExcessRows:  # fmt: skip
+    count, index = len(at), at + stretch.start
     load = run.beside.get("normal_load_N")
-    return Rows(
+    return ExcessRows(
         signal=signal,
         excess_N=excess_N,
         sign=np.full(count, sign),

@@ -11,4 +11,6 @@ speeds       friction over speed, and over the dwell before a slip
 steady       whether the record is alike from beginning to end
 look         all of it, for one record
 words        a sentence for each number
+position_owner  whether a position column belongs to the drive or to the slide
+turns        maxima and minima of a record that differ by more than its noise
 """

@@ -1,56 +1,55 @@
 """The mean force at breakaway, from all tops of a record laid over each other.
 
 The largest of noisy samples is too large, and a top that is smoothed, or found in noise, is too low. The mean of many tops has
-little noise, so that a place on it is found well; one half of the slips finds the place, and the other half measures it.
-What a smoothing cuts off a top is what a second one cuts off again (Tukey, Exploratory data analysis, 1977: twicing).
+little noise, so its maximum is located well; one half of the slips locates it, and the other half measures the force there.
+A second smoothing cuts off as much of a top as the first (Tukey, Exploratory data analysis, 1977: twicing).
 """
 
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from diagnosis.look.numbers import Number, mean_of
 from diagnosis.look.record import smoothed
 from diagnosis.look.slip_shape import half_done
-from diagnosis.look.slips import Slips
+from diagnosis.look.slips import RecordSlips
 
-Floats = npt.NDArray[np.float64]
 _FEWEST = 4  # tops: two for each half
 _SMOOTHED = 3  # samples of a smoothing from which the falls have samples enough to be laid over each other
-_STAYS = 0.5  # share of what is mended that may stay
+_STAYS = 0.5  # share of the correction that may be wrong, in the interval
 _OF_LARGEST = 2.0  # standard deviations of noise that the largest of some samples is too large by
-_BEYOND = 2  # widths of the smoothing, beside the place that is looked for
+_BEYOND = 2  # widths of the smoothing, on either side of the searched stretch
 
 
 class _Tops(NamedTuple):
-    """Force at breakaway of each slip but the first, whose stick is not seen, [slips - 1]; and what the smoothing took."""
+    """Force at breakaway of each slip except the first, whose stick is not recorded, [slips - 1]; and the part cut off."""
 
     force_N: Floats
     cut_N: Floats
 
 
-def breakaway_of(found: list[Slips], each: Number) -> Number:
+def breakaway_of(slips_of_parts: list[RecordSlips], each: Number) -> Number:
     """The mean force at breakaway over all parts.
 
     Args:
-        found: slips of each part.
-        each: the mean of the tops that are found one by one; it stands where there are too few slips or samples, and where the
-            falls are so unlike that tops laid over each other are surely lower.
+        slips_of_parts: slips of each part.
+        each: the mean of the tops that are found one by one; returned where there are too few slips or samples, and where the
+            falls differ so much that the mean of the overlaid tops is lower by more than noise.
 
     """
-    tops = [one for one in map(_tops_of, found) if one is not None]
+    tops = [top for top in map(_tops_of, slips_of_parts) if top is not None]
     if not tops:
         return each
-    cut_N = _STAYS * abs(float(np.concatenate([one.cut_N for one in tops]).mean()))
-    laid = mean_of(np.concatenate([one.force_N for one in tops]), each.unit, cut_N)
+    cut_N = _STAYS * abs(float(np.concatenate([top.cut_N for top in tops]).mean()))
+    laid = mean_of(np.concatenate([top.force_N for top in tops]), each.unit, cut_N)
     if laid is None:
         return each
-    noise_N = _OF_LARGEST * max(slips.part.noise_N for slips in found)
+    noise_N = _OF_LARGEST * max(slips.part.noise_N for slips in slips_of_parts)
     return each if each.low - laid.high > noise_N else laid
 
 
-def _tops_of(slips: Slips) -> _Tops | None:
+def _tops_of(slips: RecordSlips) -> _Tops | None:
     """The tops of a part; None for too few."""
     force_N, width = slips.part.force_N, slips.width | 1
     whole = min(len(slips.tops), len(slips.bottoms))
@@ -65,16 +64,16 @@ def _tops_of(slips: Slips) -> _Tops | None:
     at = at[(at[:, 0] >= 0) & (at[:, -1] <= len(force_N) - 1)]
     if len(at) < _FEWEST:
         return None
-    once = np.array([smoothed(one, width) for one in np.interp(at, np.arange(len(force_N)), force_N)])
-    twice = np.array([smoothed(one, width) for one in once])
+    once = np.array([smoothed(course, width) for course in np.interp(at, np.arange(len(force_N)), force_N)])
+    twice = np.array([smoothed(course, width) for course in once])
     inner = slice(_BEYOND * width, -_BEYOND * width)
     cut_N = np.empty(len(at))
     top_N = np.empty(len(at))
     for half in (0, 1):
-        own, other = slice(half, None, 2), slice(1 - half, None, 2)
+        measured, other = slice(half, None, 2), slice(1 - half, None, 2)
         of_once, of_twice = (
             _BEYOND * width + int(np.argmax(courses[other].mean(axis=0)[inner])) for courses in (once, twice)
         )
-        cut_N[own] = once[own, of_once] - twice[own, of_twice]
-        top_N[own] = once[own, of_once] + cut_N[own]
+        cut_N[measured] = once[measured, of_once] - twice[measured, of_twice]
+        top_N[measured] = once[measured, of_once] + cut_N[measured]
     return _Tops(top_N, cut_N)

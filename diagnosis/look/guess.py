@@ -30,15 +30,15 @@ _QUANTITIES = {
     "coefficient": ("share",),
 }
 _FEWEST_STEPS = 8
-# what none of these is, whatever else its name says
+# columns that are never used as force, load, speed or position, even if their name matches
 _OTHER = re.compile(r"acc|beschl|temp|humid|feucht|count|zyklus|cycle|voltage|current", re.IGNORECASE)
 
-# a force that is asked for, beside the one that is there; a position that is asked for is as good as one that is reached
+# a commanded force, which is not the measured one; a commanded position is as good as a measured one
 _WANTED = re.compile(r"soll|set.?p(oin)?t|target|demand|command|nominal", re.IGNORECASE)
 
 
 class Guess(NamedTuple):
-    """Columns by what they are; empty where there is none. `reasons` say why, in words."""
+    """The column of each quantity; empty without such a column. `reasons` explains each choice."""
 
     time: str
     force: str
@@ -50,72 +50,76 @@ class Guess(NamedTuple):
 
 
 def guess(table: Table, given: dict[str, str]) -> Guess:
-    """The columns of a record; `given` names those that a person has named, by time, force, load or position.
+    """The columns of a record; `given` holds the columns that the operator has named, by time, force, load or position.
 
-    Raises Fault CONFIG with a line to copy where the force cannot be known.
+    Raises Fault CONFIG with a line to copy where no column can be identified as the force.
     """
     numeric = [name for name in _numeric(table) if name not in table.own_times.values()]
-    found: dict[str, str] = {what: table.find(column) for what, column in given.items() if column}
+    chosen: dict[str, str] = {what: table.find(column) for what, column in given.items() if column}
     reasons: list[str] = []
     for what in ("coefficient", "time", "load", "force", "speed", "position"):
-        if what in found or (what == "time" and table.own_times):
+        if what in chosen or (what == "time" and table.own_times):
             continue
-        left = [name for name in (list(table.columns) if what == "time" else numeric) if name not in found.values()]
+        left = [name for name in (list(table.columns) if what == "time" else numeric) if name not in chosen.values()]
         column = _named(table, what, left)
         if column:
-            found[what] = column
+            chosen[what] = column
             reasons.append(f"{what} = {column!r} by its name")
-    if "load" in found and "load" not in given and not {"force", "coefficient"} & found.keys():
+    if "load" in chosen and "load" not in given and not {"force", "coefficient"} & chosen.keys():
         _refuse_empty_force(table, numeric)
-        found["force"] = found.pop("load")  # what a testing machine calls the load is the force that it measures
+        chosen["force"] = chosen.pop("load")  # testing machines call their measured force the load
         reasons = [reason for reason in reasons if not reason.startswith("load = ")]
-        reasons.append(f"force = {found['force']!r}, as no other column is one")
-    if "time" not in found and not table.clocks:
+        reasons.append(f"force = {chosen['force']!r}, as no other column is one")
+    if "time" not in chosen and not table.clocks:
         dated = next((name for name in table.columns if name not in numeric and _has_dates(table, name)), "")
         if dated:
-            found["time"] = dated
+            chosen["time"] = dated
             reasons.append(f"time = {dated!r}, which holds times")
-    if "time" not in found and not table.clocks:
-        left = [name for name in numeric if name not in found.values()]
+    if "time" not in chosen and not table.clocks:
+        left = [name for name in numeric if name not in chosen.values()]
         by_unit = next((name for name in left if _in(table, name, "time") and _rises(table, name)), "")
         if by_unit:
-            found["time"] = by_unit
+            chosen["time"] = by_unit
             reasons.append(f"time = {by_unit!r}, which rises in even steps of a unit of time")
-    if "time" not in found and not table.clocks:
-        left = [name for name in numeric if name not in found.values()]
+    if "time" not in chosen and not table.clocks:
+        left = [name for name in numeric if name not in chosen.values()]
         rising = next((name for name in left if _is_clock(table, name)), "")
-        # beside a column that numbers the rows it may be the way of an even drive
+        # with a column that numbers the rows, an evenly rising one may be the position of an even drive
         if rising and not any(_numbers_rows(table, name) for name in left):
-            found["time"] = rising
+            chosen["time"] = rising
             reasons.append(f"time = {rising!r}, which rises in even steps")
-    left = [name for name in numeric if name not in found.values()]
-    if "force" not in found and "coefficient" not in found:
+    left = [name for name in numeric if name not in chosen.values()]
+    if "force" not in chosen and "coefficient" not in chosen:
         by_unit = [name for name in left if _in(table, name, "force")]
         if len(by_unit) != 1:
             _refuse_empty_force(table, numeric)
-        only = by_unit if len(by_unit) == 1 else [one for one in left if not (_OTHER.search(one) or _rises(table, one))]
+        only = (
+            by_unit
+            if len(by_unit) == 1
+            else [name for name in left if not (_OTHER.search(name) or _rises(table, name))]
+        )
         if len(only) != 1:
             raise Fault("CONFIG", _ask(table, numeric))
         what = "coefficient" if (known_unit(table.unit(only[0])) or ("",))[0] == "share" else "force"
-        found[what] = only[0]
+        chosen[what] = only[0]
         reasons.append(f"{what} = {only[0]!r}, the only one left")
-    if "position" in found and _flat(table, found["position"]):
-        del found["position"]
+    if "position" in chosen and _flat(table, chosen["position"]):
+        del chosen["position"]
     for what in ("load", "position", "speed"):
-        if what not in found and (empty := _empty(table, what, numeric)):
+        if what not in chosen and (empty := _empty(table, what, numeric)):
             reasons.append(f"no {what}, as column {empty!r} holds no number")
     kinds = ("time", "force", "load", "position", "speed", "coefficient")
-    time, force, load, position, speed, coefficient = (found.get(what, "") for what in kinds)
+    time, force, load, position, speed, coefficient = (chosen.get(what, "") for what in kinds)
     return Guess(time, force, load, position, speed, coefficient, reasons)
 
 
 def _in(table: Table, name: str, what: str) -> bool:
-    """Whether a column states a unit of what is wanted."""
+    """Whether a column states a unit of the wanted quantity."""
     return (known_unit(table.unit(name)) or ("",))[0] in _QUANTITIES[what]
 
 
 def _refuse_empty_force(table: Table, numeric: list[str]) -> None:
-    """Raise Fault CONFIG where a column is named as the force and holds no number: another one must not stand for it."""
+    """Raise Fault CONFIG where a column is named as the force and holds no number: no other column may take its place."""
     if empty := _empty(table, "force", numeric):
         text = f"{table.path.name}: column {empty!r} holds no number: must hold the force, by its name"
         raise Fault(
@@ -124,7 +128,7 @@ def _refuse_empty_force(table: Table, numeric: list[str]) -> None:
 
 
 def no_time(table: Table) -> str:
-    """Of a column of texts that is named as a time, what cannot be read, in words; empty where there is none."""
+    """A message for a column that is named as a time and holds unreadable text; empty without such a column."""
     for name, values in table.columns.items():
         if re.search(_NAMES["time"], bare_name(name), re.IGNORECASE):
             try:
@@ -135,7 +139,7 @@ def no_time(table: Table) -> str:
 
 
 def _empty(table: Table, what: str, numeric: list[str]) -> str:
-    """A column that is named as what is wanted and has no cell with a value; empty where there is none."""
+    """A column that is named as the wanted quantity and has no cell with a value; empty without such a column."""
     named = (name for name in table.columns if name not in numeric and re.search(_NAMES[what], bare_name(name), re.I))
     if what == "force":
         named = (name for name in named if not re.search(_NAMES["load"], bare_name(name), re.I))  # a normal force
@@ -151,7 +155,9 @@ def _is_empty(table: Table, what: str, name: str) -> bool:
 
 
 def _ask(table: Table, numeric: list[str]) -> str:
-    columns = ", ".join(f'"{name}"' for name in numeric) or "none of numbers"
+    if not numeric:
+        return f"{table.path.name}: no column holds 4 numbers or more; give a file with at least 16 rows of data"
+    columns = ", ".join(f'"{name}"' for name in numeric)
     sheet = f" (sheet {table.written['sheet']!r}; a map reads another one)" if "sheet" in table.written else ""
     return f'{table.path.name}: which column is the force? add --force "NAME"; columns here{sheet}: {columns}'
 
@@ -160,7 +166,7 @@ def _numeric(table: Table) -> list[str]:
     names: list[str] = []
     rows = max((len(values) for values in table.columns.values()), default=0)
     for name, values in table.columns.items():
-        if len(values) < max(rows // 50, 4):  # a parameter, no course
+        if len(values) < max(rows // 50, 4):  # a parameter, not a time series
             continue
         try:
             if np.isfinite(table.column(name)).sum() >= 4:
@@ -171,7 +177,7 @@ def _numeric(table: Table) -> list[str]:
 
 
 def _one_each(table: Table, names: list[str]) -> list[str]:
-    """Without the long names of what a short name stands for too."""
+    """The names without long names of columns that also have a short name."""
     seen: dict[int, str] = {}
     for name in names:
         key = id(table.columns[name])

@@ -5,25 +5,26 @@ import re
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from diagnosis.look.breakaway import breakaway_of
 from diagnosis.look.numbers import Number, groups_of, jackknifed, mean_of
-from diagnosis.look.record import Part, parts_of
-from diagnosis.look.slip_shape import LESS, Falls, Shape, falls_of, fit_from_rest, fit_shape
+from diagnosis.look.record import OneWayPart, parts_of
+from diagnosis.look.slip_shape import LESS, Shape, StackedFalls, falls_of, fit_from_rest, fit_shape
 from diagnosis.look.slip_times import with_slip_times
-from diagnosis.look.slips import Slips, find_slips
+from diagnosis.look.slips import RecordSlips, find_slips
 from diagnosis.look.speeds import AtSpeed, over_dwell, over_speed
 from diagnosis.look.sticks import Cycle, cycles_of
 
-Floats = npt.NDArray[np.float64]
 _FEWEST_FOR_SCATTER = 3
-_SURE = 1.2  # half intervals of 90 % from which a decay is there
-_ALIKE = 0.1  # share up to which what a decay does to level and ends is alike
-# Of a swing from rest: half intervals from which its decay is there; decay over frequency that creep and friction that falls
-# slowly do not look like, up to 0.041 on 127 rigs; and by what share of it the middle of the fall is lifted: 0.16 in theory.
+_SURE = 1.2  # half intervals of 90 % from which a decay counts
+_ALIKE = (
+    0.1  # largest difference, as a share, between the shifts that a decay causes in the level and in the ends of a fall
+)
+# A swing from rest: half intervals from which its decay counts; least decay over frequency, as creep and slowly falling friction
+# look like a decay of up to 0.041 on 127 rigs; and the share of it by which the middle of the fall is lifted: 0.16 in theory.
 _SURER, _LEAST_DECAY, _LIFT = 1.6, 0.05, (0.1, 0.25)
-_LARGEST_DECAY = 2.5  # over a fall: a decay at the end of what is tried is none
+_LARGEST_DECAY = 2.5  # over a fall: a decay near the bound of the fit does not count
 # names of numbers of a force, where a coefficient is looked at
 _MU = {
     "static_force_N": "mu_s",
@@ -38,18 +39,18 @@ _MU = {
 _TURNING = {"N": "N m", "N/s": "N m/s", "N/m": "N m/rad", "kg": "kg m²", "N per decade": "N m per decade"}
 
 
-class Known(NamedTuple):
-    """What is known beside the force, SI units; of a rig that turns torque for force, rad for m, kg m² for kg."""
+class RecordFacts(NamedTuple):
+    """Numbers that the operator gives, SI units; for a rig that turns torque for force, rad for m, kg m² for kg."""
 
     speed_mps: float | None = None  # of the drive, where its position was not measured
     load_N: float | None = None  # normal load
     mass_kg: float | None = None  # of the slide
-    coefficient: bool = False  # what is looked at is the force over an unknown load
+    coefficient: bool = False  # the record holds the force over an unknown load
     torsion: bool = False  # the rig turns: forces are torques, ways are angles
 
     @property
     def force_unit(self) -> str:
-        """Of what is looked at."""
+        """Unit of the record's force or coefficient."""
         return "1" if self.coefficient else "N m" if self.torsion else "N"
 
     @property
@@ -58,18 +59,18 @@ class Known(NamedTuple):
         return "rad/s" if self.torsion else "m/s"
 
 
-class Look(NamedTuple):
-    """What is in a record. Numbers that it does not show are missing from `numbers`."""
+class LookResult(NamedTuple):
+    """The numbers of a record. Numbers that it does not show are missing from `numbers`."""
 
     seconds: float
     rate_Hz: float
     noise_N: float
     cycles: list[Cycle]
-    sticks: bool  # False: what swings here has no straight climbs, or nothing swings
+    sticks: bool  # False: the force swings without straight climbs, or does not swing
     numbers: dict[str, Number]
     at_speeds: list[AtSpeed]
-    parts: list[Part]
-    known: Known
+    parts: list[OneWayPart]
+    known: RecordFacts
     mean_force_N: float
 
     @property
@@ -89,33 +90,37 @@ class Look(NamedTuple):
             "numbers": {name: number.as_dict() for name, number in self.numbers.items()},
             "at_speeds": [
                 {
-                    "speed_mps": one.speed_mps,
-                    "times": one.times,
-                    "mean_N": one.mean_N.as_dict(),
-                    "breakaway_N": None if one.breakaway_N is None else one.breakaway_N.as_dict(),
+                    "speed_mps": at_speed.speed_mps,
+                    "times": at_speed.times,
+                    "mean_N": at_speed.mean_N.as_dict(),
+                    "breakaway_N": None if at_speed.breakaway_N is None else at_speed.breakaway_N.as_dict(),
                 }
-                for one in self.at_speeds
+                for at_speed in self.at_speeds
             ],
         }
 
 
-def look(t_s: Floats, force_N: Floats, position_m: Floats | None = None, known: Known | None = None) -> Look | None:
+def look(
+    t_s: Floats, force_N: Floats, position_m: Floats | None = None, known: RecordFacts | None = None
+) -> LookResult | None:
     """Look at a record: time, force and drive position, [samples] each, SI units. None where it is too short."""
-    known = known or Known()
+    known = known or RecordFacts()
     parts = parts_of(t_s, force_N, position_m)
     if not parts:
         return None
-    found = [slips for slips in (find_slips(part) for part in parts) if slips is not None]
-    cycles = [cycle for slips in found for cycle in cycles_of(slips, known.speed_mps)]
-    weights = [len(slips.tops) for slips in found]
-    straight = float(np.average([slips.straight for slips in found], weights=weights)) if found else 0.0
-    sticks = bool(found) and straight >= 0.5
+    slips_of_parts = [slips for slips in (find_slips(part) for part in parts) if slips is not None]
+    cycles = [cycle for slips in slips_of_parts for cycle in cycles_of(slips, known.speed_mps)]
+    weights = [len(slips.tops) for slips in slips_of_parts]
+    straight = (
+        float(np.average([slips.straight for slips in slips_of_parts], weights=weights)) if slips_of_parts else 0.0
+    )
+    sticks = bool(slips_of_parts) and straight >= 0.5
     seconds = sum(float(part.t_s[-1] - part.t_s[0]) for part in parts)
     step_s = float(np.median([part.step_s for part in parts]))
     numbers: dict[str, Number] = {}
     if sticks:
-        numbers |= _of_cycles(found, cycles, step_s)
-        numbers |= _of_falls(found, numbers)
+        numbers |= _of_cycles(slips_of_parts, cycles, step_s)
+        numbers |= _of_falls(slips_of_parts, numbers)
         numbers |= _between_samples(numbers, step_s)
         if (dwell := over_dwell(cycles)) is not None:
             numbers["dwell_N_per_decade"] = dwell
@@ -134,7 +139,7 @@ def look(t_s: Floats, force_N: Floats, position_m: Floats | None = None, known: 
         }
     if known.load_N:
         numbers["mu_mean"] = Number(mean_N / known.load_N, math.nan, math.nan, "1")
-    return Look(
+    return LookResult(
         seconds,
         1.0 / step_s,
         float(np.median([part.noise_N for part in parts])),
@@ -149,7 +154,7 @@ def look(t_s: Floats, force_N: Floats, position_m: Floats | None = None, known: 
 
 
 def _of_coefficient(numbers: dict[str, Number]) -> dict[str, Number]:
-    """Numbers of a friction coefficient: dimensionless, and without those of the drive's spring."""
+    """Numbers of a friction coefficient: dimensionless, and without the numbers of the drive's spring."""
     left = {
         name: number
         for name, number in numbers.items()
@@ -160,9 +165,9 @@ def _of_coefficient(numbers: dict[str, Number]) -> dict[str, Number]:
     }
 
 
-def _of_cycles(found: list[Slips], cycles: list[Cycle], step_s: float) -> dict[str, Number]:
+def _of_cycles(slips_of_parts: list[RecordSlips], cycles: list[Cycle], step_s: float) -> dict[str, Number]:
     """Means over the slips."""
-    periods = np.concatenate([np.diff(slips.part.t_s[slips.tops]) for slips in found])
+    periods = np.concatenate([np.diff(slips.part.t_s[slips.tops]) for slips in slips_of_parts])
     stuck = [cycle for cycle in cycles if math.isfinite(cycle.dwell_s)] or cycles
     drops = [cycle.breakaway_force_N - cycle.restick_force_N for cycle in stuck]
     durations = [cycle.restick_t_s - cycle.breakaway_t_s for cycle in cycles]
@@ -178,21 +183,21 @@ def _of_cycles(found: list[Slips], cycles: list[Cycle], step_s: float) -> dict[s
         "slope_N_per_s": mean_of([cycle.slope_N_per_s for cycle in stuck], "N/s"),
     } | _stiffness(stuck)
     if numbers["static_force_N"] is not None:
-        numbers["static_force_N"] = breakaway_of(found, numbers["static_force_N"])
-    return with_slip_times({name: number for name, number in numbers.items() if number is not None}, found)
+        numbers["static_force_N"] = breakaway_of(slips_of_parts, numbers["static_force_N"])
+    return with_slip_times({name: number for name, number in numbers.items() if number is not None}, slips_of_parts)
 
 
 def _stiffness(stuck: list[Cycle]) -> dict[str, Number | None]:
-    """The stiffness of the drive beside that in series, where the sticks surely show the contact give way; else the latter alone.
+    """The stiffness of the drive and of drive and contact in series, where the sticks show the contact; else the latter alone.
 
-    What the contact gives way is by a formula, so all of it is in the interval, both ways; where it is not sure, as much of it as
-    the sticks allow.
+    The compliance of the contact comes from a formula, so the interval holds all of it, both ways; where the sticks do not
+    resolve it, as much of it as they allow.
     """
     series = mean_of([cycle.stiffness_N_per_m for cycle in stuck], "N/m")
     drive = mean_of([cycle.drive_m_per_N for cycle in stuck], "m/N")
     if series is None or drive is None or not drive.low > 0.0:
         return {"stiffness_N_per_m": series}
-    # fewer half intervals: the scatter that the second column brings would be more than half of what it mends
+    # fewer half intervals: the scatter of the second column would exceed half of its correction
     if not 1.0 / series.value - drive.value > 2.0 * (drive.high - drive.value):
         return {"stiffness_N_per_m": series._replace(high=max(series.high, 1.0 / drive.low))}
     value = 1.0 / drive.value
@@ -201,12 +206,14 @@ def _stiffness(stuck: list[Cycle]) -> dict[str, Number | None]:
     return {"series_N_per_m": series, "stiffness_N_per_m": stiffness}
 
 
-def _of_falls(found: list[Slips], numbers: dict[str, Number]) -> dict[str, Number]:
+def _of_falls(slips_of_parts: list[RecordSlips], numbers: dict[str, Number]) -> dict[str, Number]:
     """Sliding friction, mass and the force at which the slide breaks away, from the falls laid over each other."""
     if "restick_force_N" not in numbers:
         return {}
     top, bottom = numbers["static_force_N"], numbers["restick_force_N"]
-    stacks = [falls for falls in (falls_of(slips, top.value, bottom.value) for slips in found) if falls is not None]
+    stacks = [
+        falls for falls in (falls_of(slips, top.value, bottom.value) for slips in slips_of_parts) if falls is not None
+    ]
     midway = 0.5 * (top.value + bottom.value)
     # undamped it is the middle; heavily damped it is at the re-stick
     guess = Number(midway, midway - 0.5 * (top.value - bottom.value), midway + 0.25 * (top.value - bottom.value), "N")
@@ -216,8 +223,8 @@ def _of_falls(found: list[Slips], numbers: dict[str, Number]) -> dict[str, Numbe
     shape, others, more = _shape(falls)
     if shape is None:
         return {"kinetic_force_N": guess}
-    kinetic = jackknifed(shape.force_N, [one.force_N for one in others], "N")
-    omega = jackknifed(shape.omega_rad_per_s, [one.omega_rad_per_s for one in others], "rad/s")
+    kinetic = jackknifed(shape.force_N, [other.force_N for other in others], "N")
+    omega = jackknifed(shape.omega_rad_per_s, [other.omega_rad_per_s for other in others], "rad/s")
     if more is not None:
         kinetic = kinetic.wider(more.force_N - shape.force_N)
         omega = omega.wider(more.omega_rad_per_s - shape.omega_rad_per_s)
@@ -233,10 +240,10 @@ def _of_falls(found: list[Slips], numbers: dict[str, Number]) -> dict[str, Numbe
 
 
 def _breakaway(shape: Shape, numbers: dict[str, Number]) -> Number:
-    """The mean force at breakaway; the interval reaches down to what static friction may be below it.
+    """The mean force at breakaway; the interval reaches down to the lowest static friction that the record allows.
 
-    The force rises on until the slide is as fast as its drive. For friction that falls at once
-    (top - F_k)^2 = (F_s - F_k)^2 + (slope / w)^2; for one that falls slowly F_s is lower.
+    The force rises further until the slide is as fast as its drive. For friction that falls at once
+    (top - F_k)^2 = (F_s - F_k)^2 + (slope / w)^2; for friction that falls slowly F_s is lower.
     """
     top = numbers["static_force_N"]
     above = top.value - shape.force_N
@@ -246,7 +253,7 @@ def _breakaway(shape: Shape, numbers: dict[str, Number]) -> Number:
 
 
 def _between_samples(numbers: dict[str, Number], step_s: float) -> dict[str, Number]:
-    """F_s and F_k with what the force climbs in one sample time in their intervals: all breakaways lie between samples."""
+    """F_s and F_k, their intervals widened by the climb of the force in one sample time: breakaways lie between samples."""
     if "slope_N_per_s" not in numbers:
         return {}
     more = abs(numbers["slope_N_per_s"].value) * step_s
@@ -256,41 +263,40 @@ def _between_samples(numbers: dict[str, Number], step_s: float) -> dict[str, Num
     }
 
 
-def _shape(falls: Falls) -> tuple[Shape | None, list[Shape], Shape | None]:
-    """The swing, those without one group of falls each, and that of more of the falls; with a decay where they surely have one.
+def _shape(falls: StackedFalls) -> tuple[Shape | None, list[Shape], Shape | None]:
+    """The swing, the swings without one group of falls each, and the swing of a longer part of the falls; damped where sure.
 
-    Level and decay of a fall are hardly told apart, so a decay that is not there spoils the level: friction that falls slowly,
-    and a contact that creeps, bend a fall much as a decay does. But a decay also takes the level away from the middle of the
-    ends, by as much.
+    A fall hardly separates level and decay, so a false decay spoils the level: friction that falls slowly and a contact that
+    creeps bend a fall much as a decay does. But a true decay also shifts the level from the middle of the ends, by as much.
     """
     groups = groups_of(falls.slips) if falls.slips >= _FEWEST_FOR_SCATTER else []
-    found: dict[bool, tuple[Shape | None, list[Shape]]] = {}
+    fitted: dict[bool, tuple[Shape | None, list[Shape]]] = {}
     for damped in (True, False):
         whole = fit_shape(falls, damped)
         without = [fit_shape(falls.without(group), damped, whole) for group in groups] if whole is not None else []
-        found[damped] = whole, [one for one in without if one is not None]
-    shape, others = found[True]
+        fitted[damped] = whole, [other for other in without if other is not None]
+    shape, others = fitted[True]
     damped = False
     if shape is not None and len(others) == len(groups) >= _FEWEST_FOR_SCATTER:
-        decay = jackknifed(shape.decay_per_s, [one.decay_per_s for one in others], "1/s")
-        there = decay.value > _SURE * (decay.high - decay.value) and decay.value * falls.length_s < _LARGEST_DECAY
+        decay = jackknifed(shape.decay_per_s, [other.decay_per_s for other in others], "1/s")
+        decays = decay.value > _SURE * (decay.high - decay.value) and decay.value * falls.length_s < _LARGEST_DECAY
         level = (shape.force_N - falls.bottom_N) / (falls.top_N - falls.bottom_N)
-        damped = there and abs((0.5 - level) / (0.5 - shape.level_of_ends()) - 1.0) < _ALIKE
-    shape, others = found[damped]
+        damped = decays and abs((0.5 - level) / (0.5 - shape.level_of_ends()) - 1.0) < _ALIKE
+    shape, others = fitted[damped]
     if shape is not None and not damped and (rest := fit_from_rest(falls)) is not None:
         again = [fit_from_rest(falls.without(group), rest) for group in groups]
-        without = [one for one in again if one is not None]
+        without = [other for other in again if other is not None]
         if _swings_from_rest(falls, shape, rest, without):
             return rest, without, fit_from_rest(falls, rest, LESS)
     return shape, others, fit_shape(falls, damped, shape, LESS) if shape is not None else None
 
 
-def _swings_from_rest(falls: Falls, undamped: Shape, rest: Shape, without: list[Shape]) -> bool:
-    """Whether a swing from rest to rest surely decays, and lifts the middle of one without a decay as a decay does."""
+def _swings_from_rest(falls: StackedFalls, undamped: Shape, rest: Shape, without: list[Shape]) -> bool:
+    """Whether a swing from rest to rest decays beyond its interval, and the middle of the undamped fit is lifted accordingly."""
     if len(without) < _FEWEST_FOR_SCATTER:
         return False
     ratio = rest.decay_per_s / rest.omega_rad_per_s
-    half = jackknifed(ratio, [one.decay_per_s / one.omega_rad_per_s for one in without], "1")
+    half = jackknifed(ratio, [other.decay_per_s / other.omega_rad_per_s for other in without], "1")
     lift = (undamped.force_N - falls.bottom_N) / (falls.top_N - falls.bottom_N) - 0.5
     sure = ratio > _LEAST_DECAY and ratio > _SURER * (half.high - half.value)
     return sure and _LIFT[0] * ratio < lift < _LIFT[1] * ratio

@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from bridge.arrays import Floats
+
 _GROUPS = 10  # of slips, of which one after the other is left out
 # Student's t for 90 %, two sides, by degrees of freedom; 1.645 beyond the table
 _T = (math.inf, 6.314, 2.920, 2.353, 2.132, 2.015, 1.943, 1.895, 1.860, 1.833, 1.812, 1.796, 1.782, 1.771, 1.761, 1.753)
@@ -27,7 +28,7 @@ class Number(NamedTuple):
         return Number(self.value * factor, ends[0], ends[1], unit)
 
     def wider(self, more: float) -> "Number":
-        """The number with as much more in its interval, both ways, that has nothing to do with what is in it."""
+        """The number with an independent error of `more` added to its interval, both ways."""
         low, high = (math.hypot(end - self.value, more) for end in (self.low, self.high))
         return self._replace(low=self.value - low, high=self.value + high)
 
@@ -44,27 +45,27 @@ def quantile_t(free: int) -> float:
 
 
 def mean_of(values: Floats | Sequence[float], unit: str, resolution: float = 0.0) -> Number | None:
-    """The mean of independent values [n]; `resolution` is the standard deviation of what all have in common."""
-    found = np.asarray(values, np.float64)
-    found = found[np.isfinite(found)]
-    if not len(found):
+    """The mean of independent values [n]; `resolution` is the standard deviation of their common error."""
+    finite = np.asarray(values, np.float64)
+    finite = finite[np.isfinite(finite)]
+    if not len(finite):
         return None
-    mean = float(found.mean())
-    if len(found) < 2:
+    mean = float(finite.mean())
+    if len(finite) < 2:
         return Number(mean, math.nan, math.nan, unit)
     error = math.hypot(
-        quantile_t(len(found) - 1) * float(found.std(ddof=1)) / math.sqrt(len(found)), 1.645 * resolution
+        quantile_t(len(finite) - 1) * float(finite.std(ddof=1)) / math.sqrt(len(finite)), 1.645 * resolution
     )
     return Number(mean, mean - error, mean + error, unit)
 
 
 def jackknifed(whole: float, without: Sequence[float], unit: str) -> Number:
-    """A number of all slips, with the interval that those without one group of slips each give."""
-    some = np.asarray([one for one in without if math.isfinite(one)])
-    if len(some) < 3:
+    """A number of all slips; its interval comes from the same number without one group of slips each."""
+    finite = np.asarray([value for value in without if math.isfinite(value)])
+    if len(finite) < 3:
         return Number(whole, math.nan, math.nan, unit)
-    n = len(some)
-    error = quantile_t(n - 1) * math.sqrt((n - 1) / n * float(((some - some.mean()) ** 2).sum()))
+    n = len(finite)
+    error = quantile_t(n - 1) * math.sqrt((n - 1) / n * float(((finite - finite.mean()) ** 2).sum()))
     return Number(whole, whole - error, whole + error, unit)
 
 

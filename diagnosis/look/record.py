@@ -7,17 +7,17 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
 
+from bridge.arrays import Floats
 from bridge.log.watches.arrays import noise_of
 
-Floats = npt.NDArray[np.float64]
-_GAP_STEPS = 10.0  # usual steps, beyond which the record is cut: nobody knows what happened
+_GAP_STEPS = 10.0  # usual steps; a longer gap cuts the record, as it may hide slips
 FEWEST = 16  # samples of a part
 _UNEVEN = 0.01  # of a step; beyond it the record is interpolated to an even clock
 _BOTH_WAYS = 0.3  # share of the force's largest size that it reaches with either sign on a rig that goes both ways
 _TURN = 0.1  # of that size: a force that changes sign by less has not turned
 
 
-class Part(NamedTuple):
+class OneWayPart(NamedTuple):
     """An even stretch in which the drive goes one way. Arrays are [samples]; the force is positive along the motion."""
 
     t_s: Floats
@@ -32,8 +32,8 @@ class Part(NamedTuple):
         return float(self.t_s[-1] - self.t_s[0]) / (len(self.t_s) - 1)
 
 
-def parts_of(t_s: Floats, force_N: Floats, position_m: Floats | None = None) -> list[Part]:
-    """The even parts of a record, [samples] each; samples that are no number or go back in time are left out."""
+def parts_of(t_s: Floats, force_N: Floats, position_m: Floats | None = None) -> list[OneWayPart]:
+    """The even parts of a record, [samples] each; samples without a number or back in time are left out."""
     good = np.isfinite(t_s) & np.isfinite(force_N)
     if position_m is not None:
         good &= np.isfinite(position_m)
@@ -48,16 +48,16 @@ def parts_of(t_s: Floats, force_N: Floats, position_m: Floats | None = None) -> 
     gaps = np.flatnonzero(np.diff(t_s) > _GAP_STEPS * step_s) + 1
     edges = np.unique(np.concatenate([[0], gaps, [len(t_s)]]))
     edges = np.unique(np.concatenate([edges, _turns(force_N)]))
-    parts: list[Part] = []
+    parts: list[OneWayPart] = []
     for first, last in pairwise(edges.tolist()):
         if last - first < FEWEST:
             continue
-        own = slice(first, last)
-        sign = -1.0 if float(np.median(force_N[own])) < 0.0 else 1.0
-        place = None if position_m is None else position_m[own]
+        inside = slice(first, last)
+        sign = -1.0 if float(np.median(force_N[inside])) < 0.0 else 1.0
+        place = None if position_m is None else position_m[inside]
         if place is not None and place[-1] < place[0]:
             place = -place
-        parts.append(_even(t_s[own], sign * force_N[own], place, sign))
+        parts.append(_even(t_s[inside], sign * force_N[inside], place, sign))
     return parts
 
 
@@ -72,13 +72,13 @@ def _turns(force_N: Floats) -> npt.NDArray[np.int64]:
     return known[turned]
 
 
-def _even(t_s: Floats, force_N: Floats, position_m: Floats | None, sign: float) -> Part:
+def _even(t_s: Floats, force_N: Floats, position_m: Floats | None, sign: float) -> OneWayPart:
     step_s = float(t_s[-1] - t_s[0]) / (len(t_s) - 1)
     even_s = t_s[0] + step_s * np.arange(len(t_s))
     if np.abs(t_s - even_s).max() > _UNEVEN * step_s:
         force_N = np.interp(even_s, t_s, force_N)
         position_m = None if position_m is None else np.interp(even_s, t_s, position_m)
-    return Part(even_s, force_N, position_m, sign, float(noise_of(force_N)))
+    return OneWayPart(even_s, force_N, position_m, sign, float(noise_of(force_N)))
 
 
 def smoothed(values: Floats, width: int) -> Floats:

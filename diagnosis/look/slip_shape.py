@@ -1,7 +1,7 @@
 """Sliding friction and frequency of the swing, from all falls of a record laid over each other.
 
 While the slide slips, m x'' = F - F_k and F = k (s - x), so F = F_k + A cos(w t + phase): the middle of the fall lies at F_k, for
-any start and end of the slip. A decay stands for damping.
+any start and end of the slip. A decay represents damping.
 """
 
 import math
@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
 
-from diagnosis.look.slips import Slips
+from bridge.arrays import Floats
+from diagnosis.look.slips import RecordSlips
 
-Floats = npt.NDArray[np.float64]
-# Share of the fall at either end that is not fitted: it belongs to breakaway and re-stick. What another share gives is not known.
+# Share of the fall at either end that is not fitted: it belongs to breakaway and re-stick. No other share was counted.
 FIRST, LESS = 0.12, 0.06
 _MOST_SAMPLES = 4000  # that are fitted
 _FEWEST = 5  # samples of a fall
@@ -35,7 +35,7 @@ class Shape(NamedTuple):
         return 1.0 / (1.0 + math.exp(math.pi * self.decay_per_s / self.omega_rad_per_s))
 
 
-class Falls(NamedTuple):
+class StackedFalls(NamedTuple):
     """All whole falls of a part laid over each other: samples [n] and the number of their slip [n]."""
 
     since_s: Floats  # since half of the fall was done
@@ -47,13 +47,13 @@ class Falls(NamedTuple):
     bottom_N: float
     step_s: float
 
-    def without(self, group: npt.NDArray[np.int64]) -> "Falls":
+    def without(self, group: npt.NDArray[np.int64]) -> "StackedFalls":
         """Those that do not belong to some slips."""
         kept = ~np.isin(self.slip, group)
         return self._replace(since_s=self.since_s[kept], force_N=self.force_N[kept], slip=self.slip[kept])
 
 
-def falls_of(slips: Slips, top_N: float, bottom_N: float) -> Falls | None:
+def falls_of(slips: RecordSlips, top_N: float, bottom_N: float) -> StackedFalls | None:
     """The falls of a part, whose mean forces at breakaway and re-stick are known; None where they are too quick to be seen."""
     part, tops, bottoms = slips.part, slips.tops, slips.bottoms
     whole = min(len(tops), len(bottoms))
@@ -74,7 +74,7 @@ def falls_of(slips: Slips, top_N: float, bottom_N: float) -> Falls | None:
         since.append(((at - middle) * part.step_s).astype(np.float64))
         force.append(part.force_N[at])
         number.append(np.full(len(at), count, np.int64))
-    return Falls(
+    return StackedFalls(
         np.concatenate(since), np.concatenate(force), np.concatenate(number), len(good), usual * part.step_s, top_N, bottom_N,
         part.step_s,
     )  # fmt: skip
@@ -94,7 +94,7 @@ def half_done(force_N: Floats, top: int, bottom: int, width: int) -> float:
     return float(near.mean()) + (half - float(y.mean())) / slope if slope < 0.0 else float(near.mean())
 
 
-def fit_from_rest(falls: Falls, near: Shape | None = None, first: float = FIRST) -> Shape | None:
+def fit_from_rest(falls: StackedFalls, near: Shape | None = None, first: float = FIRST) -> Shape | None:
     """The swing with a decay that begins at rest at the mean breakaway and ends at rest at the mean re-stick; None: no fit.
 
     These ends tie the level and the size to the decay, which is seen through more noise then. Friction that falls slowly after
@@ -113,13 +113,13 @@ def fit_from_rest(falls: Falls, near: Shape | None = None, first: float = FIRST)
     start = list(near.found) if near is not None else [0.05, math.pi, 0.0]
     ends = [-0.5, 1.0, -0.5], [1.5, 6.0, 0.5]
     fitted = least_squares(rest, start, bounds=ends, x_scale=[0.1, 1.0, 0.1], xtol=1e-6, ftol=1e-8)
-    ratio, w, _ = (float(one) for one in fitted.x)
+    ratio, w, _ = (float(parameter) for parameter in fitted.x)
     level = 1.0 / (1.0 + math.exp(math.pi * ratio))
     force_N = falls.bottom_N + (falls.top_N - falls.bottom_N) * level
     return Shape(force_N, w / falls.length_s, ratio * w / falls.length_s, tuple(fitted.x)) if fitted.success else None
 
 
-def _inside(falls: Falls, first: float) -> tuple[Floats, Floats]:
+def _inside(falls: StackedFalls, first: float) -> tuple[Floats, Floats]:
     """Times over the length of a fall and forces over its height, without a share `first` of the height at either end."""
     reach_s = math.acos(1.0 - 2.0 * first) / math.pi  # of the fall before its ends
     inside = np.abs(falls.since_s) < (0.5 - reach_s) * falls.length_s
@@ -127,8 +127,8 @@ def _inside(falls: Falls, first: float) -> tuple[Floats, Floats]:
     return falls.since_s[inside] / falls.length_s, (falls.force_N[inside] - falls.bottom_N) / drop_N
 
 
-def fit_shape(falls: Falls, damped: bool, near: Shape | None = None, first: float = FIRST) -> Shape | None:
-    """The swing in all falls, with a decay or without, from one that is near; None where it does not fit.
+def fit_shape(falls: StackedFalls, damped: bool, near: Shape | None = None, first: float = FIRST) -> Shape | None:
+    """The swing in all falls, with a decay or without, fitted from the shape `near`; None where it does not fit.
 
     `first`: share of the fall at either end that is not fitted.
     """
@@ -149,8 +149,8 @@ def fit_shape(falls: Falls, damped: bool, near: Shape | None = None, first: floa
     start = list(near.found) if near is not None else [0.5, 0.5, math.pi, 0.0, 0.0][:count]
     scale = [0.1, 0.1, 1.0, 0.1, 1.0][:count]
     fitted = least_squares(rest, start, bounds=(_LOWEST[:count], _HIGHEST[:count]), x_scale=scale, xtol=1e-6, ftol=1e-8)
-    level, size, w = (float(one) for one in fitted.x[:3])
+    level, size, w = (float(parameter) for parameter in fitted.x[:3])
     decay = float(fitted.x[4]) if damped else 0.0
     sound = fitted.success and size > 0.0 and 0.05 < level < 0.95
-    found = tuple(float(one) for one in fitted.x)
-    return Shape(falls.bottom_N + drop_N * level, w / length_s, decay / length_s, found) if sound else None
+    parameters = tuple(float(parameter) for parameter in fitted.x)
+    return Shape(falls.bottom_N + drop_N * level, w / length_s, decay / length_s, parameters) if sound else None

@@ -8,23 +8,22 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from diagnosis.look.numbers import Number, groups_of, jackknifed
 from diagnosis.look.slip_shape import half_done
-from diagnosis.look.slips import Slips
+from diagnosis.look.slips import RecordSlips
 
-Floats = npt.NDArray[np.float64]
 _FEWEST_SLIPS, _FEWEST_SAMPLES = 3, 5  # of a fall
 _BINS = 100  # in a fall
 _REACH = 0.9  # of a fall, before and after its middle, in which top and bottom are looked for
-# Half of what a parabola spans, in falls, at least and at most; between them as much as leaves this share of the fall as noise.
+# Half the span of a parabola, in falls, at least and at most; between them as much as leaves this share of the fall as noise.
 _LEAST, _MOST, _NOISE = 0.06, 0.2, 0.002
 _LEAST_SAMPLES = 1.5  # of that half: three samples of each slip are in the whole
 _RIDGE = 1e-9  # where all slips have their samples at the same instants, fewer than three are in some spans
 
 
-def with_slip_times(numbers: dict[str, Number], found: list[Slips]) -> dict[str, Number]:
+def with_slip_times(numbers: dict[str, Number], slips_of_parts: list[RecordSlips]) -> dict[str, Number]:
     """Numbers with `slip_s` and `dwell_s` from the mean fall of the part with most slips, if it has slips and samples enough.
 
     Of a fall of few samples it is only known that it lies between the sample before and the sample after it.
@@ -32,7 +31,7 @@ def with_slip_times(numbers: dict[str, Number], found: list[Slips]) -> dict[str,
     if "slip_s" not in numbers:
         return numbers
     slip, dwell = numbers["slip_s"], numbers.get("dwell_s")
-    seen = [falls for falls in map(_falls_of, found) if falls is not None]
+    seen = [falls for falls in map(_falls_of, slips_of_parts) if falls is not None]
     if seen:
         mean = max(seen, key=lambda falls: falls.slips).slip_time()
         if dwell is not None:  # a stick begins and ends where slips end and begin
@@ -41,7 +40,7 @@ def with_slip_times(numbers: dict[str, Number], found: list[Slips]) -> dict[str,
             dwell = dwell.wider(mean.high - mean.value)
         slip = mean
     else:
-        steps_s = 2.0 * max(slips.part.step_s for slips in found)
+        steps_s = 2.0 * max(slips.part.step_s for slips in slips_of_parts)
         slip = slip._replace(low=max(min(slip.low, slip.value - steps_s), 0.0))
         if dwell is not None:
             dwell = dwell._replace(high=max(dwell.high, dwell.value + steps_s))
@@ -59,7 +58,7 @@ class _Falls(NamedTuple):
     step_s: float
 
     def slip_time(self) -> Number:
-        """From the top of the mean course to its bottom; no instant is known better than to half of what a parabola spans."""
+        """From the top of the mean course to its bottom; each instant is uncertain by half the span of a parabola."""
         counts, sums = self.counts.sum(axis=0), self.sums.sum(axis=0)
         whole = self._long_s(counts, sums)
         without = [self._long_s(counts - c, sums - s) for c, s in zip(self.counts, self.sums, strict=True)]
@@ -74,7 +73,7 @@ class _Falls(NamedTuple):
         return self.bin_s * float(reach - np.nanargmax(before) + np.nanargmin(after))
 
 
-def _falls_of(slips: Slips) -> _Falls | None:
+def _falls_of(slips: RecordSlips) -> _Falls | None:
     """The falls of a part; None for too few slips or samples."""
     part = slips.part
     whole = min(len(slips.tops), len(slips.bottoms))

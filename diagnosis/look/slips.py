@@ -1,19 +1,17 @@
 """Slips of a part of a record, on its own scale of time: falls of 10 ms and of 10 s are found alike.
 
-A fall that begins at a straight climb is a slip; a swing without a straight climb is none. How long the fall lasts against the
-climb does not count, so a slip may take longer than the stick before it.
+A fall that begins at a straight climb is a slip; a swing without a straight climb is not a slip. The ratio of fall time to climb
+time does not count, so a slip may take longer than the stick before it.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from diagnosis.look.record import Part, smoothed
+from bridge.arrays import Floats, Indices
+from diagnosis.look.record import OneWayPart, smoothed
 from diagnosis.look.turns import long_turns
 
-Floats = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.int64]
 # Smallest fall, in standard deviations of the smoothed noise: white noise spans 8 to 9 of them in 10^5 samples.
 _NOISE_SPANS = 10.0
 # Smallest fall as a share of the range between the 1st and the 99th percentile. Smaller: ripple counts; larger: small slips of a
@@ -23,20 +21,20 @@ _SMOOTH = 10  # samples of a smoothing in a fall: it cuts a round peak by 0.2 % 
 _WIDEST = 0.02  # of the part, of a smoothing
 _NOISE_OF_MANY = 3.0  # standard deviations that some of many samples reach
 # Distance of the inner 80 % of a climb from its chord, as a share of the climb, up to which it is straight. A stiff contact that
-# creeps gives 0.07, a sine 0.056: what falls as it climbs must be straighter.
+# creeps gives 0.07, a sine 0.056: a climb that lasts as long as its fall must be straighter.
 _STRAIGHT, _STRAIGHTER = 0.08, 0.04
 _QUICK = 3.0  # times that the climb lasts as long as the fall, from which it is a stick, bent by creep or not
 _ALIKE = 1.15  # factor between the times of climb and fall, up to which they are alike
-_AS_QUICK = 3.0  # times that a fall lasts as long as the climb, from which nothing is said of it
+_AS_QUICK = 3.0  # times that a fall lasts as long as the climb, from which the climb is not judged
 _FEWEST_OF_FALL = 8  # samples of a fall whose course is seen
 _POINTS = 41  # of a fall, in which the falls are averaged
 _LEAST_STRAIGHT = 0.5  # share of the climbs that are straight, from which it is stick-slip and no swing
 
 
-class Slips(NamedTuple):
-    """Slips of a part, indices of samples, [slips] each, but for `bottoms`, which may be one shorter."""
+class RecordSlips(NamedTuple):
+    """Slips of a part, indices of samples, [slips] each; `bottoms` may be one shorter."""
 
-    part: Part
+    part: OneWayPart
     tops: Indices  # breakaways
     bottoms: Indices  # re-sticks
     width: int  # samples of the smoothing
@@ -44,20 +42,20 @@ class Slips(NamedTuple):
 
     @property
     def sticks(self) -> bool:
-        """Whether the climbs are those of a spring on a slide that stands."""
+        """Whether the climbs are straight, as a spring loads on a slide at rest."""
         return self.straight >= _LEAST_STRAIGHT
 
 
-def find_slips(part: Part) -> Slips | None:
+def find_slips(part: OneWayPart) -> RecordSlips | None:
     """The slips of a part; None where nothing falls by more than noise does."""
     width = 1
     widest = max(1, int(_WIDEST * len(part.force_N)))
-    found: tuple[Indices, Indices] | None = None
+    result: tuple[Indices, Indices] | None = None
     noise_N = part.noise_N
     while width <= widest:
         tops, bottoms = _turning(part.force_N, width, noise_N)
         if len(tops):
-            found = tops, bottoms
+            result = tops, bottoms
             falls = bottoms - tops[: len(bottoms)]
             wanted = min(max(1, int(np.median(falls)) // _SMOOTH), widest) if len(falls) else width
             if wanted <= width:
@@ -65,11 +63,11 @@ def find_slips(part: Part) -> Slips | None:
             width = min(wanted, 4 * width)
             continue
         width *= 2
-    if found is None:
+    if result is None:
         return None
     width = min(width, widest)
-    tops, bottoms = found
-    return Slips(part, tops, bottoms, width, _straight(part, tops, bottoms, width, noise_N))
+    tops, bottoms = result
+    return RecordSlips(part, tops, bottoms, width, _straight(part, tops, bottoms, width, noise_N))
 
 
 def _turning(force_N: Floats, width: int, noise_N: float) -> tuple[Indices, Indices]:
@@ -83,7 +81,7 @@ def _turning(force_N: Floats, width: int, noise_N: float) -> tuple[Indices, Indi
     return at[::2], at[1::2]
 
 
-def _straight(part: Part, tops: Indices, bottoms: Indices, width: int, sample_noise_N: float) -> float:
+def _straight(part: OneWayPart, tops: Indices, bottoms: Indices, width: int, sample_noise_N: float) -> float:
     """Share of the climbs between a re-stick and the next breakaway that are straight; of the first climb where it is alone."""
     smooth = smoothed(part.force_N, width)
     noise_N = _NOISE_OF_MANY * sample_noise_N / (width | 1) ** 0.5
@@ -116,7 +114,7 @@ def _straight(part: Part, tops: Indices, bottoms: Indices, width: int, sample_no
 
 
 def _falls_straight(smooth: Floats, tops: Indices, bottoms: Indices) -> bool:
-    """Whether the mean fall is a straight line: a slide that is free swings, so its fall is bent; a triangle is no slip."""
+    """Whether the mean fall is a straight line. A free slide swings, so its fall is bent; a triangle is not a slip."""
     falls = [smooth[top : bottom + 1] for top, bottom in zip(tops.tolist(), bottoms.tolist(), strict=False)]
     falls = [fall for fall in falls if len(fall) >= _FEWEST_OF_FALL and fall[0] > fall[-1]]
     if not falls:

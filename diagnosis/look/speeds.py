@@ -3,24 +3,23 @@
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.log.watches.arrays import noise_of
 from diagnosis.look.numbers import Number, mean_of, slope_of
-from diagnosis.look.record import Part, smoothed
+from diagnosis.look.record import OneWayPart, smoothed
 from diagnosis.look.sticks import Cycle
 
-Floats = npt.NDArray[np.float64]
-VARIES = 1.3  # largest speed over smallest, from which friction is told over speed
+VARIES = 1.3  # largest speed over smallest, from which friction is reported over speed
 _BINS_A_DECADE = 8.0
 _WINDOWS = 200  # of a record without slips, in which speed and force are averaged
-_STANDS = 4.0  # standard deviations of a speed by the position's noise alone, within which the drive stands
+_STANDS = 4.0  # standard deviations of a speed by the position's noise alone, within which the drive counts as at rest
 _FEWEST_IN_BIN = 3
 _FEWEST_DWELLS = 5
 _MOST_INFLATED = 10.0  # Marquardt's bound: an estimate has ten times the variance that it has alone
 _ENOUGH = 0.1  # share of the dwell's variation; a rate that varies less makes at most a tenth of a slope over the dwell
-_DWELLS = 1.25  # largest dwell over smallest (of nine in ten slips), from which breakaway is told over dwell
-_ASIDE = 0.05  # share of the dwells at each end that is not looked at for that, one slip at least
+_DWELLS = 1.25  # largest dwell over smallest (of nine in ten slips), from which breakaway is reported over dwell
+_ASIDE = 0.05  # share of the dwells at each end that this ratio leaves out, one slip at least
 
 
 class AtSpeed(NamedTuple):
@@ -33,15 +32,15 @@ class AtSpeed(NamedTuple):
     sliding: bool
 
 
-def over_speed(parts: list[Part], cycles: list[Cycle], unit: str = "N") -> list[AtSpeed]:
+def over_speed(parts: list[OneWayPart], cycles: list[Cycle], unit: str = "N") -> list[AtSpeed]:
     """Friction at each speed, from the lowest on; empty where the speed is not known or stays the same."""
     speeds = np.array([cycle.speed_mps for cycle in cycles])
     means = np.array([cycle.mean_force_N for cycle in cycles])
     tops = np.array([cycle.breakaway_force_N for cycle in cycles])
     slipping = np.ones(len(cycles), np.bool_)
     for part in parts:
-        own = [cycle for cycle in cycles if part.t_s[0] <= cycle.breakaway_t_s <= part.t_s[-1]]
-        more_speed, more_mean = _windows(part, own)
+        in_part = [cycle for cycle in cycles if part.t_s[0] <= cycle.breakaway_t_s <= part.t_s[-1]]
+        more_speed, more_mean = _windows(part, in_part)
         speeds, means = np.concatenate([speeds, more_speed]), np.concatenate([means, more_mean])
         tops = np.concatenate([tops, np.full(len(more_speed), np.nan)])
         slipping = np.concatenate([slipping, np.zeros(len(more_speed), np.bool_)])
@@ -49,7 +48,7 @@ def over_speed(parts: list[Part], cycles: list[Cycle], unit: str = "N") -> list[
     speeds, means, tops, slipping = speeds[good], means[good], tops[good], slipping[good]
     if len(speeds) < 2 * _FEWEST_IN_BIN or speeds.max() < VARIES * speeds.min():
         return []
-    found: list[AtSpeed] = []
+    result: list[AtSpeed] = []
     bins = np.round(np.log10(speeds) * _BINS_A_DECADE).astype(int)
     for number in np.unique(bins):
         own_bin = bins == number
@@ -57,11 +56,13 @@ def over_speed(parts: list[Part], cycles: list[Cycle], unit: str = "N") -> list[
         if own_bin.sum() < _FEWEST_IN_BIN or mean is None:
             continue
         top = mean_of(tops[own_bin & slipping], unit)
-        found.append(AtSpeed(float(np.exp(np.log(speeds[own_bin]).mean())), int(own_bin.sum()), mean, top, top is None))
-    return found if len(found) > 1 else []
+        result.append(
+            AtSpeed(float(np.exp(np.log(speeds[own_bin]).mean())), int(own_bin.sum()), mean, top, top is None)
+        )
+    return result if len(result) > 1 else []
 
 
-def _windows(part: Part, cycles: list[Cycle]) -> tuple[Floats, Floats]:
+def _windows(part: OneWayPart, cycles: list[Cycle]) -> tuple[Floats, Floats]:
     """Speed and mean force in windows without a slip, [windows] each; nothing where the drive's position is not known."""
     if part.position_m is None:
         return np.zeros(0), np.zeros(0)
@@ -95,8 +96,8 @@ def over_dwell(cycles: list[Cycle]) -> Number | None:
 def confounded(cycles: list[Cycle]) -> bool:
     """Whether dwells are long where the force climbs slowly, so that a slope over the dwell may be one over the speed.
 
-    Told by the variance inflation of one logarithm beside the other, as for any two regressors (Marquardt, Technometrics 12,
-    1970), where the rate differs enough to stand for the dwell.
+    The criterion is the variance inflation of the two logarithms as regressors (Marquardt, Technometrics 12, 1970), where the
+    rate varies enough to imitate the dwell.
     """
     rows = _dwells(cycles)
     if rows is None:

@@ -1,4 +1,4 @@
-"""Whether a record is alike from its beginning to its end: a mean over a drift or over two speeds is nobody's number."""
+"""Whether a record is alike from its beginning to its end: a mean over a drift or over two speeds describes neither."""
 
 import numpy as np
 
@@ -8,8 +8,8 @@ from diagnosis.look.speeds import VARIES
 from diagnosis.look.sticks import Cycle
 
 _FEWEST = 8  # slips: fewer show a drift by chance
-_SURE = 2.5  # half intervals of 90 % from which a drift is there
-_OF_SWING = 0.1  # of the fall in a slip: a smaller drift changes no number by what it is read to
+_SURE = 2.5  # half intervals of 90 % from which a drift counts
+_OF_SWING = 0.1  # of the fall in a slip: a smaller drift changes no number beyond its reading accuracy
 
 
 def unsteady(cycles: list[Cycle], unit: str) -> list[str]:

@@ -3,13 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from diagnosis.look.record import Part, smoothed
-from diagnosis.look.slips import Slips
+from bridge.arrays import Floats, Indices
+from diagnosis.look.record import OneWayPart, smoothed
+from diagnosis.look.slips import RecordSlips
 
-Floats = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.int64]
 _FROM, _TO = (
     0.25,
     0.9,
@@ -31,20 +29,20 @@ class Cycle(NamedTuple):
     restick_force_N: float
     dwell_s: float  # of the stick before
     slope_N_per_s: float  # of that stick
-    loading_N_per_s: float  # of its last half where the force climbs fastest: beside a halt of the drive
+    loading_N_per_s: float  # of its last half, where the force climbs fastest: without a halt of the drive
     speed_mps: float  # of the drive in that stick
     stiffness_N_per_m: float  # of that stick, over the way of the drive: of drive and contact in series
-    drive_m_per_N: float  # of that way: what the drive gives way for a force
-    contact_m_per_N: float  # and the contact, before it nears its breakaway
+    drive_m_per_N: float  # compliance of the drive in that stick
+    contact_m_per_N: float  # compliance of the contact, before it nears its breakaway
     mean_force_N: float  # from this breakaway to the next
     sign: float  # of the force as measured
 
 
-def cycles_of(slips: Slips, speed_mps: float | None) -> list[Cycle]:
-    """Every slip of a part. `speed_mps` is that of the drive where its position was not measured."""
+def cycles_of(slips: RecordSlips, speed_mps: float | None) -> list[Cycle]:
+    """Every slip of a part. `speed_mps` is the drive's speed, used where its position was not measured."""
     part = slips.part
     top_N, bottom_N = _peaks(slips)
-    found: list[Cycle] = []
+    cycles: list[Cycle] = []
     for i, top in enumerate(slips.tops.tolist()):
         bottom = int(slips.bottoms[i]) if i < len(slips.bottoms) else -1
         began = int(slips.bottoms[i - 1]) if i else -1
@@ -53,7 +51,7 @@ def cycles_of(slips: Slips, speed_mps: float | None) -> list[Cycle]:
             _stick(part, began, top, float(top_N[i]), speed_mps, slips.width) if i else _UNKNOWN
         )
         loading = _loading(part, began, top, slips.width) if i else np.nan
-        found.append(
+        cycles.append(
             Cycle(
                 float(part.t_s[top]),
                 float(top_N[i]),
@@ -70,10 +68,10 @@ def cycles_of(slips: Slips, speed_mps: float | None) -> list[Cycle]:
                 part.sign,
             )
         )
-    return found
+    return cycles
 
 
-def _peaks(slips: Slips) -> tuple[Floats, Floats]:
+def _peaks(slips: RecordSlips) -> tuple[Floats, Floats]:
     """Forces at breakaways and at re-sticks, [slips] each.
 
     The largest of several noisy samples is too large. So one half of the samples finds the peak, and the other half measures it.
@@ -84,13 +82,13 @@ def _peaks(slips: Slips) -> tuple[Floats, Floats]:
         reach = max(width // 2, 1)
         return _extremes(smooth, slips.tops, reach, 1.0), _extremes(smooth, slips.bottoms, reach, -1.0)
     halves = force_N[: len(force_N) // 2 * 2].reshape(-1, 2)
-    one, other = (smoothed(np.ascontiguousarray(halves[:, i]), width // 2) for i in (0, 1))
+    even, other = (smoothed(np.ascontiguousarray(halves[:, i]), width // 2) for i in (0, 1))
     result: list[Floats] = []
     for at, sign in ((slips.tops // 2, 1.0), (slips.bottoms // 2, -1.0)):
         values = np.empty(len(at))
-        for i, middle in enumerate(np.minimum(at, len(one) - 1)):
+        for i, middle in enumerate(np.minimum(at, len(even) - 1)):
             near = slice(max(middle - width, 0), middle + width + 1)
-            first, second = one[near], other[near]
+            first, second = even[near], other[near]
             values[i] = 0.5 * (second[np.argmax(sign * first)] + first[np.argmax(sign * second)])
         result.append(values)
     return result[0], result[1]
@@ -101,9 +99,9 @@ def _extremes(smooth: Floats, at: Indices, reach: int, sign: float) -> Floats:
 
 
 def _stick(
-    part: Part, began: int, top: int, breakaway_N: float, speed_mps: float | None, width: int
+    part: OneWayPart, began: int, top: int, breakaway_N: float, speed_mps: float | None, width: int
 ) -> tuple[float, float, float, float, float]:
-    """Slope of the force, speed of the drive, slope over its way, and what drive and contact give way, in the middle of a stick.
+    """Slope of the force, speed of the drive, slope over its way, compliances of drive and contact, in the middle of a stick.
 
     NaN where the stick is too short or the speed is not known.
     """
@@ -118,7 +116,7 @@ def _stick(
         speed = _slope(t_s, part.position_m[first:last])
     if not speed > 0.0 or (part.position_m is not None and _halted(part.position_m, began, top, first, last)):
         return slope, speed, np.nan, np.nan, np.nan
-    # a breakaway is known to the width of the smoothing that found it: nearer to it the force may be that of the slip
+    # a breakaway is known to the width of the smoothing that found it: nearer to it the slip may have begun
     whole = slice(0, max(min(last, top - width) - first, 0))
     return slope, speed, slope / speed, *_both(speed * (t_s - t_s[0])[whole], force_N[whole], breakaway_N)
 
@@ -129,7 +127,7 @@ def _halted(position_m: Floats, began: int, top: int, first: int, last: int) -> 
     return bool(way < _EVEN * (_TO - _FROM) * whole)
 
 
-def _loading(part: Part, began: int, top: int, width: int) -> float:
+def _loading(part: OneWayPart, began: int, top: int, width: int) -> float:
     """How fast the force climbs in the last half of a stick: in the quickest of its steps. NaN for too few samples."""
     climb = smoothed(part.force_N[began : top + 1], width)
     if len(climb) < _FEWEST:
@@ -142,10 +140,10 @@ def _loading(part: Part, began: int, top: int, width: int) -> float:
 
 
 def _both(way_m: Floats, force_N: Floats, breakaway_N: float) -> tuple[float, float]:
-    """What drive and contact give way for a force [m/N]; NaN where the stick does not show it.
+    """Compliance of drive and contact [m/N]; NaN where the stick does not show it.
 
-    A contact whose stiffness falls from S to nothing as the force nears its breakaway F_b goes the way -F_b / S * ln(1 - F / F_b)
-    (Dahl, A solid friction model, 1968), the drive F / k: a line in two columns. The force in both is a smooth curve through
+    A contact whose stiffness falls from S to 0 as the force nears its breakaway F_b moves by -F_b / S * ln(1 - F / F_b)
+    (Dahl, A solid friction model, 1968), the drive by F / k: a line in two columns. The force in both is a smooth curve through
     the samples, as noise in a column would draw its factor towards zero.
     """
     if len(way_m) <= 2 * _DEGREE:

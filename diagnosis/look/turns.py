@@ -1,7 +1,7 @@
-"""Maxima and minima of a record that differ by more than noise does.
+"""Maxima and minima of a record that differ by more than its noise.
 
-In plain Python, which takes 1 ms for 10 s of force at 1 kHz: what judges one log does without the compiler, whose import takes
-0.3 s. What looks at thousands of records has it compiled: `falls`.
+In plain Python, which takes 1 ms for 10 s of force at 1 kHz: a command for a single log avoids the import of the compiler, which
+takes 0.3 s. The search over thousands of records is compiled: `falls`.
 """
 
 import math
@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+from bridge.arrays import Floats
 
 _PIECE = 256  # samples that are passed over at once where none of them can be a turning point; 64 and 1024 are slower
 
@@ -26,20 +28,20 @@ def turns(values: Any, drop: float, at: Any) -> int:
     """
     count = 0
     sign = 1.0  # while the values rise
-    extreme, here = -math.inf, 0
+    extreme, place = -math.inf, 0
     for i in range(len(values)):
         value = sign * values[i]
         if value > extreme:
-            extreme, here = value, i
+            extreme, place = value, i
         elif value < extreme - drop:
-            at[count] = here
+            at[count] = place
             count += 1
             sign = -sign
-            extreme, here = -value, i
+            extreme, place = -value, i
     return count
 
 
-def long_turns(values: npt.NDArray[np.float64], drop: float) -> npt.NDArray[np.int64]:
+def long_turns(values: Floats, drop: float) -> npt.NDArray[np.int64]:
     """The turning points that `turns` finds, as indices; pieces of a record in which the values do not turn are passed over.
 
     Takes 50 ms for 10 min at 10 kHz, where `turns` takes 1 s.
@@ -49,24 +51,24 @@ def long_turns(values: npt.NDArray[np.float64], drop: float) -> npt.NDArray[np.i
         1.0: (pieces.max(1), pieces.min(1), pieces.argmax(1)),
         -1.0: (-pieces.min(1), -pieces.max(1), pieces.argmin(1)),
     }
-    sides = {sign: [one.tolist() for one in both] for sign, both in ends.items()}
+    sides = {sign: [side.tolist() for side in both] for sign, both in ends.items()}
     at: list[int] = []
     sign = 1.0
-    extreme, here = -math.inf, 0
+    extreme, place = -math.inf, 0
     for piece in range(len(pieces) + 1):
         begin = piece * _PIECE
         if piece < len(pieces):
             highs, lows, where = sides[sign]
             if lows[piece] >= max(extreme, highs[piece]) - drop:
                 if highs[piece] > extreme:
-                    extreme, here = highs[piece], begin + where[piece]
+                    extreme, place = highs[piece], begin + where[piece]
                 continue
-        for i, own in enumerate(values[begin : begin + _PIECE].tolist(), begin):
-            value = sign * own
+        for i, sample in enumerate(values[begin : begin + _PIECE].tolist(), begin):
+            value = sign * sample
             if value > extreme:
-                extreme, here = value, i
+                extreme, place = value, i
             elif value < extreme - drop:
-                at.append(here)
+                at.append(place)
                 sign = -sign
-                extreme, here = -value, i
+                extreme, place = -value, i
     return np.array(at, np.int64)

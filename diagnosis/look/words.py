@@ -1,14 +1,14 @@
-"""What is in a record, in sentences."""
+"""The numbers of a record in sentences."""
 
 import math
 
 from bridge.units import counted, fixed_digits, prefixed
-from diagnosis.look.look import Look
+from diagnosis.look.look import LookResult
 from diagnosis.look.numbers import Number
 from diagnosis.look.speeds import confounded
 from diagnosis.look.steady import unsteady
 
-# in the order in which they are told
+# in the order of the output
 TITLES = {
     "static_force_N": ("F_s", "force at breakaway"),
     "kinetic_force_N": ("F_k", "force while it slides in a slip"),
@@ -50,7 +50,7 @@ def _digits(value: float, width: float) -> int:
     return min(max(1 - math.floor(math.log10(width)), 0), max(most, 0), 6)
 
 
-def headline(seen: Look) -> str:
+def headline(seen: LookResult) -> str:
     """The answer in one line."""
     if not seen.cycles:
         if seen.known.coefficient:
@@ -70,23 +70,23 @@ def headline(seen: Look) -> str:
     return text + (f", every {with_interval(period)}" if period is not None else "")
 
 
-def sentences(seen: Look) -> list[str]:
-    """A line for each number, and one for what the record cannot tell."""
+def sentences(seen: LookResult) -> list[str]:
+    """A line for each number, and one for each number that the record cannot give."""
     lines: list[str] = []
     for name, (symbol, meaning) in TITLES.items():
         if name in seen.numbers:
             lines.append(f"{symbol:<10} {with_interval(seen.numbers[name])}: {meaning}")
     lines += [f"{'':<10} {text}" for text in cannot_tell(seen)]
-    for one in seen.at_speeds:
-        top = "" if one.breakaway_N is None else f", breakaway {with_interval(one.breakaway_N)}"
+    for at_speed in seen.at_speeds:
+        top = "" if at_speed.breakaway_N is None else f", breakaway {with_interval(at_speed.breakaway_N)}"
         lines.append(
-            f"{'at ' + f'{1e3 * one.speed_mps:.3g} m{seen.known.speed_unit}':<14} mean {with_interval(one.mean_N)}{top}"
+            f"{'at ' + f'{1e3 * at_speed.speed_mps:.3g} m{seen.known.speed_unit}':<14} mean {with_interval(at_speed.mean_N)}{top}"
         )
     return lines
 
 
-def cannot_tell(seen: Look) -> list[str]:
-    """What is missing and why, with what to add."""
+def cannot_tell(seen: LookResult) -> list[str]:
+    """A line for each missing number: the reason, and the option to add."""
     lines: list[str] = []
     if not seen.sticks:
         return lines
@@ -96,7 +96,7 @@ def cannot_tell(seen: Look) -> list[str]:
         lines.append(f"no stiffness and no mass: the drive's speed is not known; add --speed {example}")
     if "stiffness_N_per_m" in seen.numbers and "series_N_per_m" not in seen.numbers:
         lines.append(
-            "no stiffness of the contact: the sticks are straight, and the stiffness is that of drive and contact in series"
+            "no stiffness of the contact: the sticks are straight, so the stiffness above is of drive and contact in series"
         )
     if seen.known.coefficient:
         lines.append("no force: the normal load is not known; add --load 94.5N")
@@ -111,6 +111,6 @@ def cannot_tell(seen: Look) -> list[str]:
     static = seen.numbers[names[0]]
     if names[1] in seen.numbers and static.value - static.low > 0.1 * (static.value - seen.numbers[names[1]].value):
         lines.append(
-            "F_s may be lower than the force at breakaway: a slide that moves off slowly lets the force rise on"
+            "F_s may be lower than the force at breakaway: a slide that moves off slowly lets the force rise further"
         )
     return lines

@@ -15,18 +15,17 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.kernel import Record, kernel
 from bridge.wire.messages import CHANNELS
 from diagnosis.features.grid import BLOCK_S, SIGNALS
-from diagnosis.features.segments import Commands
-from diagnosis.model.rig import Entry, Rig, Start, built
+from diagnosis.features.segments import CommandedRun
+from diagnosis.model.rig import Rig, Start, StartState, built
 from plant.config import RigConfig
 from plant.core import advance_disturbed
 from plant.four_rigs import advance_lanes
 from plant.four_rigs_step import LANES, NARROW
 from plant.records import TRUTH
-
-Floats = npt.NDArray[np.floating[Any]]
 
 # Natural frequency of the critically damped spring that holds a force-driven model to the measured motion (10 Hz).
 # Too small: reversals are smeared; friction errors show up to this frequency only. Too large: the encoder's noise becomes force.
@@ -37,7 +36,7 @@ _RATE_FILTER_S = 3e-3
 
 
 def predict(
-    config: RigConfig, force_driven: bool, commands: Commands, start: Start, entries: Sequence[Entry] = ()
+    config: RigConfig, force_driven: bool, commands: CommandedRun, start: Start, entries: Sequence[StartState] = ()
 ) -> dict[str, Floats]:
     """Noise-free signals by name, [blocks] each, SI units, before the sensors.
 
@@ -49,22 +48,22 @@ def predict(
         entries: states at the start of the segments; with a force drive there are none.
 
     """
-    (found,) = predict_many([config], force_driven, commands, [start], [entries])
-    assert found is not None, "what is wanted is predicted"  # noqa: S101
-    return found
+    (signals,) = predict_many([config], force_driven, commands, [start], [entries])
+    assert signals is not None, "a wanted rig is predicted"  # noqa: S101
+    return signals
 
 
 def predict_many(
     configs: Sequence[RigConfig],
     force_driven: bool,
-    commands: Commands,
+    commands: CommandedRun,
     starts: Sequence[Start],
-    entries: Sequence[Sequence[Entry]],
+    entries: Sequence[Sequence[StartState]],
     wanted: int | None = None,
 ) -> list[dict[str, Floats] | None]:
     """Signals as from `predict` for each of many rigs in the same run; the entries of all rigs are at the same blocks.
 
-    With `wanted`, the first `wanted` rigs are predicted, and of the others those that fill empty lanes; the rest is None.
+    With `wanted`, the first `wanted` rigs are predicted, and as many others as fill empty lanes; the rest is None.
     """
     rigs = [built(config, force_driven, commands, start) for config, start in zip(configs, starts, strict=True)]
     if force_driven:
@@ -72,7 +71,7 @@ def predict_many(
     same_steps: dict[bytes, list[int]] = {}
     for number, rig in enumerate(rigs):
         same_steps.setdefault(rig.steps.tobytes(), []).append(number)
-    found: dict[int, Floats] = {}
+    by_number: dict[int, Floats] = {}
     for numbers in same_steps.values():
         needed = len(numbers) if wanted is None else sum(number < wanted for number in numbers)
         first = 0
@@ -80,13 +79,16 @@ def predict_many(
             width = LANES if needed - first > NARROW else NARROW
             group = numbers[first : first + width]
             lanes = [*group, *[group[-1]] * (width - len(group))]
-            signals = _side_by_side([rigs[number] for number in lanes], commands, [entries[one] for one in lanes])
-            found |= zip(group, signals, strict=False)
+            signals = _side_by_side([rigs[number] for number in lanes], commands, [entries[lane] for lane in lanes])
+            by_number |= zip(group, signals, strict=False)
             first += width
-    return [dict(zip(SIGNALS, found[number], strict=True)) if number in found else None for number in range(len(rigs))]
+    return [
+        dict(zip(SIGNALS, by_number[number], strict=True)) if number in by_number else None
+        for number in range(len(rigs))
+    ]
 
 
-def _led(rig: Rig, commands: Commands) -> Floats:
+def _led(rig: Rig, commands: CommandedRun) -> Floats:
     """Signals of a rig with a force drive, led along the measured motion, [signals, blocks]."""
     assert commands.motion is not None, "a force drive without a motion is refused when it is read"  # noqa: S101
     params, state, steps = rig
@@ -103,11 +105,11 @@ def _led(rig: Rig, commands: Commands) -> Floats:
     return out
 
 
-def _side_by_side(rigs: Sequence[Rig], commands: Commands, entries: Sequence[Sequence[Entry]]) -> Floats:
+def _side_by_side(rigs: Sequence[Rig], commands: CommandedRun, entries: Sequence[Sequence[StartState]]) -> Floats:
     """Signals of `NARROW` or `LANES` rigs with the same steps, [rigs, signals, blocks]."""
     blocks = np.array([entry.block for entry in entries[0]], np.int64)
-    ages_s = [[math.nan if entry.age_s is None else entry.age_s for entry in own] for own in entries]
-    forces_N = [[entry.force_N for entry in own] for own in entries]
+    ages_s = [[math.nan if entry.age_s is None else entry.age_s for entry in of_rig] for of_rig in entries]
+    forces_N = [[entry.force_N for entry in of_rig] for of_rig in entries]
     out = np.empty((len(rigs), len(SIGNALS), len(commands.drive)))
     advance_lanes(
         (1,) * len(rigs), np.concatenate([rig.params for rig in rigs]), np.concatenate([rig.state for rig in rigs]), BLOCK_S,
@@ -172,7 +174,7 @@ def _follow(
 ) -> None:
     """As `_predict`, along a measured motion; the force in `out` is the force that keeps the model on this motion."""
     s: Record = state[0]
-    own = np.empty((out.shape[0], 1))
+    column = np.empty((out.shape[0], 1))
     force = np.empty(1)
     ahead_before_m = position_m[0] - s.x
     rate_mps = 0.0
@@ -183,6 +185,6 @@ def _follow(
         ahead_before_m = ahead_m
         force[0] = force_N[block] + stiffness * ahead_m + damping * rate_mps
         _predict(params, state, force, frequency_Hz[block : block + 1], amplitude_m[block : block + 1],
-                 steps[block : block + 1], analogue, truth, own)  # fmt: skip
+                 steps[block : block + 1], analogue, truth, column)  # fmt: skip
         for row in range(out.shape[0]):
-            out[row, block] = own[row, 0]
+            out[row, block] = column[row, 0]

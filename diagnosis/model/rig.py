@@ -8,19 +8,18 @@ import numpy.typing as npt
 
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.grid import BLOCK_S
-from diagnosis.features.segments import Commands
+from diagnosis.features.segments import CommandedRun
 from plant.config import RigConfig
 from plant.effects.drive import even_m, extension_m
 from plant.records import build
 
-Floats = npt.NDArray[np.floating[Any]]
 Effects = dict[str, dict[str, float | str]]
 # Age of the contact when a run begins, and the standard deviation of its logarithm in replicates: three of them reach from a
 # stick under way to a quarter of an hour. A smaller spread makes the first breakaway a gap; a larger one hides ageing.
 AGE_BEFORE_S, AGE_SPREAD = 10.0, 1.5
-# Longest step without vibration. Larger: features change. Smaller: only slower. Counted: docs/method/model.md.
+# Longest step without vibration. Larger: features change. Smaller: only slower. Counted: docs/method/diagnosis.md.
 _COARSEST_STEP_S = 7e-5
-# Steps in a period of the vibration. Fewer: features change. More: only slower. Counted: docs/method/model.md.
+# Steps in a period of the vibration. Fewer: features change. More: only slower. Counted: docs/method/diagnosis.md.
 _STEPS_PER_PERIOD = 16
 _CONTACT_STEP = 0.5  # longest step, in 1 / natural frequency [rad/s] of the mass on the contact: stability
 _LED_STEP_S = 1e-4  # longest step with a force drive: features are equal to 1e-3 N to those at 10 us
@@ -36,7 +35,7 @@ class Start(NamedTuple):
     drive_m: float | None = None  # position that the drive's own sensor shows; its zero differs from the slide sensor's
 
 
-class Entry(NamedTuple):
+class StartState(NamedTuple):
     """State of the rig at the start of a segment."""
 
     block: int
@@ -93,7 +92,7 @@ def rig_config(rig: RigTable, values: dict[str, float], effects: Effects, roughn
     return RigConfig.model_validate(table)
 
 
-def built(config: RigConfig, force_driven: bool, commands: Commands, start: Start) -> Rig:
+def built(config: RigConfig, force_driven: bool, commands: CommandedRun, start: Start) -> Rig:
     """Records of a rig for the kernels, at the start of a run, and the steps in each of its blocks."""
     params, state = build(config)
     p: Any = params[0]

@@ -1,50 +1,49 @@
 """The measured force with which every segment begins; the model begins with the same (reason: `diagnosis.model.predict`)."""
 
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Floats
 from diagnosis.features.feature import Scales, Signals
 from diagnosis.features.grid import BLOCK_S
-from diagnosis.features.noise import Noise
-from diagnosis.features.segments import Commands, Segment
+from diagnosis.features.noise import RunNoise
+from diagnosis.features.segments import CommandedRun, Segment
 from diagnosis.features.slips import find_slips
-from diagnosis.model.rig import Entry
+from diagnosis.model.rig import StartState
 
-Floats = npt.NDArray[np.floating[Any]]
 # Most and fewest blocks of the line through the force whose begin is read. Fewer: noise; more: the line runs into the slip.
 # 40 blocks reduce noise of 30 mN a block to 10 mN.
 _MOST, _FEWEST = 40, 10
 
 
-def entries_of(signals: Signals, commands: Commands, scales: Scales) -> tuple[Entry, ...]:
+def entries_of(signals: Signals, commands: CommandedRun, scales: Scales) -> tuple[StartState, ...]:
     """State at the start of each settled segment that slides evenly or begins in a stick, in time order.
 
     Empty without a measured force, and with a force drive. `signals` are [blocks] each.
     """
     if "drive_force_N" not in signals:
         return ()
-    found: list[Entry] = []
+    entries: list[StartState] = []
     renewed = _renewed(signals, commands, scales)
     for segment in commands.segments:
         cut = {name: segment.sign * values[segment.first : segment.last] for name, values in signals.items()}
         if segment.still:
             force_N, _ = _line(cut["drive_force_N"][:_MOST])
-            found.append(Entry(segment.first, segment.sign * force_N, None))
+            entries.append(StartState(segment.first, segment.sign * force_N, None))
         elif segment.slips > 0:
-            found += _stuck(segment, cut, scales, renewed[renewed <= segment.first])
-    return tuple(found)
+            entries += _stuck(segment, cut, scales, renewed[renewed <= segment.first])
+    return tuple(entries)
 
 
-def misread(entry: Entry, noise: Noise, random: np.random.Generator) -> Entry:
+def misread(entry: StartState, noise: RunNoise, random: np.random.Generator) -> StartState:
     """The entry with the reading error that a draw of the force's noise makes."""
     error_N, _ = _line(noise.drawn("drive_force_N", _MOST, random))
     return entry._replace(force_N=entry.force_N + error_N)
 
 
-def _renewed(signals: Signals, commands: Commands, scales: Scales) -> npt.NDArray[np.int64]:
+def _renewed(signals: Signals, commands: CommandedRun, scales: Scales) -> npt.NDArray[np.int64]:
     """Blocks at which the contact was new, because a slip or even sliding ended there; in time order."""
     slid = [segment.last for segment in commands.segments if segment.still]
     sign = np.sign(commands.drive)
@@ -55,7 +54,7 @@ def _renewed(signals: Signals, commands: Commands, scales: Scales) -> npt.NDArra
     return np.array(sorted(slid), np.int64)
 
 
-def _stuck(segment: Segment, cut: Signals, scales: Scales, renewed: npt.NDArray[np.int64]) -> list[Entry]:
+def _stuck(segment: Segment, cut: Signals, scales: Scales, renewed: npt.NDArray[np.int64]) -> list[StartState]:
     measured_N = cut["drive_force_N"]
     slips = find_slips(cut, scales)
     blocks = min(_MOST, int(slips.tops[0]) // 2)
@@ -63,10 +62,10 @@ def _stuck(segment: Segment, cut: Signals, scales: Scales, renewed: npt.NDArray[
         return []
     force_N, rate_N = _line(measured_N[:blocks])
     if len(renewed) == 0:
-        return [Entry(segment.first, segment.sign * force_N, segment.first * BLOCK_S, from_before=True)]
+        return [StartState(segment.first, segment.sign * force_N, segment.first * BLOCK_S, from_before=True)]
     if rate_N <= 0.0 or force_N < float(measured_N[slips.bottoms].mean()):  # the segment begins in a slip
         return []
-    return [Entry(segment.first, segment.sign * force_N, (segment.first - int(renewed[-1])) * BLOCK_S)]
+    return [StartState(segment.first, segment.sign * force_N, (segment.first - int(renewed[-1])) * BLOCK_S)]
 
 
 def _line(values: Floats) -> tuple[float, float]:

@@ -5,23 +5,22 @@ effect needs no simulation. A slip lasts tens of blocks, so the grid resolves a 
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.signal import lfilter
 
+from bridge.arrays import Floats
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.model.rig import Effects
 from plant.effects.library import EFFECTS
 from plant.effects.sensors import LAG_ORDERS
 
-Floats = npt.NDArray[np.floating[Any]]
 Signals = dict[str, Floats]
 SENSOR_EFFECTS = tuple(name for name, effect in EFFECTS.items() if effect.acts_on == "sensor")
 
 
-class Chain(NamedTuple):
+class SensorChain(NamedTuple):
     """Small deviations of an ordinary measuring chain; a manifest does not state them."""
 
     force_delay_s: float = 0.0
@@ -33,7 +32,7 @@ class Chain(NamedTuple):
     accel_rolled_off: float = 0.0  # the accelerometer's gain is 1 / sqrt(1 + accel_rolled_off (f / 10 kHz)^2)
 
 
-def sensed(signals: Signals, frequency_Hz: Floats, effects: Effects, chain: Chain) -> Signals:
+def sensed(signals: Signals, frequency_Hz: Floats, effects: Effects, chain: SensorChain) -> Signals:
     """Predicted signals as a chain with these sensor effects would show them; new arrays, [blocks] each.
 
     Args:

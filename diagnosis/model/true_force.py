@@ -3,28 +3,25 @@
 `sensor_chain.sensed` turns a true force into a measured one; this file goes the other way.
 """
 
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d
 
+from bridge.arrays import Floats
 from diagnosis.features.grid import BLOCK_S
-from diagnosis.features.segments import Commands
+from diagnosis.features.segments import CommandedRun
 from diagnosis.model.rig import Effects
-from diagnosis.model.sensor_chain import Chain, delayed, true_force_N
+from diagnosis.model.sensor_chain import SensorChain, delayed, true_force_N
 
-Floats = npt.NDArray[np.floating[Any]]
 # Standard deviation of the smoothing before the force's rate undoes a low-pass. Too small: noise; too large: smeared reversals.
 _DERIVATIVE_S = 2e-3
 
 
-def relative(chain: Chain) -> Chain:
+def relative(chain: SensorChain) -> SensorChain:
     """The same chain with all delays relative to the position sensor: along a measured motion only their difference shows."""
     return chain._replace(force_delay_s=chain.force_delay_s - chain.position_delay_s, position_delay_s=0.0)
 
 
-def true_commands(commands: Commands, effects: Effects, chain: Chain) -> Commands:
+def true_commands(commands: CommandedRun, effects: Effects, chain: SensorChain) -> CommandedRun:
     """The commands of a force-driven run with the true force [N] and the true motion; `chain` is from `relative`."""
     motion = commands.motion
     assert motion is not None, "a force drive has a motion"  # noqa: S101
@@ -32,7 +29,7 @@ def true_commands(commands: Commands, effects: Effects, chain: Chain) -> Command
     return commands._replace(drive=_true_force(commands.drive, effects, chain), motion=motion)
 
 
-def _true_force(force_N: Floats, effects: Effects, chain: Chain) -> Floats:
+def _true_force(force_N: Floats, effects: Effects, chain: SensorChain) -> Floats:
     force_N = true_force_N(force_N, effects, (np.arange(len(force_N)) + 0.5) * BLOCK_S)
     delay_s = chain.force_delay_s
     if "force-sensor-delay" in effects:

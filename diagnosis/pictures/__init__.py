@@ -1,4 +1,4 @@
-"""Pictures by which a person can check a verdict.
+"""Pictures by which an engineer can check a verdict.
 
 choice               which pictures a diagnosis shows
 cycles               measured cycles laid over predicted ones

@@ -1,4 +1,4 @@
-"""How residuals and variables are labelled, and what a residual is drawn over where no effect says so."""
+"""Labels of residuals and variables, and the variable that a residual is drawn over where no effect gives it."""
 
 from typing import Final, NamedTuple
 
@@ -45,7 +45,7 @@ Y: Final = {
 }
 TITLES: Final = {
     BREAKAWAY: "Breakaway force against the baseline's static friction, without vibration",
-    "spring": "Does the spring pull as it is extended? Zero if it does",
+    "spring": "Spring force less stiffness times extension: zero if the spring law holds",
     "curvature": "Does the force bend as the mass accelerates? Zero if it does",
     "motion": "Do accelerometer and displacement agree? Zero if they do",
     "exciter": "Does the base vibrate as commanded? Zero if it does",

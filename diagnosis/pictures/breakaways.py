@@ -1,26 +1,22 @@
 """Breakaways and re-sticks within a segment, and the variables that each breakaway could depend on."""
 
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.feature import Scales, Signals
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.features.segments import Segment
-from diagnosis.features.slips import Slips, find_slips
+from diagnosis.features.slips import SegmentSlips, find_slips
 from diagnosis.gap.prepare import Prepared
 from diagnosis.pictures.derivatives import motion
 
-Floats = npt.NDArray[np.floating[Any]]
 
-
-def slips_of(signals: Signals, segment: Segment, scales: Scales) -> Slips:
+def slips_of(signals: Signals, segment: Segment, scales: Scales) -> SegmentSlips:
     """The slips of a segment that the drive force shows, in blocks of the run."""
     first = segment.first
     slips = find_slips({"drive_force_N": segment.sign * signals["drive_force_N"][first : segment.last]}, scales)
-    return Slips(slips.tops + first, slips.bottoms + first, slips.middles + first, slips.weights)
+    return SegmentSlips(slips.tops + first, slips.bottoms + first, slips.middles + first, slips.weights)
 
 
 def breakaways(rig: RigTable, run: Prepared, scales: Scales) -> tuple[Floats, dict[str, Floats]]:

@@ -5,12 +5,13 @@ shows the effect. Every residual comes with its noise: the measured noise of the
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
+from bridge.arrays import Floats
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.feature import RESOLVED_M, Signals
 from diagnosis.features.grid import BLOCK_S
@@ -25,7 +26,6 @@ from diagnosis.pictures.derivatives import (
     without_slow,
 )
 
-Floats = npt.NDArray[np.floating[Any]]
 # Error that an ordinary measuring chain makes in each relation, as a share of the signal in the relation (rms, or peak to peak in
 # `_spring`). Too small: good sensors stand out; too large: an effect does not. Displacement sensors are linear to 0.2 to 0.4 % in
 # slope, a force channel lags by 40 us (0.35 % of a slip on the paper's spring), a displacement channel by up to 200 us (1.8 %),
@@ -57,12 +57,12 @@ class Residual(NamedTuple):
 
 
 def parity_residuals(rig: RigTable, run: Prepared) -> tuple[Residual, ...]:
-    """The residuals that the channels of a run allow, with the rig numbers of `rig` (best: those of the baseline)."""
-    found: list[Residual | None] = []
+    """The residuals that the channels of a run allow, with the numbers of `rig` (best: of the baseline)."""
+    residuals: list[Residual | None] = []
     if rig.drive == "spring":
-        found += [_spring(rig, run), _curvature(rig, run), _exciter(run), _drive(rig, run)]
-    found += [_motion(rig, run), _friction(rig, run)]
-    return tuple(residual for residual in found if residual is not None and len(residual.values) > 1)
+        residuals += [_spring(rig, run), _curvature(rig, run), _exciter(run), _drive(rig, run)]
+    residuals += [_motion(rig, run), _friction(rig, run)]
+    return tuple(residual for residual in residuals if residual is not None and len(residual.values) > 1)
 
 
 def _noise_signals(run: Prepared) -> Signals:
@@ -81,7 +81,7 @@ def _residual(
     sensor_error: float,
     without_vibration: bool = False,
 ) -> Residual:
-    """A residual without the blocks beside changes of command.
+    """A residual without the blocks around changes of command.
 
     Args:
         name: of the relation.
@@ -171,7 +171,7 @@ def _drive(rig: RigTable, run: Prepared) -> Residual | None:
             values[at] = path_m - np.polynomial.Polynomial.fit(at, path_m, 2)(at)
     noise = _noise_signals(run)["drive_position_m"]
     travel_m = float(np.median(np.abs(run.commands.drive)))  # in a second
-    # a drive that stands still in the log has no noise but rounding: `RESOLVED_M`
+    # a drive that rests in the log has only rounding noise: `RESOLVED_M`
     return _residual("drive", rig, run, values, noise, max(_DRIVE_SHARE * travel_m, RESOLVED_M))
 
 

@@ -43,13 +43,13 @@ def _cycles(problem: Problem, models: list[Overlay]) -> list[Picture]:
         versions += [Version(model.label, model.style, model.signals[run.file]) for model in models]
         if run.commands.segments:
             shown.append(most_telling(run, tuple(versions), problem.scales))
-    shown.sort(key=lambda one: -one.difference)
-    shown = sorted(shown[:_MOST_RUNS], key=lambda one: one.run.file)
-    drawn = [force_picture(one, problem.scales) for one in shown]
+    shown.sort(key=lambda segment: -segment.difference)
+    shown = sorted(shown[:_MOST_RUNS], key=lambda segment: segment.run.file)
+    drawn = [force_picture(segment, problem.scales) for segment in shown]
     for name in ("drive_force_N", "mass_accel_mps2"):
-        with_it = [one for one in shown if {"drive_force_N", name} <= one.run.signals.keys()]
+        with_it = [segment for segment in shown if {"drive_force_N", name} <= segment.run.signals.keys()]
         if problem.rig.drive == "spring" and with_it:
-            best = max(with_it, key=lambda one: slip_difference(one, name, problem.scales))
+            best = max(with_it, key=lambda segment: slip_difference(segment, name, problem.scales))
             picture = slip_picture(best, name, problem.scales)
             if picture is not None and slip_difference(best, name, problem.scales) > _SLIP_DIFFERS:
                 drawn.append(picture)

@@ -1,20 +1,19 @@
 """Measured cycles laid over predicted ones, for the segment of each run in which they differ most."""
 
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.units import counted
 from diagnosis.features.feature import Scales, Signals
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.features.segments import Segment
-from diagnosis.features.slips import Slips
+from diagnosis.features.slips import SegmentSlips
 from diagnosis.gap.prepare import Prepared
 from diagnosis.pictures.breakaways import slips_of
 from diagnosis.result import Curve, Picture
 
-Floats = npt.NDArray[np.floating[Any]]
 Style = Literal["measured", "nominal", "retuned", "effect"]
 _POINTS = 700  # of a curve
 _AXES = {"drive_force_N": "drive force [N]", "mass_accel_mps2": "acceleration of the mass [m/s²]"}
@@ -39,11 +38,11 @@ class ShownSegment(NamedTuple):
 
 def most_telling(run: Prepared, versions: tuple[Version, ...], scales: Scales) -> ShownSegment:
     """The segment of a run in which measurement and baseline (without a baseline, the last version) differ most."""
-    baseline = next((one for one in versions if one.style == "retuned"), versions[-1])
+    baseline = next((version for version in versions if version.style == "retuned"), versions[-1])
     best = ShownSegment(run, run.commands.segments[0], versions, -1.0)
     for segment in run.commands.segments:
         difference = _difference(versions[0].signals, baseline.signals, segment, scales)
-        # where any detail decides whether or when the slide slips, a difference says little
+        # where any detail decides whether or when the slide slips, a difference means little
         if segment.at_the_edge or not _cycles_there(versions[0].signals, segment, scales):
             difference *= 0.3
         if difference > best.difference:
@@ -83,18 +82,18 @@ def _summary(signals: Signals, segment: Segment, scales: Scales) -> Floats:
 def force_picture(shown: ShownSegment, scales: Scales) -> Picture:
     """The mean cycle, from slip to slip, where every version has one; else the signal over time."""
     name = "drive_force_N" if "drive_force_N" in shown.run.signals else "mass_accel_mps2"
-    # with a force drive the force is not a saw tooth, and its phase is that of the measured motion
+    # with a force drive the force is not a saw tooth, and its phase follows the measured motion
     if name == "drive_force_N" and shown.segment.drive_velocity_mps != 0.0:
         slips = [slips_of(version.signals, shown.segment, scales) for version in shown.versions]
-        if all(len(one.middles) >= 2 for one in slips):
-            curves = [_whole_cycle(version, found) for version, found in zip(shown.versions, slips, strict=True)]
+        if all(len(slip.middles) >= 2 for slip in slips):
+            curves = [_whole_cycle(version, slips_of) for version, slips_of in zip(shown.versions, slips, strict=True)]
             title = f"{_place(shown)}: {_mean_of(len(slips[0].middles) - 1)} from slip to slip"
             return Picture("cycle", title, "time after the middle of the slip [ms]", _AXES[name], tuple(curves))
-        if all(len(one.middles) == 1 for one in slips) or (
-            shown.segment.first and all(len(one.middles) for one in slips)
+        if all(len(slip.middles) == 1 for slip in slips) or (
+            shown.segment.first and all(len(slip.middles) for slip in slips)
         ):
             # the phase of stick-slip is chance, so the first slips are aligned
-            zeros = [float(one.middles[0]) for one in slips]
+            zeros = [float(slip.middles[0]) for slip in slips]
             title = f"{_place(shown)}: first slips laid on each other"
             curves = [
                 _over_time(version, name, shown, zero) for version, zero in zip(shown.versions, zeros, strict=True)
@@ -133,7 +132,7 @@ def slip_difference(shown: ShownSegment, name: str, scales: Scales) -> float:
     return float((measured - baseline).std() / (measured.std() + 1e-12))
 
 
-def _whole_cycle(version: Version, slips: Slips) -> Curve:
+def _whole_cycle(version: Version, slips: SegmentSlips) -> Curve:
     """The mean of all cycles, each stretched to the mean period so that the slips at its ends stay sharp."""
     values = version.signals["drive_force_N"]
     periods = np.diff(slips.middles)

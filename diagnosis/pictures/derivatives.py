@@ -1,18 +1,16 @@
 """Motion of the mass and the spring of a reduced run, from the channels that it has; smooth derivatives on the 1 ms grid."""
 
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
+from bridge.arrays import Floats
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.feature import Signals, scales_of
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.gap.prepare import Prepared
 from diagnosis.model.sensor_chain import low_pass
 
-Floats = npt.NDArray[np.floating[Any]]
 # Standard deviation of the smoothing, as a share of a slip. Too small: noise of the second derivative; too large: slips are cut.
 # 0.14 is 5 ms on the paper's spring, where a slip keeps 90 % of its acceleration.
 _SMOOTH_SHARE = 0.14
@@ -20,7 +18,7 @@ _SMOOTH_FREE = 5.0  # blocks, with a force drive, where no slip gives a time sca
 _FIRST_SHARE = 0.4  # share of this smoothing for a first derivative, which needs less
 _EDGE_BLOCKS = 100  # left out around a change of command, while drive and piezo settle
 _END_BLOCKS = 20  # left out at the ends of a run
-_SLOW_S = 0.08  # time constant of a high-pass at 2 Hz: accelerometers do not show what is slower than 0.5 Hz
+_SLOW_S = 0.08  # time constant of a high-pass at 2 Hz: accelerometers show nothing slower than 0.5 Hz
 _MOVES_MPS = 2e-3  # speed above which the mass has moved; a slip of the paper's rig reaches 22 mm/s
 
 

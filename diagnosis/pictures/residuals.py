@@ -1,10 +1,10 @@
 """Residuals drawn over the variable that explains them; the named effect decides which residual and which variable."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.feature import Scales, Signals
 from diagnosis.gap.prepare import Prepared
@@ -16,7 +16,6 @@ from diagnosis.pictures.channel_relations import parity_residuals
 from diagnosis.pictures.cycles import Style
 from diagnosis.result import Curve, Picture
 
-Floats = npt.NDArray[np.floating[Any]]
 _ROUNDING = 1e-3  # rms in units of the noise, up to which a residual is rounding: a drive that was logged as commanded
 _CLOUD = 900  # points of a measured cloud
 _BINS = 50  # of a mean line
@@ -41,7 +40,7 @@ class _Series(NamedTuple):
 def residual_pictures(
     rig: RigTable, runs: list[Prepared], scales: Scales, models: list[Overlay], effects: tuple[str, ...]
 ) -> list[Picture]:
-    """One or two pictures for each named effect, then those of the residuals with the largest rms; without effects, two.
+    """One or two pictures for each named effect, then of the residuals with the largest rms; without effects, two.
 
     Args:
         rig: with the numbers of the baseline.
@@ -54,7 +53,7 @@ def residual_pictures(
     wanted: list[Over] = []
     for effect in effects:
         row = CATALOGUE[effect]
-        possible = [over for over in row.shown_by if any(len(one.x) for one in _all(rig, runs, scales, over))]
+        possible = [over for over in row.shown_by if any(len(part.x) for part in _all(rig, runs, scales, over))]
         wanted += [over for over in possible[: 2 if row.shown_twice else 1] if over not in wanted]
     for over in _standing_out(rig, runs):
         if len(wanted) < max(2, len(effects) + 1) and over[0] not in {residual for residual, _ in wanted}:
@@ -125,7 +124,7 @@ def _picture(rig: RigTable, runs: list[Prepared], scales: Scales, models: list[O
 
 
 def _joined(series: list[_Series]) -> tuple[Floats, Floats]:
-    return np.concatenate([one.x for one in series]), np.concatenate([one.y for one in series])
+    return np.concatenate([part.x for part in series]), np.concatenate([part.y for part in series])
 
 
 def _line(label: str, style: Style, x: Floats, y: Floats, over: Over) -> Curve:

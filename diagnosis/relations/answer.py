@@ -14,7 +14,7 @@ from diagnosis.relations.exciter import exciter_relation
 from diagnosis.relations.motion import motion_relation
 from diagnosis.relations.outside import Pattern, burst_ratio, patterns_of, whitened_rows
 from diagnosis.relations.products import (
-    Noise,
+    BandNoise,
     Products,
     band_edges_Hz,
     band_of_rows,
@@ -84,8 +84,8 @@ def relations_of(rig: RigTable, runs: list[Prepared]) -> Relations:
     )
     fitted = [i for i, run in enumerate(runs) if not run.holdout]
     return Relations(
-        tuple(answered_of(thinned(one), fitted) for one in built if isinstance(one, Relation)),
-        tuple(one for one in built if isinstance(one, Missing)),
+        tuple(answered_of(thinned(relation), fitted) for relation in built if isinstance(relation, Relation)),
+        tuple(relation for relation in built if isinstance(relation, Missing)),
     )
 
 
@@ -152,26 +152,26 @@ def _rms(bare: Floats, size: Floats, rows: float) -> float:
     return math.sqrt(max(float(with_left @ bare @ with_left), 0.0) / rows)
 
 
-def _agreement(products: Products, runs: list[int], noise: Noise, chosen: Found, number: int) -> float:
+def _agreement(products: Products, runs: list[int], noise: BandNoise, chosen: Found, number: int) -> float:
     """Chance that the sizes of one chosen cause in each run alone differ as much as they do where they are one size."""
     columns, _ = model_columns(products, chosen.terms)
     size, _ = sizes_of(products, runs, noise, chosen.terms)
-    first = len(size) - sum(len(one) for one in chosen.sizes[number:])
-    own = slice(first, first + len(chosen.sizes[number]))
+    first = len(size) - sum(len(size) for size in chosen.sizes[number:])
+    term_columns = slice(first, first + len(chosen.sizes[number]))
     others = size.copy()
-    others[own] = 0.0
+    others[term_columns] = 0.0
     mine = size - others
-    found: list[tuple[float, float]] = []
+    intervals: list[tuple[float, float]] = []
     for run in runs:
         over = np.tensordot(1.0 / noise.variance, products.values[run], axes=1)
         inner = over[columns[:, None], columns]
         information = float(mine @ inner @ mine)
         towards = float(mine @ (over[columns, -1] - inner @ others))
         if information > _INFORMED:
-            found.append((towards / information, 1.0 / information))
-    if len(found) < 2:
+            intervals.append((towards / information, 1.0 / information))
+    if len(intervals) < 2:
         return 1.0
-    value, variance = np.array(found).T
+    value, variance = np.array(intervals).T
     weight = 1.0 / (variance + _SAME_SIZE**2)
     mean = float(weight @ value / weight.sum())
     return float(chi2.sf(float(weight @ (value - mean) ** 2), len(value) - 1))

@@ -24,14 +24,14 @@ def base_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
     if why := lacking(NEEDED, runs):
         return Missing("base", why)
     pieces = tuple(pieces_of(kept_blocks(run) & (run.commands.frequency_Hz == 0.0)) for run in runs)
-    if not any(own for own, run in zip(pieces, runs, strict=True) if not run.holdout):
+    if not any(pieces_of for pieces_of, run in zip(pieces, runs, strict=True) if not run.holdout):
         return Missing("base", "no stretch without vibration is long enough")
     accel = [run.signals["mass_accel_mps2"] for run in runs]
     friction = [run.signals["drive_force_N"] - rig.mass_kg * run.signals["mass_accel_mps2"] for run in runs]
     since = [slip_phase(rate(run.signals["drive_force_N"]), scales_of(rig).slip_s) for run in runs]
     modes = tuple(
         term(
-            "base-compliance", f"{each_Hz:.3g} Hz", [bend(mode(one, each_Hz, 0.02)) for one in friction],
+            "base-compliance", f"{each_Hz:.3g} Hz", [bend(mode(force, each_Hz, 0.02)) for force in friction],
             _COMPLIANCE_M_PER_N, 1, "compliance_m_per_N",
         )
         for each_Hz in _MODES_HZ.tolist()

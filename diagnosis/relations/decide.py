@@ -6,7 +6,7 @@ from typing import NamedTuple
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.relations.answer import Answered, Relations
 from diagnosis.relations.relation import OUTSIDE
-from diagnosis.relations.shares import Share
+from diagnosis.relations.shares import RelationShare
 
 # Log evidence by which a set must fall without a cause before the cause is named, beyond the logarithm of the number of
 # columns tried. Smaller: noise that is not quite even gets a name. Larger: small effects do not. Counted:
@@ -55,7 +55,7 @@ class Decided(NamedTuple):
     relation: str
     evidence: float  # natural logarithm by which the relation is worse without it
     alike: tuple[str, ...]  # causes that this relation cannot tell from it, itself among them
-    share: Share | None  # on the held-out runs
+    share: RelationShare | None  # on the held-out runs
 
     @property
     def known(self) -> bool:
@@ -86,19 +86,19 @@ def decision_of(relations: Relations, rig: RigTable) -> Decision:
     pull_N_per_m = rig.drive_stiffness_N_per_m or 0.0
     decided: list[Decided] = []
     outside: list[Outside] = []
-    for one in relations.answered:
-        if one.name == "drive" and pull_N_per_m * one.refitted < _MATTERS * rig.static_force_N:
+    for answered in relations.answered:
+        if answered.name == "drive" and pull_N_per_m * answered.refitted < _MATTERS * rig.static_force_N:
             continue
-        own = _decided(one)
-        pattern = _pattern(one, own)
-        if pattern is not None and one.name == "drive":  # any function of the place is an uneven drive
-            own, pattern = [Decided(_UNEVEN, one.name, pattern.evidence, (_UNEVEN,), None)], None
-        decided += own
-        outside += [_outside_cause(one, cause) for cause in own if not cause.known]
-        if pattern is not None and not any(not cause.known for cause in own):
+        decided_here = _decided(answered)
+        pattern = _pattern(answered, decided_here)
+        if pattern is not None and answered.name == "drive":  # any function of the place is an uneven drive
+            decided_here, pattern = [Decided(_UNEVEN, answered.name, pattern.evidence, (_UNEVEN,), None)], None
+        decided += decided_here
+        outside += [_outside_cause(answered, cause) for cause in decided_here if not cause.known]
+        if pattern is not None and not any(not cause.known for cause in decided_here):
             outside.append(pattern)
     # a base with a mode of its own changes what an exciter delivers, also where the mode's formula does not fit every run
-    if any(one.name == "base" and one.chosen.evidence > _limit(one) for one in relations.answered):
+    if any(answered.name == "base" and answered.chosen.evidence > _limit(answered) for answered in relations.answered):
         decided = [cause for cause in decided if cause.relation != "exciter"]
         outside = [left for left in outside if left.relation != "exciter"]
     return Decision(
@@ -113,75 +113,82 @@ def ruled_out(relations: Relations, decision: Decision) -> frozenset[str]:
     Where a relation names causes, its other effects; elsewhere those whose size its best column knows to a tenth of a large
     effect's, with less evidence than no effect at all.
     """
-    found: set[str] = set()
-    for one in relations.answered:
-        own = {name for name, relation in SHOWN_BY.items() if relation == one.name}
-        kept = {term.cause for term in one.chosen.terms}
-        named = [cause for cause in decision.decided if cause.relation == one.name and cause.known]
+    effects: set[str] = set()
+    for answered in relations.answered:
+        shown = {name for name, relation in SHOWN_BY.items() if relation == answered.name}
+        kept = {term.cause for term in answered.chosen.terms}
+        named = [cause for cause in decision.decided if cause.relation == answered.name and cause.known]
         if named:
-            found |= own - kept - {other for cause in named for other in cause.alike}
-        for alone in one.ranking.singles:
+            effects |= shown - kept - {other for cause in named for other in cause.alike}
+        for alone in answered.ranking.singles:
             (term,), (deviation,) = alone.terms, alone.deviations
             known = float(deviation.max()) < _KNOWN_SIZE * term.spread
-            if term.cause in own - kept and alone.evidence < 0.0 and known:
-                found.add(term.cause)
-    return frozenset(found)
+            if term.cause in shown - kept and alone.evidence < 0.0 and known:
+                effects.add(term.cause)
+    return frozenset(effects)
 
 
-def _decided(one: Answered) -> list[Decided]:
-    limit = _limit(one)
-    shares = {} if one.shares is None else {(share.cause, share.form): share for share in one.shares.causes}
-    found: list[Decided] = []
-    for number, term in enumerate(one.chosen.terms):
-        lost, share = one.lost[number], shares.get((term.cause, term.form))
+def _decided(answered: Answered) -> list[Decided]:
+    limit = _limit(answered)
+    shares = {} if answered.shares is None else {(share.cause, share.form): share for share in answered.shares.causes}
+    decided: list[Decided] = []
+    for number, term in enumerate(answered.chosen.terms):
+        lost, share = answered.lost[number], shares.get((term.cause, term.form))
         # a number beyond its tolerance: the refitted rig follows it, so it closes nothing that the baseline leaves
         borne_out = share is None or share.share > share.null_90 or term.cause in _LEVELS
-        if lost > limit and lost > _ADDS * one.chosen.evidence and one.agreement[number] > _SAME_SIZE and borne_out:
-            cause = _of_library(one, term.cause)
-            found.append(Decided(cause, one.name, lost, _alike(one, cause), share))
-    return found
+        if (
+            lost > limit
+            and lost > _ADDS * answered.chosen.evidence
+            and answered.agreement[number] > _SAME_SIZE
+            and borne_out
+        ):
+            cause = _of_library(answered, term.cause)
+            decided.append(Decided(cause, answered.name, lost, _alike(answered, cause), share))
+    return decided
 
 
-def _limit(one: Answered) -> float:
-    return _DECIDES + math.log(max(one.tried, 1))
+def _limit(answered: Answered) -> float:
+    return _DECIDES + math.log(max(answered.tried, 1))
 
 
-def _of_library(one: Answered, cause: str) -> str:
+def _of_library(answered: Answered, cause: str) -> str:
     """The cause, or the best of the library where that would do as well."""
-    if cause not in OUTSIDE or len(one.chosen.terms) > 1:
+    if cause not in OUTSIDE or len(answered.chosen.terms) > 1:
         return cause
-    known = next((found for found in one.ranking.singles if found.causes[0] not in OUTSIDE), None)
-    return cause if known is None or one.chosen.evidence - known.evidence >= _NEAR else known.causes[0]
+    known = next((single for single in answered.ranking.singles if single.causes[0] not in OUTSIDE), None)
+    return cause if known is None or answered.chosen.evidence - known.evidence >= _NEAR else known.causes[0]
 
 
-def _alike(one: Answered, cause: str) -> tuple[str, ...]:
+def _alike(answered: Answered, cause: str) -> tuple[str, ...]:
     """Causes whose own best column comes within a few of log evidence of this one's, where it stands alone."""
     known = _ALIKE.get(cause, (cause,))
-    if len(one.chosen.terms) > 1:
+    if len(answered.chosen.terms) > 1:
         return known
-    best = next((found.evidence for found in one.ranking.singles if found.causes == (cause,)), 0.0)
+    best = next((single.evidence for single in answered.ranking.singles if single.causes == (cause,)), 0.0)
     near = [
-        found.causes[0]
-        for found in one.ranking.singles
-        if best - found.evidence < _NEAR and found.causes[0] not in OUTSIDE
+        single.causes[0]
+        for single in answered.ranking.singles
+        if best - single.evidence < _NEAR and single.causes[0] not in OUTSIDE
     ]
     return tuple(dict.fromkeys((cause, *known, *near)))
 
 
-def _outside_cause(one: Answered, cause: Decided) -> Outside:
-    term = next(term for term in one.chosen.terms if term.cause == cause.cause)
-    taken = math.sqrt(max(one.refitted**2 - one.left**2, 0.0))
-    return Outside(one.name, f"{term.cause}: {term.form}", taken, one.noise, one.unit, cause.evidence)
+def _outside_cause(answered: Answered, cause: Decided) -> Outside:
+    term = next(term for term in answered.chosen.terms if term.cause == cause.cause)
+    taken = math.sqrt(max(answered.refitted**2 - answered.left**2, 0.0))
+    return Outside(answered.name, f"{term.cause}: {term.form}", taken, answered.noise, answered.unit, cause.evidence)
 
 
-def _pattern(one: Answered, named: list[Decided]) -> Outside | None:
-    taken = math.sqrt(max(one.refitted**2 - one.left**2, 0.0)) if named else 0.0
-    for pattern in () if one.name in _COARSE else one.patterns:
-        if pattern.evidence > _PATTERN and pattern.rms > max(_PATTERN_OVER_NOISE * one.noise, _MISMATCH * taken):
-            return Outside(one.name, f"over {pattern.what}", pattern.rms, one.noise, one.unit, pattern.evidence)
-    if one.bursts > _BURSTS and one.name in _BURSTING:
-        quiet = one.noise / math.sqrt(one.bursts)
-        size = math.sqrt(max(one.left**2 - quiet**2, 0.0))
+def _pattern(answered: Answered, named: list[Decided]) -> Outside | None:
+    taken = math.sqrt(max(answered.refitted**2 - answered.left**2, 0.0)) if named else 0.0
+    for pattern in () if answered.name in _COARSE else answered.patterns:
+        if pattern.evidence > _PATTERN and pattern.rms > max(_PATTERN_OVER_NOISE * answered.noise, _MISMATCH * taken):
+            return Outside(
+                answered.name, f"over {pattern.what}", pattern.rms, answered.noise, answered.unit, pattern.evidence
+            )
+    if answered.bursts > _BURSTS and answered.name in _BURSTING:
+        quiet = answered.noise / math.sqrt(answered.bursts)
+        size = math.sqrt(max(answered.left**2 - quiet**2, 0.0))
         if size > max(_PATTERN_OVER_NOISE * quiet, _MISMATCH * taken):
-            return Outside(one.name, "in bursts", size, quiet, one.unit, one.bursts)
+            return Outside(answered.name, "in bursts", size, quiet, answered.unit, answered.bursts)
     return None

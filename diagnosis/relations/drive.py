@@ -25,7 +25,7 @@ _FEWEST_TURNS = 2.0  # of a wave in the longest piece; a slower one is a wander 
 def drive_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
     """The relation in m; `Missing` where a run has no drive position, or no drive ever moves evenly."""
     if rig.drive == "force":
-        return Missing("drive", 'drive = "force": there is no drive that moves')
+        return Missing("drive", 'drive = "force": the rig has no moving drive')
     for run in runs:
         if "drive_position_m" not in run.signals:
             return Missing("drive", f"{run.file} has no drive_position_m: its path is taken as commanded")
@@ -36,7 +36,7 @@ def drive_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
     place = [run.signals["drive_position_m"] for run in runs]
     own_s = [(np.arange(len(s)) + 0.5) * BLOCK_S for s in place]
     speed = [np.abs(run.commands.drive) for run in runs]
-    left = [_without_parabola(s, own) for s, own in zip(place, pieces, strict=True)]
+    left = [_without_parabola(s, pieces_of) for s, pieces_of in zip(place, pieces, strict=True)]
     rows = np.concatenate([left[i][slice(*piece)] for i in fitted for piece in pieces[i]])
     if math.sqrt(float(np.mean(rows**2))) < RESOLVED_M:
         return Missing("drive", "the drive position is the commanded path, not a measurement")
@@ -62,12 +62,12 @@ def drive_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
     return Relation(
         name="drive", unit="m", row_s=BLOCK_S, highest_Hz=_HIGHEST_HZ, left=tuple(left), pieces=pieces,
         nuisances=(
-            slow._replace(values=tuple(_without_parabola(one, own) for one, own in zip(slow.values, pieces, strict=True))),
+            slow._replace(values=tuple(_without_parabola(s, parts) for s, parts in zip(slow.values, pieces, strict=True))),
         ),
         effects=tuple(effects),
         patterns=(
             Term("the place of the drive", "", tuple(
-                _without_parabola(hats(s, knots), own) for s, own in zip(place, pieces, strict=True)), math.nan),
+                _without_parabola(hats(s, knots), pieces_of) for s, pieces_of in zip(place, pieces, strict=True)), math.nan),
         ),
         resolution=RESOLVED_M,
     )  # fmt: skip
@@ -79,11 +79,11 @@ def _even(run: Prepared) -> tuple[Piece, ...]:
     for segment in run.commands.segments:
         even[segment.first : segment.last] = segment.drive_velocity_mps != 0.0
     joints = {segment.first for segment in run.commands.segments}
-    found: list[Piece] = []
+    stretches: list[Piece] = []
     for first, last in pieces_of(kept & even):
         cuts = sorted({first, last, *(joint for joint in joints if first < joint < last)})
-        found += [(a, b) for a, b in pairwise(cuts) if b - a >= 300]
-    return tuple(found)
+        stretches += [(a, b) for a, b in pairwise(cuts) if b - a >= 300]
+    return tuple(stretches)
 
 
 def _without_parabola(values: Floats, pieces: tuple[Piece, ...]) -> Floats:
@@ -92,8 +92,8 @@ def _without_parabola(values: Floats, pieces: tuple[Piece, ...]) -> Floats:
     for first, last in pieces:
         basis = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, last - first), 2)
         basis, _ = np.linalg.qr(basis)
-        own = values[first:last]
-        result[first:last] = own - basis @ (basis.T @ own)
+        part = values[first:last]
+        result[first:last] = part - basis @ (basis.T @ part)
     return result
 
 
@@ -104,16 +104,16 @@ def _strongest(
     if len(grid) == 0:
         return []
     rows = [(i, slice(first, last, _THIN)) for i in runs for first, last in pieces[i]]
-    at = np.concatenate([over[i][own] for i, own in rows])
-    values = np.concatenate([left[i][own] for i, own in rows])
+    at = np.concatenate([over[i][rows_of] for i, rows_of in rows])
+    values = np.concatenate([left[i][rows_of] for i, rows_of in rows])
     power = np.array([abs(np.exp(-2j * math.pi * turns * at) @ values) ** 2 for turns in grid])
-    found: list[float] = []
+    wavelengths: list[float] = []
     for i in np.argsort(-power):
-        if all(abs(grid[i] - other) > 4.0 * abs(grid[-1] - grid[0]) / max(len(grid) - 1, 1) for other in found):
-            found.append(float(grid[i]))
-        if len(found) == _WAVES:
+        if all(abs(grid[i] - other) > 4.0 * abs(grid[-1] - grid[0]) / max(len(grid) - 1, 1) for other in wavelengths):
+            wavelengths.append(float(grid[i]))
+        if len(wavelengths) == _WAVES:
             break
-    return found
+    return wavelengths
 
 
 def _wave(
@@ -126,8 +126,8 @@ def _wave(
 ) -> Term:
     values: list[Floats] = []
     for i, angle in enumerate(angles):
-        own = np.stack([np.sin(angle), np.cos(angle), 0.5 * np.sin(2.0 * angle), 0.5 * np.cos(2.0 * angle)], axis=1)
+        columns = np.stack([np.sin(angle), np.cos(angle), 0.5 * np.sin(2.0 * angle), 0.5 * np.cos(2.0 * angle)], axis=1)
         if factor is not None:
-            own = own * factor[i][:, None]
-        values.append(_without_parabola(own, pieces[i]))
+            columns = columns * factor[i][:, None]
+        values.append(_without_parabola(columns, pieces[i]))
     return Term(cause, form, tuple(values), amplitude, 0, "amplitude_m" if factor is None else "amplitude_s")

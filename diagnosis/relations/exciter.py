@@ -29,7 +29,7 @@ def exciter_relation(runs: list[Prepared]) -> Relation | Missing:
         if "base_shake_mps2" not in run.signals and (run.commands.frequency_Hz > 0.0).any():
             return Missing("exciter", f"{run.file} has no base_accel_mps2 that is fast enough")
     pieces = tuple(_pieces(run) for run in runs)
-    if not any(own for own, run in zip(pieces, runs, strict=True) if not run.holdout):
+    if not any(pieces_of for pieces_of, run in zip(pieces, runs, strict=True) if not run.holdout):
         return Missing("exciter", "no vibration is held long enough")
     frequency = [_rows(run.commands.frequency_Hz) for run in runs]
     left = tuple(_left(run) for run in runs)
@@ -74,7 +74,7 @@ def exciter_relation(runs: list[Prepared]) -> Relation | Missing:
         )
     each_Hz = np.unique(np.concatenate(frequency))
     each_Hz = each_Hz[each_Hz > 0.0]
-    levels = tuple(np.stack([f == one for one in each_Hz], axis=1).astype(np.float64) for f in frequency)
+    levels = tuple(np.stack([f == level_Hz for level_Hz in each_Hz], axis=1).astype(np.float64) for f in frequency)
     patterns += [
         Term("the frequency", "", levels, math.nan),
         free("the time driven", driven, 8),
@@ -118,14 +118,14 @@ def _pieces(run: Prepared) -> tuple[Piece, ...]:
     count = len(kept) // _ROW_BLOCKS
     whole: Bools = np.asarray(kept[: count * _ROW_BLOCKS].reshape(count, _ROW_BLOCKS).min(axis=1))
     key = _rows(run.commands.frequency_Hz) + 1e9 * _rows(run.commands.amplitude_m)
-    found: list[Piece] = []
+    stretches: list[Piece] = []
     first = 0
     for row in range(1, count + 1):
         if row == count or whole[row] != whole[first] or key[row] != key[first]:
             if whole[first] and row - first >= _FEWEST_ROWS:
-                found.append((first, row))
+                stretches.append((first, row))
             first = row
-    return tuple(found)
+    return tuple(stretches)
 
 
 def _driven_s(run: Prepared) -> Floats:

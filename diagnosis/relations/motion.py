@@ -27,7 +27,7 @@ def motion_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
     if why := lacking(NEEDED, runs):
         return Missing("motion", why)
     pieces = tuple(pieces_of(kept_blocks(run) & (run.commands.frequency_Hz == 0.0)) for run in runs)
-    if not any(own for own, run in zip(pieces, runs, strict=True) if not run.holdout):
+    if not any(pieces_of for pieces_of, run in zip(pieces, runs, strict=True) if not run.holdout):
         return Missing("motion", "no stretch without vibration is long enough")
     accel = [run.signals["mass_accel_mps2"] for run in runs]
     position = [run.signals["mass_position_m"] for run in runs]

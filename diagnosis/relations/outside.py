@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.relations.products import (
-    Noise,
+    BandNoise,
     Products,
     band_edges_Hz,
     band_of_rows,
@@ -29,7 +29,7 @@ class Pattern(NamedTuple):
     rms: float  # of the function over the rows, in the relation's unit
 
 
-def patterns_of(products: Products, runs: list[int], noise: Noise, chosen: Found) -> tuple[Pattern, ...]:
+def patterns_of(products: Products, runs: list[int], noise: BandNoise, chosen: Found) -> tuple[Pattern, ...]:
     """Every pattern of the relation beside the chosen causes, the largest evidence first."""
     whole = weighted(products, runs, noise)
     plain = products.values[runs].sum(axis=(0, 1))
@@ -50,7 +50,7 @@ def patterns_of(products: Products, runs: list[int], noise: Noise, chosen: Found
                 _pattern(whole, plain, rows, model, spreads, term, _columns(places[id(term)]))
                 for term in products.relation.patterns
             ),
-            key=lambda one: -one.evidence,
+            key=lambda pattern: -pattern.evidence,
         )
     )
 
@@ -60,9 +60,9 @@ def _columns(place: slice) -> np.ndarray:
 
 
 def _pattern(
-    whole: Floats, plain: Floats, rows: float, model: np.ndarray, spreads: Floats, term: Term, own: np.ndarray
+    whole: Floats, plain: Floats, rows: float, model: np.ndarray, spreads: Floats, term: Term, mask: np.ndarray
 ) -> Pattern:
-    everything = np.append(own, whole.shape[0] - 1)
+    everything = np.append(mask, whole.shape[0] - 1)
     free = whole[everything[:, None], everything]
     if len(model):
         inner = whole[model[:, None], model] + np.diag(1.0 / spreads**2)
@@ -73,34 +73,36 @@ def _pattern(
     values, vectors = np.linalg.eigh(0.5 * (inner + inner.T))
     values = np.maximum(values, 0.0)
     along = vectors.T @ towards
-    typical = math.sqrt(len(own) / max(float(values.sum()), 1e-300))  # size of a coefficient that is one noise of a row
+    typical = math.sqrt(
+        len(mask) / max(float(values.sum()), 1e-300)
+    )  # size of a coefficient that is one noise of a row
     sizes = typical * _SPREADS[:, None]
     gained = (0.5 * along**2 * sizes**2 / (1.0 + values * sizes**2) - 0.5 * np.log1p(values * sizes**2)).sum(axis=1)
     best = int(gained.argmax())
     size = vectors @ (along / (values + 1.0 / float(sizes[best, 0]) ** 2))
-    shown = plain[own[:, None], own]
+    shown = plain[mask[:, None], mask]
     if len(model):  # a part that the nuisances could take as well is not the pattern's
-        across = plain[model[:, None], own]
+        across = plain[model[:, None], mask]
         shown = shown - across.T @ np.linalg.lstsq(plain[model[:, None], model], across, rcond=1e-12)[0]
     square = float(size @ shown @ size) / max(rows, 1.0)
     return Pattern(term.cause, float(gained[best]) - math.log(len(_SPREADS)), math.sqrt(max(square, 0.0)))
 
 
 def whitened_rows(
-    products: Products, runs: list[int], noise: Noise, terms: tuple[Term, ...], sizes: Floats
+    products: Products, runs: list[int], noise: BandNoise, terms: tuple[Term, ...], sizes: Floats
 ) -> list[Floats]:
     """What the terms leave of each piece of `runs`, in units of the noise, back in time: [rows] each, white without a gap."""
     relation = products.relation
     edges = band_edges_Hz(relation)
     deviation = np.append(np.sqrt(noise.variance), np.inf)
-    found: list[Floats] = []
+    columns: list[Floats] = []
     for run in runs:
         for piece in relation.pieces[run]:
             band = band_of_rows(relation, piece[1] - piece[0], edges)
             turned = turned_piece(relation, terms, run, piece, len(band))
             rest = (turned[:, -1] - turned[:, :-1] @ sizes) / deviation[band]
-            found.append(turned_back(rest[:, None], piece[1] - piece[0])[:, 0])
-    return found
+            columns.append(turned_back(rest[:, None], piece[1] - piece[0])[:, 0])
+    return columns
 
 
 def burst_ratio(rows: list[Floats], row_s: float) -> float:

@@ -48,15 +48,15 @@ def products_of(relation: Relation) -> Products:
     bands = len(edges) - 1
     values = np.zeros((len(relation.left), bands, width, width))
     rows = np.zeros((len(relation.left), bands))
-    lengths = np.array([sum(last - first for first, last in own) for own in relation.pieces], np.float64)
+    lengths = np.array([sum(last - first for first, last in piece) for piece in relation.pieces], np.float64)
     for number in range(len(relation.left)):
         for first, last in relation.pieces[number]:
             band = band_of_rows(relation, last - first, edges)
             turned = turned_piece(relation, terms, number, (first, last), len(band))
-            for own in np.unique(band[band >= 0]):
-                block = turned[band == own]
-                values[number, own] += block.T @ block
-                rows[number, own] += len(block)
+            for band_number in np.unique(band[band >= 0]):
+                block = turned[band == band_number]
+                values[number, band_number] += block.T @ block
+                rows[number, band_number] += len(block)
     return Products(relation, terms, tuple(places), values, rows, lengths)
 
 
@@ -97,7 +97,7 @@ def turned_back(values: Floats, length: int) -> Floats:
     return np.asarray(idct(padded, axis=0, norm="ortho"))
 
 
-class Noise(NamedTuple):
+class BandNoise(NamedTuple):
     """Variance of a row in each band, [bands]."""
 
     variance: Floats
@@ -107,13 +107,13 @@ class Noise(NamedTuple):
         return float(self.variance @ products.rows[runs].sum(axis=0))
 
 
-def weighted(products: Products, runs: list[int], noise: Noise) -> Floats:
+def weighted(products: Products, runs: list[int], noise: BandNoise) -> Floats:
     """The products over `runs` in units of the noise, [columns, columns]."""
     over = products.values[runs].sum(axis=0)
     return np.tensordot(1.0 / noise.variance, over, axes=1)
 
 
-def noise_of(products: Products, runs: list[int], columns: np.ndarray, spreads: Floats) -> Noise:
+def noise_of(products: Products, runs: list[int], columns: np.ndarray, spreads: Floats) -> BandNoise:
     """Noise by REML: the variance that a band has after these columns, less the freedom that they take in it.
 
     Args:
@@ -139,7 +139,7 @@ def noise_of(products: Products, runs: list[int], columns: np.ndarray, spreads: 
         rest = square - 2.0 * towards @ size + np.einsum("bij,i,j->b", inner, size, size)
         freedom = rows - np.einsum("bij,ij->b", inner, inverse) / variance
         variance = np.maximum(_filled(rest, freedom), least)
-    return Noise(variance)
+    return BandNoise(variance)
 
 
 def _filled(rest: Floats, freedom: Floats) -> Floats:

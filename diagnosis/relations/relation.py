@@ -2,16 +2,14 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d
 
+from bridge.arrays import Bools, Floats
 from diagnosis.gap.prepare import Prepared
 
-Floats = npt.NDArray[np.floating[Any]]
-Bools = npt.NDArray[np.bool_]
 Piece = tuple[int, int]  # rows [first, last) of a run, without a hole
 OUTSIDE = frozenset(
     {"acceleration-clock", "logger-clock", "force-amplifier", "loose-clamp"}
@@ -64,7 +62,7 @@ class Missing(NamedTuple):
 
 def term(cause: str, form: str, values: Sequence[Floats], spread: float, sign: int = 0, size: str = "") -> Term:
     """A term of one column; `values` are [rows of the run] each."""
-    return Term(cause, form, tuple(np.asarray(one, np.float64)[:, None] for one in values), spread, sign, size)
+    return Term(cause, form, tuple(np.asarray(value, np.float64)[:, None] for value in values), spread, sign, size)
 
 
 def lacking(needed: Sequence[str], runs: Sequence[Prepared]) -> str:
@@ -76,10 +74,10 @@ def wander(lengths: list[int], spread: float) -> Term:
     """Slow drift of a channel as a nuisance: `_WAVES` half waves over each run, together `spread` large."""
     values: list[Floats] = []
     for number, length in enumerate(lengths):
-        own = np.zeros((length, len(lengths) * _WAVES))
+        columns = np.zeros((length, len(lengths) * _WAVES))
         turns = np.outer(np.linspace(0.0, np.pi, length), np.arange(1, _WAVES + 1))
-        own[:, number * _WAVES : (number + 1) * _WAVES] = np.cos(turns)
-        values.append(own)
+        columns[:, number * _WAVES : (number + 1) * _WAVES] = np.cos(turns)
+        values.append(columns)
     return Term("wander", "", tuple(values), spread / math.sqrt(_WAVES), of_run=True)
 
 
@@ -119,7 +117,7 @@ def thinned(relation: Relation) -> Relation:
     return relation._replace(
         row_s=count * relation.row_s,
         left=tuple(mean(values) for values in relation.left),
-        pieces=tuple(tuple((-(-first // count), last // count) for first, last in own) for own in relation.pieces),
+        pieces=tuple(tuple((-(-first // count), last // count) for first, last in piece) for piece in relation.pieces),
         nuisances=fewer(relation.nuisances),
         effects=fewer(relation.effects),
         patterns=fewer(relation.patterns),

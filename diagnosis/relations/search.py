@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.relations.products import Noise, Products, weighted
+from diagnosis.relations.products import BandNoise, Products, weighted
 from diagnosis.relations.relation import Floats, Term
 
 _TRIED_TOGETHER = 40  # terms of which all pairs are tried
@@ -43,17 +43,17 @@ class Found(NamedTuple):
 NOTHING = Found((), 0.0, (), ())
 
 
-def reduced(products: Products, runs: list[int], noise: Noise, terms: tuple[Term, ...]) -> Reduced:
+def reduced(products: Products, runs: list[int], noise: BandNoise, terms: tuple[Term, ...]) -> Reduced:
     """The products over `runs` of `terms`, freed of the nuisances of the relation."""
     whole = weighted(products, runs, noise)
     places = {id(term): place for term, place in zip(products.terms, products.places, strict=True)}
-    own = np.concatenate(
+    columns = np.concatenate(
         [np.arange(places[id(term)].start, places[id(term)].stop) for term in terms] + [np.zeros(0, int)]
     )
     spreads = np.concatenate([np.full(term.values[0].shape[1], term.spread) for term in terms] + [np.ones(0)])
     nuisance = nuisance_columns(products)
     prior = np.diag(1.0 / nuisance_spreads(products) ** 2)
-    left = np.append(own, whole.shape[0] - 1)
+    left = np.append(columns, whole.shape[0] - 1)
     across = whole[nuisance[:, None], left]
     free = whole[left[:, None], left]
     if len(nuisance):
@@ -62,7 +62,7 @@ def reduced(products: Products, runs: list[int], noise: Noise, terms: tuple[Term
         free = free - across.T @ (
             scale[:, None] * np.linalg.solve(inner * np.outer(scale, scale), scale[:, None] * across)
         )
-    count = len(own)
+    count = len(columns)
     inner, towards = np.zeros((count + 1, count + 1)), np.zeros(count + 1)
     inner[:count, :count] = free[:count, :count] * np.outer(spreads, spreads)
     towards[:count] = free[:count, -1] * spreads
@@ -108,10 +108,10 @@ def evidences(data: Reduced, sets: list[tuple[int, ...]]) -> Floats:
 
 def found_of(data: Reduced, chosen: tuple[int, ...]) -> Found:
     """One set with its sizes."""
-    own = np.concatenate([np.arange(data.places[i].start, data.places[i].stop) for i in chosen])
-    inverse = np.linalg.inv(data.inner[own[:, None], own] + np.eye(len(own)))
-    size = inverse @ data.towards[own] * data.spreads[own]
-    deviation = np.sqrt(np.diag(inverse)) * data.spreads[own]
+    columns = np.concatenate([np.arange(data.places[i].start, data.places[i].stop) for i in chosen])
+    inverse = np.linalg.inv(data.inner[columns[:, None], columns] + np.eye(len(columns)))
+    size = inverse @ data.towards[columns] * data.spreads[columns]
+    deviation = np.sqrt(np.diag(inverse)) * data.spreads[columns]
     ends = np.cumsum([data.places[i].stop - data.places[i].start for i in chosen])[:-1]
     return Found(
         tuple(data.terms[i] for i in chosen),
@@ -139,8 +139,8 @@ def ranked(data: Reduced) -> Ranking:
         singles.setdefault(data.terms[i].cause, i)
     best = [found_of(data, (order[0],))]
 
-    def differ(some: tuple[int, ...]) -> bool:
-        return len({data.terms[i].cause for i in some}) == len(some)
+    def differ(subset: tuple[int, ...]) -> bool:
+        return len({data.terms[i].cause for i in subset}) == len(subset)
 
     leading = list(dict.fromkeys([*singles.values(), *order]))[:_TRIED_TOGETHER]
     pairs = [pair for pair in combinations(leading, 2) if differ(pair)]
@@ -156,22 +156,22 @@ def ranked(data: Reduced) -> Ranking:
     return Ranking(tuple(found_of(data, (i,)) for i in singles.values()), tuple(best))
 
 
-def without_each(data: Reduced, found: Found) -> tuple[float, ...]:
+def without_each(data: Reduced, chosen: Found) -> tuple[float, ...]:
     """Log evidence by which a set is worse without each of its terms."""
-    numbers = [next(i for i, term in enumerate(data.terms) if term is one) for one in found.terms]
+    numbers = [next(i for i, term in enumerate(data.terms) if term is chosen_term) for chosen_term in chosen.terms]
     lost: list[float] = []
     for number in numbers:
         others = tuple(other for other in numbers if other != number)
         without = float(evidences(data, [others])[0]) if others else 0.0
-        lost.append(found.evidence - max(without, 0.0) if math.isfinite(without) else found.evidence)
+        lost.append(chosen.evidence - max(without, 0.0) if math.isfinite(without) else chosen.evidence)
     return tuple(lost)
 
 
 def chosen_of(ranking: Ranking, cost: float) -> Found:
     """The set whose evidence pays `cost` for each cause; nothing where none does."""
     best, value = NOTHING, 0.0
-    for found in ranking.best:
-        own = found.evidence - cost * len(found.terms)
-        if own > value and math.isfinite(own):
-            best, value = found, own
+    for candidate in ranking.best:
+        evidence = candidate.evidence - cost * len(candidate.terms)
+        if evidence > value and math.isfinite(evidence):
+            best, value = candidate, evidence
     return best

@@ -71,7 +71,7 @@ def play(values: Floats, half_width: float) -> Floats:
 def free(what: str, over: Sequence[Floats], count: int) -> Term:
     """A pattern: any function of a variable, as broken lines between `count` knots; `over` is [rows of the run] each."""
     knots = knots_of(np.concatenate(over), count)
-    return Term(what, "", tuple(hats(one, knots) for one in over), math.nan)
+    return Term(what, "", tuple(hats(values, knots) for values in over), math.nan)
 
 
 def slip_phase(velocity: Floats, slip_s: float) -> Floats:
@@ -96,10 +96,10 @@ def hats(values: Floats, knots: Floats) -> Floats:
 
 def knots_of(values: Floats, count: int) -> Floats:
     """At most `count` knots, each with as much of `values` between it and the next; two knots where they hardly differ."""
-    found = np.unique(np.quantile(values, np.linspace(0.0, 1.0, count)))
+    knots = np.unique(np.quantile(values, np.linspace(0.0, 1.0, count)))
     least = 1e-9 * max(float(np.abs(values).max()), 1e-30)
-    found = found[np.concatenate(([True], np.diff(found) > least))]
-    return found if len(found) > 1 else np.array([found[0] - 1.0, found[0] + 1.0])
+    knots = knots[np.concatenate(([True], np.diff(knots) > least))]
+    return knots if len(knots) > 1 else np.array([knots[0] - 1.0, knots[0] + 1.0])
 
 
 @kernel

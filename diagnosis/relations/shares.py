@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.relations.products import (
-    Noise,
+    BandNoise,
     Products,
     band_edges_Hz,
     band_of_rows,
@@ -22,7 +22,7 @@ _DRAWS = 400  # of blocks and sizes, for an interval
 _LEVELS = (0.05, 0.95)  # ends of a 90 % interval
 
 
-class Share(NamedTuple):
+class RelationShare(NamedTuple):
     """Share of the mean square on the held-out runs that one cause explains."""
 
     cause: str
@@ -38,13 +38,15 @@ class Shares(NamedTuple):
     described: float  # rms as described, in the relation's unit
     refitted: float  # rms of the rig without effects, refitted on the other runs
     left: float  # rms with the named causes
-    causes: tuple[Share, ...]
+    causes: tuple[RelationShare, ...]
     noise: float  # share
     unexplained: float  # share
     unexplained_90: tuple[float, float]
 
 
-def shares_of(products: Products, fitted: list[int], held_out: list[int], noise: Noise, chosen: Found) -> Shares | None:
+def shares_of(
+    products: Products, fitted: list[int], held_out: list[int], noise: BandNoise, chosen: Found
+) -> Shares | None:
     """The shares, or None where no row was held out."""
     relation = products.relation
     blocks = _blocks(relation, (*relation.nuisances, *chosen.terms), held_out)
@@ -65,13 +67,13 @@ def shares_of(products: Products, fitted: list[int], held_out: list[int], noise:
         sizes = step.drawn(random, _DRAWS, len(step.size) - nuisances)
         left = np.hstack([-sizes, np.zeros((_DRAWS, width - 1 - sizes.shape[1])), np.ones((_DRAWS, 1))])
         ways.append(np.einsum("di,dij,dj->d", left, resampled, left))
-    causes: list[Share] = []
+    causes: list[RelationShare] = []
     for number, term in enumerate(chosen.terms):
         share = (ways[number] - ways[number + 1]) / ways[0]
         low, high = np.quantile(share, _LEVELS)
         null = _null(products, held_out, noise, steps[number + 1], term)
         causes.append(
-            Share(
+            RelationShare(
                 term.cause,
                 term.form,
                 (squares[number] - squares[number + 1]) / squares[0],
@@ -98,21 +100,21 @@ class _Model(NamedTuple):
         if effects == 0:
             return np.tile(self.size, (count, 1))
         covariance = self.root @ self.root.T
-        own = covariance[-effects:, -effects:]
-        moved = random.standard_normal((count, effects)) @ np.linalg.cholesky(own).T
-        return self.size + moved @ np.linalg.solve(own, covariance[-effects:])
+        block = covariance[-effects:, -effects:]
+        moved = random.standard_normal((count, effects)) @ np.linalg.cholesky(block).T
+        return self.size + moved @ np.linalg.solve(block, covariance[-effects:])
 
 
 def model_columns(products: Products, terms: tuple[Term, ...]) -> tuple[np.ndarray, Floats]:
     """Indices and spreads of the columns of the nuisances and of `terms`."""
     places = {id(term): place for term, place in zip(products.terms, products.places, strict=True)}
-    own = (*products.relation.nuisances, *terms)
-    columns = [np.arange(places[id(term)].start, places[id(term)].stop) for term in own]
-    spreads = [np.full(len(column), term.spread) for term, column in zip(own, columns, strict=True)]
+    all_terms = (*products.relation.nuisances, *terms)
+    columns = [np.arange(places[id(term)].start, places[id(term)].stop) for term in all_terms]
+    spreads = [np.full(len(column), term.spread) for term, column in zip(all_terms, columns, strict=True)]
     return np.concatenate([*columns, np.zeros(0, int)]).astype(int), np.concatenate([*spreads, np.zeros(0)])
 
 
-def _model(products: Products, runs: list[int], noise: Noise, terms: tuple[Term, ...]) -> _Model:
+def _model(products: Products, runs: list[int], noise: BandNoise, terms: tuple[Term, ...]) -> _Model:
     columns, spreads = model_columns(products, terms)
     if len(columns) == 0:
         return _Model(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)))
@@ -124,7 +126,7 @@ def _model(products: Products, runs: list[int], noise: Noise, terms: tuple[Term,
     return _Model(size * spreads, spreads[:, None] * vectors / np.sqrt(values), spreads[:, None] * vectors * chance)
 
 
-def sizes_of(products: Products, runs: list[int], noise: Noise, terms: tuple[Term, ...]) -> tuple[Floats, Floats]:
+def sizes_of(products: Products, runs: list[int], noise: BandNoise, terms: tuple[Term, ...]) -> tuple[Floats, Floats]:
     """Coefficients of the nuisances and of `terms`, and their standard deviations, fitted to `runs`."""
     model = _model(products, runs, noise, terms)
     return model.size, np.sqrt((model.root**2).sum(axis=1))
@@ -134,23 +136,23 @@ def _blocks(relation: Relation, terms: tuple[Term, ...], runs: list[int]) -> Flo
     """Inner products of the columns and what is left, for each block of 0.5 s, [blocks, columns + 1, columns + 1]."""
     edges = band_edges_Hz(relation)
     length = max(round(_BLOCK_S / relation.row_s), 2)
-    own = np.concatenate([np.full(term.values[0].shape[1], term.of_run) for term in terms] + [np.zeros(1, np.bool_)])
-    found: list[Floats] = []
+    mask = np.concatenate([np.full(term.values[0].shape[1], term.of_run) for term in terms] + [np.zeros(1, np.bool_)])
+    blocks: list[Floats] = []
     for run in runs:
         for piece in relation.pieces[run]:
             band = band_of_rows(relation, piece[1] - piece[0], edges)
             turned = turned_piece(relation, terms, run, piece, len(band)) * (band >= 0)[:, None]
-            turned = _without_own(turned, own)
+            turned = _without_own(turned, mask)
             rows = turned_back(turned, piece[1] - piece[0])
             cuts = np.arange(0, len(rows), length)
             cuts = cuts[:-1] if len(cuts) > 1 and len(rows) - cuts[-1] < length // 2 else cuts
-            found += [block.T @ block for block in np.split(rows, cuts[1:])]
-    return np.array(found)
+            blocks += [block.T @ block for block in np.split(rows, cuts[1:])]
+    return np.array(blocks)
 
 
-def _without_own(turned: Floats, own: np.ndarray) -> Floats:
+def _without_own(turned: Floats, mask: np.ndarray) -> Floats:
     """All columns less what the run's own columns take of them: the other runs do not tell their coefficients."""
-    basis = turned[:, own]
+    basis = turned[:, mask]
     basis = basis[:, np.abs(basis).max(axis=0, initial=0.0) > 0.0]
     if basis.shape[1] == 0:
         return turned
@@ -168,12 +170,12 @@ def _square(inner: Floats, size: Floats) -> float:
     return float(with_left @ inner @ with_left)
 
 
-def _null(products: Products, held_out: list[int], noise: Noise, model: _Model, term: Term) -> float:
+def _null(products: Products, held_out: list[int], noise: BandNoise, model: _Model, term: Term) -> float:
     """Share that noise alone gives a cause in 9 of 10 draws; never below 0."""
     columns, _ = model_columns(products, (term,))
-    own = columns[len(columns) - term.values[0].shape[1] :]
-    inner = products.values[held_out].sum(axis=0)[:, own][:, :, own]
-    root = model.chance[len(model.size) - len(own) :]
+    columns_of_term = columns[len(columns) - term.values[0].shape[1] :]
+    inner = products.values[held_out].sum(axis=0)[:, columns_of_term][:, :, columns_of_term]
+    root = model.chance[len(model.size) - len(columns_of_term) :]
     random = np.random.default_rng(2)
     size = random.standard_normal((_DRAWS, root.shape[1])) @ root.T
     plain = inner.sum(axis=0)

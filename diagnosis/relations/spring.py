@@ -25,7 +25,7 @@ def spring_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
     """The relation in N, with its columns; `Missing` where a run lacks a channel."""
     stiffness = rig.drive_stiffness_N_per_m
     if stiffness is None:
-        return Missing("spring", 'drive = "force": there is no drive spring')
+        return Missing("spring", 'drive = "force": the rig has no drive spring')
     if why := lacking(NEEDED, runs):
         return Missing("spring", why)
     damping = rig.drive_damping_Ns_per_m or 0.0
@@ -37,7 +37,7 @@ def spring_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
     extension = [e + zero_m for e in extension]
     left = tuple(f - stiffness * e - damping * rate(e) for f, e in zip(force, extension, strict=True))
     near = [near_slips(x) for x in slide]
-    drive, slide = ([calmed(p, w) for p, w in zip(some, near, strict=True)] for some in (drive, slide))
+    drive, slide = ([calmed(p, w) for p, w in zip(positions, near, strict=True)] for positions in (drive, slide))
     extension = [s - x + zero_m for s, x in zip(drive, slide, strict=True)]
     rates = [rate(e) for e in extension]
     middle_m = float(np.mean([s.mean() for s in drive]))
@@ -47,7 +47,7 @@ def spring_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
         term("drive_stiffness_N_per_m", "", extension, known * stiffness),
         term("delay", "", [-stiffness * v for v in rates], _DELAY_S),
         term("bend", "", [stiffness * bend(e) for e in extension], _BEND_S2),
-        wander([len(one) for one in left], _WANDER * rig.static_force_N),
+        wander([len(values) for values in left], _WANDER * rig.static_force_N),
     ]
     if damping > 0.0 and (tolerance := rig.tolerance.get("drive_damping_Ns_per_m", 0.0)) > 0.0:
         nuisances.append(term("drive_damping_Ns_per_m", "", rates, tolerance * damping))
@@ -58,7 +58,7 @@ def spring_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
     most_N = max(float(np.abs(f).max()) for f in force)
     return Relation(
         name="spring", unit="N", row_s=BLOCK_S, highest_Hz=_HIGHEST_HZ, left=left,
-        pieces=tuple(((END_BLOCKS, len(one) - END_BLOCKS),) for one in left),
+        pieces=tuple(((END_BLOCKS, len(values) - END_BLOCKS),) for values in left),
         nuisances=tuple(nuisances),
         effects=tuple(spring_effects(stiffness, extension, rates, runs, most_N)),
         patterns=tuple(_patterns(rig, extension, rates, drive)),

@@ -50,7 +50,7 @@ def spring_effects(
 
 def _late(pull: Sequence[Floats]) -> list[Term]:
     """A force that comes late: dead time, or one to three equal low-passes. The coefficient is the delay in s."""
-    found = [
+    terms = [
         term(
             "force-sensor-delay",
             f"{1e3 * time_s:g} ms",
@@ -64,8 +64,8 @@ def _late(pull: Sequence[Floats]) -> list[Term]:
     for order in (1, 2, 3):
         for time_s in _LAGS_S:
             late = [(_slow(p, order, time_s) - p) / time_s for p in pull]
-            found.append(term("force-sensor-lag", f"order {order}, {1e3 * time_s:g} ms", late, 3e-3, 1, "lag_s"))
-    return found
+            terms.append(term("force-sensor-lag", f"order {order}, {1e3 * time_s:g} ms", late, 3e-3, 1, "lag_s"))
+    return terms
 
 
 def _slow(values: Floats, order: int, time_s: float) -> Floats:
@@ -85,21 +85,21 @@ def _clocks(stiffness: float, rates: Sequence[Floats]) -> list[Term]:
 
 def _bent(pull: Sequence[Floats], most_N: float) -> list[Term]:
     """A spring that gets stiffer, or an amplifier that shows less above a knee. The coefficient is relative."""
-    found = [term("drive-hardening", "cubic", [p * (p / most_N) ** 2 for p in pull], 0.2, 0, "ratio")]
+    terms = [term("drive-hardening", "cubic", [p * (p / most_N) ** 2 for p in pull], 0.2, 0, "ratio")]
     for width in (0.5, 1.0):
         shape = [p * np.expm1(np.abs(p) / (width * most_N)) / math.expm1(1.0 / width) for p in pull]
-        found.append(term("drive-hardening", f"exponential {width:g}", shape, 0.2, 1, "ratio"))
+        terms.append(term("drive-hardening", f"exponential {width:g}", shape, 0.2, 1, "ratio"))
     for share in _KNEES:
         over = [np.sign(p) * np.maximum(np.abs(p) - share * most_N, 0.0) for p in pull]
-        found.append(term("drive-hardening", f"from {share * most_N:.3g} N", over, 0.3, 1, "ratio"))
-        found.append(term("force-amplifier", f"from {share * most_N:.3g} N", over, 0.3, -1, "ratio"))
-    return found
+        terms.append(term("drive-hardening", f"from {share * most_N:.3g} N", over, 0.3, 1, "ratio"))
+        terms.append(term("force-amplifier", f"from {share * most_N:.3g} N", over, 0.3, -1, "ratio"))
+    return terms
 
 
 def _held(stiffness: float, extension: Sequence[Floats], most_N: float) -> list[Term]:
     """What holds on to the extension: a gap around no force, a clamp that slips beyond a yield."""
     pull = [stiffness * e for e in extension]
-    found = [
+    terms = [
         term(
             "drive-backlash",
             f"over {share * most_N:.2g} N",
@@ -112,23 +112,23 @@ def _held(stiffness: float, extension: Sequence[Floats], most_N: float) -> list[
     ]
     for share in _YIELDS:
         slider = [-stiffness * play(e, share * most_N / stiffness) for e in extension]
-        found.append(term("loose-clamp", f"yields at {share * most_N:.2g} N", slider, 0.2, 1, "share"))
-    return found
+        terms.append(term("loose-clamp", f"yields at {share * most_N:.2g} N", slider, 0.2, 1, "share"))
+    return terms
 
 
 def _drifting(runs: Sequence[Prepared], most_N: float) -> list[Term]:
     """A zero of the force sensor that moves, anew in each run or on and on. The coefficient is in N."""
-    own = [(np.arange(len(run.commands.drive)) + 0.5) * BLOCK_S for run in runs]
-    whole = [t + run.before_s for t, run in zip(own, runs, strict=True)]
+    times_s = [(np.arange(len(run.commands.drive)) + 0.5) * BLOCK_S for run in runs]
+    whole = [t + run.before_s for t, run in zip(times_s, runs, strict=True)]
     total_s = max(float(t[-1]) for t in whole)
-    longest_s = max(float(t[-1]) for t in own)
-    found: list[Term] = []
-    for name, times, length_s in (("in each run", own, longest_s), ("since the first run", whole, total_s)):
+    longest_s = max(float(t[-1]) for t in times_s)
+    terms: list[Term] = []
+    for name, times, length_s in (("in each run", times_s, longest_s), ("since the first run", whole, total_s)):
         spread = 0.1 * most_N
-        found.append(term("force-sensor-drift", f"linear {name}", [t / length_s for t in times], spread, 0, "drift_N"))
-        for time_s in _SETTLING_S if times is own else (0.3 * total_s, total_s):
+        terms.append(term("force-sensor-drift", f"linear {name}", [t / length_s for t in times], spread, 0, "drift_N"))
+        for time_s in _SETTLING_S if times is times_s else (0.3 * total_s, total_s):
             settled = [-np.expm1(-t / time_s) for t in times]
-            found.append(
+            terms.append(
                 term("force-sensor-drift", f"settling in {time_s:.3g} s {name}", settled, spread, 0, "drift_N")
             )
-    return found
+    return terms

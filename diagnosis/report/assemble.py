@@ -3,11 +3,11 @@
 import math
 import time
 from collections.abc import Callable, Iterator
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.log.finding import Finding
 from diagnosis.evidence.folder import Evidence
 from diagnosis.experiments.checks_by_hand import SINE, UNCOUPLE
@@ -29,15 +29,14 @@ from diagnosis.report.without_fits import LONGER
 from diagnosis.result import PARAMETERS, Candidate, Cell, Diagnosis, Estimate, Experiment, Gap, Shrinkage
 from diagnosis.verdict.blend import flexible_differences
 from diagnosis.verdict.confirmation import Confirmation
-from diagnosis.verdict.held_out import Closed, HeldOut
+from diagnosis.verdict.held_out import GapLeft, HeldOut
 from diagnosis.verdict.judge import Verdict, refittable
 from diagnosis.verdict.lookalikes import imitators
 from diagnosis.verdict.selection import Contest
 
-Floats = npt.NDArray[np.floating[Any]]
 R = TypeVar("R")
-# Share of a run that may pass while speed or vibration change before a finding says so. Too small: the ramps of a drive and a
-# piezo raise it. Too large: a run is hardly compared and nothing tells.
+# Share of a run in which speed or vibration may change without a finding. Smaller: the ramps of a drive and a piezo raise the
+# finding. Larger: most of a run is left out of the comparison without a finding.
 _MUCH_CHANGING = 0.2
 
 
@@ -87,7 +86,7 @@ def assembled(
     )
     named = nuisances.point(best.deviations, best.effects) if verdict.named else None
     effects = verdict.names
-    followed = [one for one in verdict.ranked if not is_random(one.fit.hypothesis)]
+    followed = [ranked for ranked in verdict.ranked if not is_random(ranked.fit.hypothesis)]
     alike = _in_time(lambda: imitators(fitter, followed, verdict.scale), ()) if refittable(verdict) else ()
     leaders = [fit for fit in (verdict.named or baseline, verdict.runner_up) if fit is not None]
     if verdict.outside:
@@ -118,7 +117,7 @@ def assembled(
 
 
 def _in_time(work: Callable[[], R], otherwise: R) -> R:
-    """What the work makes; `otherwise` where the time that a person allows is over."""
+    """The result of `work`; `otherwise` when the time budget is used up."""
     try:
         return work()
     except OutOfTimeError:
@@ -161,7 +160,7 @@ def _judged(contest: Contest, outcome: Confirmation, held_out: HeldOut, tried: l
 
 
 def _changing(runs: list[Prepared]) -> Iterator[Finding]:
-    """A finding for every run that is hardly compared because speed or vibration change all the time."""
+    """A finding for every run of which too little is compared because speed or vibration keep changing."""
     for run in runs:
         seconds, length_s = run.commands.changing_s, len(run.commands.drive) * BLOCK_S
         if seconds > _MUCH_CHANGING * length_s:
@@ -169,7 +168,7 @@ def _changing(runs: list[Prepared]) -> Iterator[Finding]:
             yield Finding("changing", f"{run.file}: commands", f"{text}; hold each one longer")
 
 
-def _shrinkage(who: str, closed: Closed) -> Shrinkage:
+def _shrinkage(who: str, closed: GapLeft) -> Shrinkage:
     return Shrinkage(who, closed.gap, closed.shrinkage, closed.interval_90)
 
 
@@ -192,19 +191,23 @@ def _cells(floor: Floor, z: Floats) -> list[Cell]:
 
 def _vibrating(evidence: Evidence) -> list[Cell]:
     """Cells for vibrations that no model makes: sizes in ordinary vibrations, where other cells count in floors."""
-    found = [
-        (signal, run.file, one)
+    vibrations = [
+        (signal, run.file, vibration)
         for run in evidence.runs
-        for signal, one in (("drive_force_N", run.pick_up), ("base_accel_mps2", run.distortion))
+        for signal, vibration in (("drive_force_N", run.pick_up), ("base_accel_mps2", run.distortion))
     ]
-    return [Cell(signal, "steady", one.band_Hz, file, one.limits**2 - 1.0) for signal, file, one in found if one]
+    return [
+        Cell(signal, "steady", vibration.band_Hz, file, vibration.limits**2 - 1.0)
+        for signal, file, vibration in vibrations
+        if vibration
+    ]
 
 
 def _candidate(name: str, probability: float, fit: Fit | None) -> Candidate:
     if fit is None:
         return Candidate(name, probability)
-    own = len(fit.deviations)
-    deviation = np.sqrt(np.diag(fit.covariance()))[own:]
+    nuisances = len(fit.deviations)
+    deviation = np.sqrt(np.diag(fit.covariance()))[nuisances:]
     parameters = {
         coordinate.name: estimate_of(coordinate, float(w), float(spread))
         for coordinate, w, spread in zip(fit.hypothesis.coordinates, fit.w, deviation, strict=True)

@@ -1,4 +1,4 @@
-"""The latent friction's part of an answer: shares, sizes, and what these runs cannot tell apart."""
+"""The latent friction's part of an answer: shares, sizes, and causes that these runs cannot separate."""
 
 from collections.abc import Sequence
 
@@ -12,53 +12,59 @@ from diagnosis.result import Diagnosis, RelationRow, Remainder, Share
 from diagnosis.verdict.by_latent import MOST
 from plant.effects.library import EFFECTS
 
-_TOLD = 0.02  # share from which a process is told
-_UNTIL_TOLD = 3  # processes in a sentence
+_LEAST_SHARE = 0.02  # share from which a process is reported
+_MOST_IN_SENTENCE = 3  # processes in a sentence
 
 
 def latent_shares(latent: Sequence[LatentSignal]) -> tuple[Share, ...]:
     """The shares of every signal as the contract has them."""
     return tuple(
-        Share(one.signal, share.what, share.share, None if share.what == NOISE else share.interval_90, share.null_90)
-        for one in latent
-        for share in one.shares
-        if share.share > _TOLD or share.what in (SCATTER, NOISE)
+        Share(signal.signal, share.what, share.share, None if share.what == NOISE else share.interval_90, share.null_90)
+        for signal in latent
+        for share in signal.shares
+        if share.share > _LEAST_SHARE or share.what in (SCATTER, NOISE)
     )
 
 
 def latent_rows(latent: Sequence[LatentSignal]) -> tuple[RelationRow, ...]:
-    """What differs in every signal, beside its noise."""
+    """Sizes of the difference and the noise in every signal."""
     return tuple(
-        RelationRow(one.signal, "N", one.described, one.differs, one.left, one.noise, _causes(one)) for one in latent
+        RelationRow(signal.signal, "N", signal.described, signal.differs, signal.left, signal.noise, _causes(signal))
+        for signal in latent
     )
 
 
 def latent_remainder(latent: Sequence[LatentSignal]) -> Remainder | None:
-    """What scatters most and goes with nothing."""
+    """The largest scatter that follows no variable."""
     if not latent:
         return None
-    worst = max(latent, key=lambda one: one.left)
+    worst = max(latent, key=lambda signal: signal.left)
     share = sum(share.share for share in worst.shares if share.what == SCATTER)
     return Remainder(share, worst.signal, "", worst.left, worst.noise, "N")
 
 
 def latent_findings(latent: Sequence[LatentSignal]) -> tuple[Finding, ...]:
-    """Signals in which what goes with place may go with time as well."""
-    text = "no place is passed twice at another time, so what goes with place may go with time"
-    return tuple(Finding("one-pass", one.signal, text) for one in latent if not one.revisited)
+    """Signals in which a dependence on place cannot be separated from a dependence on time."""
+    text = "no place is passed twice, so a dependence on place cannot be separated from one on time"
+    return tuple(Finding("one-pass", signal.signal, text) for signal in latent if not signal.revisited)
 
 
 def latent_line(latent: Sequence[LatentSignal]) -> str:
-    """The largest share that is surely more than chance, for a person who waits; empty where there is none."""
-    found = [(share.share, one.signal, share) for one in latent for share in one.shares if share.what in _causes(one)]
-    if not found:
+    """The largest share whose interval exceeds chance, as a progress message; empty without such a share."""
+    candidates = [
+        (share.share, latent_signal.signal, share)
+        for latent_signal in latent
+        for share in latent_signal.shares
+        if share.what in _causes(latent_signal)
+    ]
+    if not candidates:
         return ""
-    _, signal, share = max(found, key=lambda one: one[0])
+    _, signal, share = max(candidates, key=lambda candidate: candidate[0])
     return f"{signal}: {share_in_words(Share(signal, share.what, share.share, share.interval_90, share.null_90))}"
 
 
 def mostly(diagnosis: Diagnosis) -> Share | None:
-    """What most of a signal goes with, surely, where no name of the verdict says so; None where nothing does."""
+    """A cause outside the verdict that explains most of a signal, with an interval above chance; None without such a cause."""
     sure = [
         share
         for share in diagnosis.shares
@@ -71,27 +77,27 @@ def mostly(diagnosis: Diagnosis) -> Share | None:
 
 
 def latent_answer(diagnosis: Diagnosis) -> str:
-    """The same as a sentence; empty where nothing does."""
+    """The share of `mostly` as a sentence; empty where it is None."""
     top = mostly(diagnosis)
     if top is None:
         return ""
-    why = "is not sure enough to be named" if top.what in EFFECTS else "is none that the library can refit"
-    return f"For the most part the {top.signal} goes with {share_in_words(top)}; that {why}."
+    why = "it is not certain enough to be named" if top.what in EFFECTS else "the library has no effect for it"
+    return f"Largest cause in the {top.signal}: {share_in_words(top)}; {why}."
 
 
 def latent_sentences(diagnosis: Diagnosis, kept: str) -> list[str]:
-    """One sentence a signal: how much differs, and what explains how much of it."""
+    """One sentence per signal: the size of the difference, and the share that each cause explains."""
     sentences: list[str] = []
     for row in diagnosis.relations:
         if row.relation not in (BREAKAWAY, SLIDING):
             continue
-        own = [share for share in diagnosis.shares if share.signal == row.relation and share.what != NOISE]
-        more = sorted((share for share in own if share.what in row.causes), key=lambda share: -share.share)
-        told = "; ".join(share_in_words(one) for one in more[:_UNTIL_TOLD])
-        of = f"Of the {quantity(row.refitted, row.unit)} that differ in the {row.relation}{kept}"
-        sentences.append(f"{of}: {told}." if told else f"{of}, nothing surely explains more than chance would.")
+        shares = [share for share in diagnosis.shares if share.signal == row.relation and share.what in row.causes]
+        largest = sorted((share for share in shares if share.what != NOISE), key=lambda share: -share.share)
+        listed = "; ".join(share_in_words(share) for share in largest[:_MOST_IN_SENTENCE])
+        off = f"The {row.relation}{kept} is off by {quantity(row.refitted, row.unit)} rms"
+        sentences.append(f"{off}: {listed}." if listed else f"{off}; no cause explains it better than chance.")
     return sentences
 
 
-def _causes(one: LatentSignal) -> tuple[str, ...]:
-    return tuple(share.what for share in one.shares if share.beyond_chance)
+def _causes(signal: LatentSignal) -> tuple[str, ...]:
+    return tuple(share.what for share in signal.shares if share.beyond_chance)

@@ -82,7 +82,7 @@ def report_page(diagnosis: Diagnosis, evidence_name: str, footer: str = "") -> s
         "sd": lambda shift: f"{shift:+.1f}",
     }
     template = Path(__file__).with_name("page.html.j2").read_text(encoding="utf-8")
-    shown = [one for one in diagnosis.candidates if not one.probability < _SMALL_PROBABILITY]
+    shown = [candidate for candidate in diagnosis.candidates if not candidate.probability < _SMALL_PROBABILITY]
     runs, rows, left_out = where_map(diagnosis.where)
     return environment.from_string(template).render(
         diagnosis=diagnosis,
@@ -91,7 +91,7 @@ def report_page(diagnosis: Diagnosis, evidence_name: str, footer: str = "") -> s
         banner=_BANNERS[diagnosis.verdict],
         answer=words.answer(diagnosis),
         shown=shown,
-        hidden=[one.effect for one in diagnosis.candidates if one.probability < _SMALL_PROBABILITY],
+        hidden=[candidate.effect for candidate in diagnosis.candidates if candidate.probability < _SMALL_PROBABILITY],
         estimates=_estimates,
         meaning=_meaning,
         gap_bars=gap_bars(diagnosis.gap, bool(diagnosis.effects)),

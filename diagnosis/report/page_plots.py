@@ -38,7 +38,7 @@ def draw(pictures: tuple[Picture, ...]) -> list[Drawn]:
     dpi = _DPI
     while True:
         drawn = [Drawn(picture.title, picture.kind, _png(_figure(picture), dpi)) for picture in pictures]
-        size = sum(len(one.png) for one in drawn)
+        size = sum(len(picture.png) for picture in drawn)
         if size <= _ALL_BYTES:
             return drawn
         # The size falls a little slower than the number of pixels, so 0.8 keeps the number of rounds small.

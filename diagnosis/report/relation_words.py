@@ -5,26 +5,26 @@ from diagnosis.result import Diagnosis, RelationNumber, RelationRow, Remainder, 
 
 
 def relation_lines(diagnosis: Diagnosis) -> list[str]:
-    """Lines for a person: every relation with its sizes and shares, what is left out, the refitted numbers."""
+    """Lines of the summary: every relation with its sizes and shares, omitted relations, the largest remainder."""
     lines: list[str] = []
     for row in diagnosis.relations:
         lines.append(sizes_in_words(row))
-        lines += [f"  {share_in_words(one)}" for one in diagnosis.shares if one.signal == row.relation]
-    lines += [f"{one.relation}: left out: {one.why}" for one in diagnosis.left_out]
+        lines += [f"  {share_in_words(share)}" for share in diagnosis.shares if share.signal == row.relation]
+    lines += [f"{omitted.relation}: left out: {omitted.why}" for omitted in diagnosis.left_out]
     if diagnosis.remainder is not None:
         lines.append(remainder_in_words(diagnosis.remainder))
     return lines
 
 
 def number_lines(diagnosis: Diagnosis) -> list[str]:
-    """Every number that a relation or the baseline refits, beside the described one."""
-    lines = [number_in_words(one) for one in diagnosis.numbers]
-    lines += [rig_number_in_words(one) for one in diagnosis.rig if one.described and one.tolerance]
+    """Every number that a relation or the baseline refits, next to the described number."""
+    lines = [number_in_words(number) for number in diagnosis.numbers]
+    lines += [rig_number_in_words(number) for number in diagnosis.rig if number.described and number.tolerance]
     return lines
 
 
 def sizes_in_words(row: RelationRow) -> str:
-    """What a relation leaves as described, refitted and with its causes, beside its noise."""
+    """Residuals of a relation as described, refitted and with its causes, and its noise."""
     described, refitted, left, noise = (
         _size(size, row.unit) for size in (row.described, row.refitted, row.left, row.noise)
     )
@@ -33,13 +33,13 @@ def sizes_in_words(row: RelationRow) -> str:
 
 
 def _size(size: float, unit: str) -> str:
-    """A size with a prefix of its own, three digits: one prefix for all of a line would write newtons as 1.93e+03 mN."""
+    """A size with its best prefix, three digits: a common prefix for a whole line would write newtons as 1.93e+03 mN."""
     factor, shown = prefixed(size, unit)
     return f"{size * factor:.3g} {shown}".rstrip()
 
 
 def share_in_words(share: Share) -> str:
-    """One share with its interval, and what chance would show."""
+    """One share with its interval, and the share that chance alone reaches."""
     text = f"{share.what} {_percent(share.share)}"
     if known := _between(share.interval_90):
         text += f" (90 %: {known})"
@@ -55,7 +55,7 @@ def _percent(share: float) -> str:
 
 
 def remainder_in_words(remainder: Remainder) -> str:
-    """What is left and where."""
+    """The size and the relation of the remainder."""
     size, noise = _size(remainder.size, remainder.unit), _size(remainder.noise, remainder.unit)
     if not remainder.what:
         return f"largest remainder: {size} in the {remainder.where}, where noise is {noise}: no pattern"

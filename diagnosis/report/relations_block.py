@@ -1,4 +1,4 @@
-"""The relations' part of an answer: shares of what differs, the remainder, refitted numbers, one picture."""
+"""The relations' part of an answer: shares of the difference, the remainder, refitted numbers, one picture."""
 
 from collections.abc import Sequence
 
@@ -36,24 +36,30 @@ def with_relations(
     latent: Sequence[LatentSignal],
 ) -> Diagnosis:
     """The diagnosis with shares, remainder, numbers and picture of relations and latent friction, and with its sentences."""
-    found = done._replace(
-        shares=(*(share for one in relations.answered for share in _shares(one)), *latent_shares(latent)),
+    complete = done._replace(
+        shares=(*(share for answered in relations.answered for share in _shares(answered)), *latent_shares(latent)),
         remainder=_remainder(relations, decision) or latent_remainder(latent),
         relations=(
             *(
                 RelationRow(
-                    signal_of(one.name), one.unit, one.described, one.refitted, one.left, one.noise, one.chosen.causes
+                    signal_of(answered.name),
+                    answered.unit,
+                    answered.described,
+                    answered.refitted,
+                    answered.left,
+                    answered.noise,
+                    answered.chosen.causes,
                 )
-                for one in relations.answered
+                for answered in relations.answered
             ),
             *latent_rows(latent),
         ),
         findings=(*done.findings, *latent_findings(latent)),
-        left_out=tuple(LeftOut(signal_of(one.name), one.why) for one in relations.missing),
-        numbers=tuple(number for one in relations.answered for number in _numbers(one, rig)),
+        left_out=tuple(LeftOut(signal_of(missing.name), missing.why) for missing in relations.missing),
+        numbers=tuple(number for answered in relations.answered for number in _numbers(answered, rig)),
         pictures=(*_pictures(relations, runs), *done.pictures),
     )
-    return found._replace(summary=summary(found))
+    return complete._replace(summary=summary(complete))
 
 
 def signal_of(relation: str) -> str:
@@ -62,7 +68,7 @@ def signal_of(relation: str) -> str:
 
 
 def in_a_line(decision: Decision) -> str:
-    """What the relations decide, for a person who waits; empty where they decide nothing."""
+    """The decision of the relations as a progress message; empty without a decision."""
     if decision.outside:
         first = decision.outside[0]
         return f"{signal_of(first.relation)}: {first.what}, which nothing in the library makes"
@@ -72,21 +78,23 @@ def in_a_line(decision: Decision) -> str:
     return ""
 
 
-def _shares(one: Answered) -> list[Share]:
-    if one.shares is None:
+def _shares(answered: Answered) -> list[Share]:
+    if answered.shares is None:
         return []
-    signal = signal_of(one.name)
-    found = [Share(signal, cause.cause, cause.share, cause.interval_90, cause.null_90) for cause in one.shares.causes]
+    signal = signal_of(answered.name)
+    shares = [
+        Share(signal, cause.cause, cause.share, cause.interval_90, cause.null_90) for cause in answered.shares.causes
+    ]
     return [
-        *found,
-        Share(signal, "noise", one.shares.noise, None, None),
-        Share(signal, "unexplained", one.shares.unexplained, one.shares.unexplained_90, None),
+        *shares,
+        Share(signal, "noise", answered.shares.noise, None, None),
+        Share(signal, "unexplained", answered.shares.unexplained, answered.shares.unexplained_90, None),
     ]
 
 
 def _remainder(relations: Relations, decision: Decision) -> Remainder | None:
     """The unexplained pattern with the most evidence, or the relation with the largest unexplained share."""
-    by_name = {one.name: one for one in relations.answered}
+    by_name = {answered.name: answered for answered in relations.answered}
     if decision.outside:
         first = decision.outside[0]
         shares = by_name[first.relation].shares
@@ -94,38 +102,40 @@ def _remainder(relations: Relations, decision: Decision) -> Remainder | None:
         return Remainder(share, signal_of(first.relation), first.what, first.size, first.noise, first.unit)
     if not by_name:
         return None
-    worst = max(relations.answered, key=lambda one: one.left / one.noise)
+    worst = max(relations.answered, key=lambda answered: answered.left / answered.noise)
     size = float(np.sqrt(max(worst.left**2 - worst.noise**2, 0.0)))
     share = None if worst.shares is None else worst.shares.unexplained
     return Remainder(share, signal_of(worst.name), "", size, worst.noise, worst.unit)
 
 
-def _numbers(one: Answered, rig: RigTable) -> list[RelationNumber]:
+def _numbers(answered: Answered, rig: RigTable) -> list[RelationNumber]:
     known = rig.values()
     extra = {"drive-stiffness": "drive_stiffness_N_per_m", "drive-damping": "drive_damping_Ns_per_m"}
     moved: dict[str, tuple[float, float]] = {}
-    for name, size, deviation in one.nuisances:
+    for name, size, deviation in answered.nuisances:
         if name in known:
             moved[name] = (size, deviation)
-    for term, sizes, deviations in zip(one.chosen.terms, one.chosen.sizes, one.chosen.deviations, strict=True):
+    for term, sizes, deviations in zip(
+        answered.chosen.terms, answered.chosen.sizes, answered.chosen.deviations, strict=True
+    ):
         name = extra.get(term.cause)
         if name is not None:
             before = moved.get(name, (0.0, 0.0))
             moved[name] = (before[0] + float(sizes[0]), float(np.hypot(before[1], deviations[0])))
-    found: list[RelationNumber] = []
+    numbers: list[RelationNumber] = []
     for name, (size, deviation) in moved.items():
         described = known[name] or 0.0
         half = _TWO_SIDED_90 * deviation
         value = described + size
-        found.append(RelationNumber(name, signal_of(one.name), described, value, (value - half, value + half)))
-    return found
+        numbers.append(RelationNumber(name, signal_of(answered.name), described, value, (value - half, value + half)))
+    return numbers
 
 
 def _pictures(relations: Relations, runs: list[Prepared]) -> list[Picture]:
     """The relation that leaves most above its noise, with and without its causes, over time."""
     if not relations.answered:
         return []
-    worst = max(relations.answered, key=lambda one: one.refitted / one.noise)
+    worst = max(relations.answered, key=lambda answered: answered.refitted / answered.noise)
     trace = worst.trace
     thin = slice(None, None, max(len(trace.t_s) // _POINTS, 1))
     curves = [Curve("rig without effects, refitted", trace.t_s[thin], trace.without[thin], "retuned")]
@@ -134,5 +144,5 @@ def _pictures(relations: Relations, runs: list[Prepared]) -> list[Picture]:
         curves.append(Curve(label, trace.t_s[thin], trace.with_causes[thin], "effect"))
     run = runs[trace.run].file.rsplit(".", 1)[0]
     unit = f" / {worst.unit}" if worst.unit else ""
-    title = f"What the {signal_of(worst.name)} leaves in {run}"
+    title = f"Residual of the {signal_of(worst.name)} in {run}"
     return [Picture("residual", title, "time / s", f"left{unit}", tuple(curves))]

@@ -40,8 +40,8 @@ def write_rig(diagnosis: Diagnosis, evidence: Evidence, path: Path) -> None:
     if diagnosis.verdict in ("unexplained", "partly"):
         raise Fault(
             "CONFIG",
-            f"{name}: the verdict is {diagnosis.verdict}: there is no effect to apply; measure what the diagnosis suggests "
-            "next, and diagnose again",
+            f"{name}: the verdict is {diagnosis.verdict}: there is no effect to apply; measure the next run that the diagnosis "
+            "suggests, and diagnose again",
         )
     table = rig_table(diagnosis, evidence)
     validate(RigConfig, table, f"the rig diagnosed from {name}")
@@ -54,7 +54,7 @@ def refuse_force_drive(evidence: Evidence) -> None:
     if evidence.rig.drive == "force":
         raise Fault(
             "CONFIG",
-            f'{name}: rig.drive = "force": no rig file can say that, the stand-in rig pulls through a spring; use the '
+            f'{name}: rig.drive = "force": a rig file cannot describe it, the stand-in rig pulls through a spring; use the '
             "parameters in the JSON of the diagnosis",
         )
 
@@ -71,7 +71,7 @@ def rig_table(diagnosis: Diagnosis, evidence: Evidence) -> dict[str, Any]:
             table.setdefault(part, {})[key] = values[name]
     effects: dict[str, dict[str, float | str]] = {}
     for name in diagnosis.effects:
-        candidate = next(one for one in diagnosis.candidates if one.effect == name)
+        candidate = next(candidate for candidate in diagnosis.candidates if candidate.effect == name)
         effects[name] = {"form": candidate.form} if candidate.form else {}
         effects[name] |= as_in_rig_file({key: estimate.value for key, estimate in candidate.parameters.items()})
     return table | {"effects": effects} if effects else table
@@ -88,8 +88,8 @@ def _comment(diagnosis: Diagnosis, evidence: Evidence) -> str:
         lines.append(
             f"Gap on held-out runs, in noise floors: {gap.nominal:.3g} as described, {gap.with_effect:.3g} so."
         )
-    lines += [f"The runs cannot tell apart: {', '.join(group)}." for group in diagnosis.not_distinguishable]
-    lines.append("What is left out is the paper's rig: piezo, sensors and drive profile.")
+    lines += [f"The runs cannot separate: {', '.join(group)}." for group in diagnosis.not_distinguishable]
+    lines.append("Piezo, sensors and drive profile are not given here: they keep the values of the paper's rig.")
     first = f"{RIG_BEGINS}from the evidence {_word(evidence.folder.name)}.\n"
     return first + "".join(f"# {line}\n" for line in lines)
 

@@ -13,18 +13,18 @@ from diagnosis.result import Diagnosis
 from diagnosis.verdict.held_out import MORE_THAN_RIGHT
 
 _WORSE = 1.1  # times the gap as described from which a refit makes held-out runs worse, and not by chance
-_SMALL_SHARE = 0.05  # of the gap: regimes with less are not told
+_SMALL_SHARE = 0.05  # of the gap: regimes with less are not reported
 
 
 def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
-    """Sentences for a person at the machine, the verdict first and the next experiment last."""
+    """Sentences for the operator, the verdict first and the next experiment last."""
     gap, unexplained = diagnosis.gap, diagnosis.verdict == "unexplained"
     sentences: list[str] = []
     if diagnosis.verdict == "no-gap":
         if cannot_tell(diagnosis):
             sentences.append(
-                "These runs cannot tell: nothing beyond the stated tolerances shows in those that were fitted, yet the "
-                f"held-out runs are {times(gap.retuned)} noise floors off."
+                "These runs do not decide: the fitted runs stay within the stated tolerances, but the held-out runs are "
+                f"{times(gap.retuned)} noise floors off."
             )
         else:
             sentences.append("No gap beyond the stated tolerances: the rig as described explains these runs.")
@@ -36,31 +36,33 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
         sentences.append(latent_answer(diagnosis) or "There is a gap, and nothing in the library explains it.")
         if gap.refuted:
             names = " and ".join(gap.refuted)
-            with_it = next(one.gap for one in gap.compared if one.who == names)
+            with_it = next(row.gap for row in gap.compared if row.who == names)
             explain, it = ("explains", "it") if len(gap.refuted) == 1 else ("explain", "them")
             sentences.append(
                 f"{names} {explain} the runs that were fitted, but not {', '.join(gap.runs)}, held out: "
                 f"there the gap is {times(with_it)} noise floors with {it}, {times(gap.retuned)} for the baseline."
             )
-        nearest = next((one for one in diagnosis.candidates if one.effect not in ("none", "unexplained")), None)
+        nearest = next(
+            (candidate for candidate in diagnosis.candidates if candidate.effect not in ("none", "unexplained")), None
+        )
         if nearest is not None and nearest.form == "random":
             sentences.append(
                 f"It scatters as {nearest.effect} at random would (probability {percent(nearest.probability)}), and as bursts "
-                "of debris or a tilted track would: no path can be told from these runs."
+                "of debris or a tilted track would: these runs do not show its course."
             )
     elif diagnosis.verdict == "partly":
         sentences += [most] if (most := latent_answer(diagnosis)) else []
         sentences.append(
-            f"{' and '.join(diagnosis.effects)} explains a part of what differs, more than chance would; the rest is not "
+            f"{' and '.join(diagnosis.effects)} explains a part of the difference, more than chance would; the rest is not "
             "explained."
         )
-    kept = f" on {', '.join(gap.runs)}, held out" if gap.runs else ""
+    kept = f" on {', '.join(gap.runs)}, held out," if gap.runs else ""
     sentences += latent_sentences(diagnosis, kept)
     if diagnosis.remainder is not None and diagnosis.remainder.what:
         sentences.append(f"{remainder_in_words(diagnosis.remainder)}.")
     still = [finding.where.partition(":")[0] for finding in diagnosis.findings if finding.kind == "still"]
     if still:
-        sentences.append(f"In {', '.join(still)} the drive stands still: friction and drive are not tested there.")
+        sentences.append(f"In {', '.join(still)} the drive does not move: friction and drive are not tested there.")
     vibrating = [finding for finding in diagnosis.findings if finding.kind in (PICK_UP, DISTORTED)]
     for kind in dict.fromkeys(finding.kind for finding in vibrating):
         first, *more = (finding for finding in vibrating if finding.kind == kind)
@@ -82,9 +84,9 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
         )
     if diagnosis.where and diagnosis.verdict != "no-gap":
         sentences.append(_where(diagnosis))
-    sure = sum(one.probability for one in diagnosis.candidates if one.effect in diagnosis.effects)
+    sure = sum(candidate.probability for candidate in diagnosis.candidates if candidate.effect in diagnosis.effects)
     for i, name in enumerate(diagnosis.effects):
-        candidate = next(one for one in diagnosis.candidates if one.effect == name)
+        candidate = next(candidate for candidate in diagnosis.candidates if candidate.effect == name)
         numbers = ", ".join(estimate_in_words(name, *item) for item in candidate.parameters.items())
         says = "explains it" if i == 0 else "is needed besides"
         if diagnosis.verdict == "partly":
@@ -98,10 +100,10 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
             + (f"; {numbers}." if numbers else ".")
         )
         if candidate.form == "random":
-            sentences.append("It varies at random and is known by what it scatters, not by its path.")
+            sentences.append("It varies at random: its scatter is known, its course is not.")
         if has_own_phases(candidate.parameters):
-            sentences.append("It begins in another phase in every run, so it is scatter where its phase is not known.")
-    sentences += [f"These runs cannot tell apart: {', '.join(group)}." for group in diagnosis.not_distinguishable]
+            sentences.append("Its phase differs from run to run, so on a run of unknown phase it counts as scatter.")
+    sentences += [f"These runs cannot separate: {', '.join(group)}." for group in diagnosis.not_distinguishable]
     if gap.runs and math.isfinite(gap.retuned):
         kept = ", ".join(gap.runs)
         if gap.shrinkage is not None and gap.with_effect > gap.retuned:
@@ -113,10 +115,12 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
             between = f" (90 %: {known})" if (known := closed_between(gap.interval_90)) else ""
             sentences.append(
                 f"On {kept}, held out, the gap falls from {times(gap.retuned)} to {times(gap.with_effect)} noise floors: "
-                f"{closed_in_words(gap.shrinkage)} of what could be closed{between}."
+                f"{closed_in_words(gap.shrinkage)} of the part that could be closed{between}."
             )
         elif diagnosis.effects:
-            sentences.append(f"On {kept}, held out, there is no gap to close: new data have not tested the name.")
+            sentences.append(
+                f"On {kept}, held out, the baseline leaves no gap to close: new data have not tested the name."
+            )
         if diagnosis.effects and gap.with_effect > MORE_THAN_RIGHT:
             sentences.append(
                 f"A right explanation leaves about 1 there, not {times(gap.with_effect)}: something else acts as well, if only "
@@ -138,7 +142,10 @@ def _where(diagnosis: Diagnosis) -> str:
         key = (cell.signal, cell.regime)
         by_regime[key] = by_regime.get(key, 0.0) + cell.share
     signal, share = max(by_signal.items(), key=lambda item: item[1])
-    regimes = sorted(((value, regime) for (own, regime), value in by_regime.items() if own == signal), reverse=True)
+    regimes = sorted(
+        ((value, regime) for (signal_of_regime, regime), value in by_regime.items() if signal_of_regime == signal),
+        reverse=True,
+    )
     shown = ", ".join(f"{percent(value)} at {regime}" for value, regime in regimes[:2] if value > _SMALL_SHARE)
     return f"The gap is mostly in the {signal_name(signal)}, {percent(share)} of it" + (
         f" ({shown})." if shown else "."

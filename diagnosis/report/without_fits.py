@@ -1,4 +1,4 @@
-"""A diagnosis without a simulated fit: what relations and latent friction say, where no fit is possible or there is no time."""
+"""A diagnosis from relations and latent friction alone, for runs that no fit can compare or a budget too short for a fit."""
 
 import math
 import time
@@ -37,7 +37,7 @@ def unfitted() -> Verdict:
 
 
 def without_fits(verdict: Verdict, runs: list[Prepared], following: Experiment, began: float) -> Diagnosis:
-    """The diagnosis of a verdict that no fit stands behind, still without relations, shares and sentences."""
+    """The diagnosis of a verdict without any fit, still without relations, shares and sentences."""
     return Diagnosis(
         verdict=verdict.kind,
         effects=verdict.names,

@@ -1,4 +1,4 @@
-"""A diagnosis in words: verdicts, numbers with their units, and what each effect means on a machine."""
+"""A diagnosis in words: verdicts, numbers with their units, and the meaning of each effect on a machine."""
 
 import math
 from typing import Final
@@ -31,7 +31,7 @@ def answer(diagnosis: Diagnosis) -> str:
     """The answer in one line, without the word of the verdict."""
     if diagnosis.verdict == "no-gap":
         if cannot_tell(diagnosis):
-            return f"these runs cannot tell, the held-out runs are {times(diagnosis.gap.retuned)} noise floors off"
+            return f"the fitted runs show no gap, but the held-out runs are {times(diagnosis.gap.retuned)} noise floors off"
         return "the rig as described explains these runs"
     most = mostly(diagnosis)
     if diagnosis.verdict == "unexplained":
@@ -41,11 +41,11 @@ def answer(diagnosis: Diagnosis) -> str:
     names = " and ".join(diagnosis.effects)
     if diagnosis.verdict == "partly":
         if most is not None:
-            return f"{most.what} explains most of the {most.signal}, {names} a part besides"
-        return f"{names} explains a part of what differs; the rest is not explained"
-    sure = sum(one.probability for one in diagnosis.candidates if one.effect in diagnosis.effects)
-    others = [one for group in diagnosis.not_distinguishable if {*group} & {*diagnosis.effects} for one in group]
-    others = [one for one in dict.fromkeys(others) if one not in diagnosis.effects]
+            return f"{most.what} explains most of the {most.signal}, {names} another part"
+        return f"{names} explains a part of the difference; the rest is not explained"
+    sure = sum(candidate.probability for candidate in diagnosis.candidates if candidate.effect in diagnosis.effects)
+    others = [name for group in diagnosis.not_distinguishable if {*group} & {*diagnosis.effects} for name in group]
+    others = [fromkey for fromkey in dict.fromkeys(others) if fromkey not in diagnosis.effects]
     alike = f"; or {', '.join(others)}, which would explain these runs nearly as well" if others else ""
     return f"{names}, probability {percent(sure)}{alike}"
 
@@ -61,14 +61,14 @@ def closed_between(interval_90: tuple[float, float] | None) -> str:
 
 
 def who_in_words(who: str) -> str:
-    """What is compared on the held-out runs, in the glossary's word; an effect keeps its name."""
+    """A model that is compared on the held-out runs, in the glossary's word; an effect keeps its name."""
     return "baseline" if who == PARAMETERS else who
 
 
 def estimate_in_words(effect: str, name: str, estimate: Estimate) -> str:
     """A parameter in words, such as `gap 81 µm (90 %: 76 to 86)`; an interval that is not finite is left out.
 
-    Where the number is below 0 and the effect is called after the opposite, it is said what the number is.
+    A number below 0 whose effect is named after the opposite gets the right word, such as "a softening".
     """
     word, unit = name_and_unit(name)
     low, high = estimate.interval_90

@@ -54,7 +54,7 @@ def _vibration(*steps: tuple[float, float]) -> tuple[Vibration, ...]:
 
 
 PROTOCOLS: Final[dict[str, tuple[RunPlan, ...]]] = {
-    # the shortest protocol that tells ageing, direction, position, piezo and drive apart
+    # the shortest protocol that separates ageing, direction, position, piezo and drive
     "ladder": (
         RunPlan(_constant(0.0005), track=0),
         # 3 mm forward; 5 mm back, of which 2.1 mm slide; 0.9 mm of slow drag with dwells of 3 s

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.wire.messages import CHANNELS
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.synthetic.protocols import AxisPlan, RunPlan
@@ -16,7 +17,6 @@ from plant.effects.drive import even_m, extension_m
 from plant.records import TRUTH, build
 from plant.simulate import run_blocks
 
-Floats = npt.NDArray[np.float64]
 Columns = dict[str, npt.NDArray[Any]]
 
 _SAME_PLACE_M = 2e-5  # standard deviation of the place at which a run starts

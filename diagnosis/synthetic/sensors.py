@@ -7,11 +7,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from plant.config import SensorsConfig
-
-Floats = npt.NDArray[np.float64]
 
 _REFERENCE_HZ = 20_000.0  # the noise levels are rms values of 20 kHz records
 
@@ -28,7 +26,7 @@ class DrawnChain(NamedTuple):
 
 
 def draw_chain(random: np.random.Generator, sensors: SensorsConfig, force_scale: float) -> DrawnChain:
-    """Draw a chain; `force_scale` is the static friction over that of the paper's pair, and scales the errors of the force."""
+    """Draw a chain; `force_scale` is the static friction relative to the paper's pair, and scales the errors of the force."""
     force_N = force_scale * _log_uniform(random, 0.005, 0.040)
     accel_mps2 = _log_uniform(random, 0.0015, 0.05)
     position_m = _log_uniform(random, 5e-8, 1e-6)
@@ -85,7 +83,7 @@ def _noise(random: np.random.Generator, samples: int, pink_share: float) -> Floa
     white = random.standard_normal(samples)
     spectrum: Any = np.fft.rfft(random.standard_normal(samples))
     at = np.arange(len(spectrum), dtype=np.float64)
-    at[0] = np.inf  # no constant part: an offset is an effect of its own
+    at[0] = np.inf  # no constant part: an offset is a separate effect
     pink = np.fft.irfft(spectrum / np.sqrt(at), samples)
     return math.sqrt(1.0 - pink_share) * white + math.sqrt(pink_share) * pink / pink.std()
 

@@ -4,11 +4,9 @@ The blend names no effect. It shows how far so free a model closes the gap on he
 effect with it.
 """
 
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.fits.screening import Directions
@@ -16,7 +14,6 @@ from diagnosis.hypotheses.starts import Trial
 from diagnosis.processes import each
 from diagnosis.verdict.held_out import HeldOut
 
-Floats = npt.NDArray[np.floating[Any]]
 # Step for the derivatives of the nuisances on the held-out runs, in tolerances. Too small: the grid of the features shows.
 # Too large: curvature does.
 _STEP = 0.5
@@ -35,10 +32,10 @@ def flexible_differences(fitter: Fitter, baseline: Fit, trials: list[Trial], hel
     """
     trials = list({trial.hypothesis.effects: trial for trial in reversed(trials)}.values())
     directions = Directions(baseline, fitter.most)
-    here = fitter.predicted(baseline.deviations, {})
-    _, slope = fitter.whitened(here)
+    base_features = fitter.predicted(baseline.deviations, {})
+    _, slope = fitter.whitened(base_features)
     shown = each(jobs, _shown, fitter, [(baseline.deviations, trials[i::jobs]) for i in range(jobs)])
-    columns = [fitter.column(here, shown[i % jobs][i // jobs], slope) for i in range(len(trials))]
+    columns = [fitter.column(base_features, shown[i % jobs][i // jobs], slope) for i in range(len(trials))]
     free = np.stack([directions.freed(column) for column in columns], axis=1)
     shares = np.linalg.solve(free.T @ free + np.eye(len(trials)), free.T @ directions.left)
     blended = np.stack(columns, axis=1) @ shares
@@ -48,8 +45,8 @@ def flexible_differences(fitter: Fitter, baseline: Fit, trials: list[Trial], hel
     points += [fitter.nuisances.point(ahead, {}) for ahead in baseline.deviations + _STEP * np.eye(len(moved))]
     unmoved, *others = held_out.problem.predicted_many(points)
     total = unmoved.copy()
-    for share, there in zip([*shares, *(moved / _STEP)], others, strict=True):
-        total += share * _finite(there - unmoved)
+    for share, moved_features in zip([*shares, *(moved / _STEP)], others, strict=True):
+        total += share * _finite(moved_features - unmoved)
     return held_out.differences_of(total)
 
 

@@ -16,12 +16,12 @@ MOST = 0.5  # share below which it is told and not named: the rest would be the 
 
 def named_by(latent: Sequence[LatentSignal]) -> tuple[str, ...]:
     """Effects whose share of a signal is more than half, more than chance shows, and sure; the largest share first."""
-    found: dict[str, float] = {}
+    largest: dict[str, float] = {}
     for signal in latent:
-        for one in signal.shares if signal.judged_on_held_out else ():
-            if one.what in _KNOWN and one.beyond_chance and one.gain > _SURE and one.share > MOST:
-                found[one.what] = max(one.share, found.get(one.what, 0.0))
-    return tuple(sorted(found, key=lambda what: -found[what]))
+        for share in signal.shares if signal.judged_on_held_out else ():
+            if share.what in _KNOWN and share.beyond_chance and share.gain > _SURE and share.share > MOST:
+                largest[share.what] = max(share.share, largest.get(share.what, 0.0))
+    return tuple(sorted(largest, key=lambda what: -largest[what]))
 
 
 def with_latent(verdict: Verdict, latent: Sequence[LatentSignal], held_out: HeldOut | None) -> Verdict:

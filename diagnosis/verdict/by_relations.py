@@ -15,14 +15,16 @@ _LEAST_CLOSED = 0.5  # share of the held-out gap that two effects must close to 
 _SEEN = SHOWN_BY | dict.fromkeys(("piezo-roll-off", "piezo-resonance", "piezo-sag"), "exciter")
 
 
-class Closed(NamedTuple):
+class ClosedByRelations(NamedTuple):
     """The best explanation of a contest that ended unexplained, and the share of the held-out gap that it closes."""
 
     fit: Fit | None
     share: float | None
 
 
-def in_view_of(verdict: Verdict, decision: Decision, fits: Sequence[Fit], nearest: Closed) -> Verdict:
+def with_relations_verdict(
+    verdict: Verdict, decision: Decision, fits: Sequence[Fit], nearest: ClosedByRelations
+) -> Verdict:
     """The verdict of the contest, corrected by the relations.
 
     Args:
@@ -47,7 +49,7 @@ def in_view_of(verdict: Verdict, decision: Decision, fits: Sequence[Fit], neares
     return verdict
 
 
-def _is_pair(nearest: Closed) -> bool:
+def _is_pair(nearest: ClosedByRelations) -> bool:
     fit, share = nearest
     return (
         fit is not None
@@ -63,11 +65,11 @@ def _with_known(verdict: Verdict, known: list[Decided], fits: Sequence[Fit]) -> 
     names = list(dict.fromkeys(cause.cause for cause in known))
     alike = {other for cause in known for other in cause.alike}
     if verdict.kind in ("effect", "partly") and verdict.named is not None:
-        said = verdict.named.hypothesis.effects
-        if set(names) <= set(said) or (len(names) == 1 and alike & set(said)):
+        named = verdict.named.hypothesis.effects
+        if set(names) <= set(named) or (len(names) == 1 and alike & set(named)):
             return verdict
         seen = {effect for effect, relation in _SEEN.items() if relation in {cause.relation for cause in known}}
-        kept = [name for name in said if name not in seen and name not in names]
+        kept = [name for name in named if name not in seen and name not in names]
         if not kept:
             return _named(verdict, "effect", known[:2], fits)
         both = (names[0], kept[0])
@@ -80,16 +82,16 @@ def _named(verdict: Verdict, kind: str, causes: list[Decided], fits: Sequence[Fi
 
 
 def _with_names(verdict: Verdict, kind: str, names: tuple[str, ...], fits: Sequence[Fit]) -> Verdict:
-    own = next((fit for fit in fits if set(fit.hypothesis.effects) == set(names)), None)
+    fit_of_names = next((fit for fit in fits if set(fit.hypothesis.effects) == set(names)), None)
     top, value = next(iter(verdict.probabilities.items()))
     first = names[0]
     swapped = {top: verdict.probabilities.get(first, 0.0), first: value}
     probabilities = dict(sorted((verdict.probabilities | swapped).items(), key=lambda item: -item[1]))
     # a name without a fit has no size that a rig file could take, and no gap that it closes
     return verdict._replace(
-        kind="effect" if kind == "effect" and own is not None else "partly",
-        named=own,
-        by_relations=() if own is not None else names,
+        kind="effect" if kind == "effect" and fit_of_names is not None else "partly",
+        named=fit_of_names,
+        by_relations=() if fit_of_names is not None else names,
         probabilities=probabilities,
         refuted=(),
     )

@@ -11,7 +11,7 @@ from diagnosis.verdict.selection import Contest
 
 # Noise floors that the baseline leaves on the held-out runs: up to here a random effect is not named, as it scatters in every
 # run. Too small: chance scatter in the fitted runs is named. Too large: weak random effects are lost.
-# Counted: docs/method/verdict.md.
+# Counted: docs/method/diagnosis.md.
 _NO_GAP = 1.0
 
 
@@ -51,9 +51,9 @@ def borne_out(contest: Contest, held_out_problem: Problem | None, jobs: int) -> 
         verdict, gone, best = contest.refuted(), best, rig.fit
         elsewhere = contest.elsewhere() if is_of_one_place(gone) else None
         if elsewhere is not None and elsewhere.named is not None:
-            there = on(elsewhere.named)
-            if not there.refutes(elsewhere.named, expected):
-                verdict, gone, best, held_out = elsewhere, None, elsewhere.named, there
+            judged_there = on(elsewhere.named)
+            if not judged_there.refutes(elsewhere.named, expected):
+                verdict, gone, best, held_out = elsewhere, None, elsewhere.named, judged_there
     if verdict.named is not None and held_out.left_by(best) > MORE_THAN_RIGHT:
         verdict = doubted(verdict)
     return Confirmation(verdict, best, gone, held_out)

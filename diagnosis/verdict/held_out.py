@@ -5,11 +5,11 @@ The held-out runs are a problem of their own: the fitter that knows the fitted r
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.random_friction import RANDOM, is_random
 from diagnosis.gap.floor import Floor, floor_of, replicates
@@ -20,7 +20,6 @@ from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.model.per_run import PHASE, Table, has_own_phases
 from diagnosis.model.rig import Effects, Roughness
 
-Floats = npt.NDArray[np.floating[Any]]
 _REPLICATES = 24  # for the floor of the held-out runs
 _DRAWS = 8  # of a fit's parameters
 _RESAMPLES = 400  # of the cells
@@ -39,14 +38,14 @@ _SCATTERED = 2.2
 # Floors: 111 right names on a sealed set left 2.2 at most, of 19 wrong ones four 2.4 to 4.8
 MORE_THAN_RIGHT = 2.3
 # Floors that the baseline may leave for an answer of "no gap". Too small: a good "no gap" is doubted. Too large: a gap that shows
-# only on held-out runs is not told. Counted: docs/method/report.md.
+# only on held-out runs is not told. Counted: docs/method/diagnosis.md.
 FAR_FOR_NO_GAP = 2.0
 # Of chi2 that a right one may be worse by, where it shows little: a seal named as ageing was by 16. What changes a prediction by
 # less cannot be refuted: backlash where nothing reverses changes it by 0.
 _CHANCE = 8.0
 
 
-class Closed(NamedTuple):
+class GapLeft(NamedTuple):
     """What an explanation leaves of the gap."""
 
     gap: float
@@ -81,14 +80,14 @@ class HeldOut:
         drawn = replicates(self.problem, point, roughness, _REPLICATES, _SEED, self._jobs)
         return floor_of(self.problem, point, drawn, before)
 
-    def closed_by(self, fit: Fit) -> Closed:
+    def closed_by(self, fit: Fit) -> GapLeft:
         """The gap under a fit, with an interval from the spread over cells and the fit's own uncertainty."""
         random = np.random.default_rng(_SEED)
         spread = np.linalg.cholesky(fit.covariance() + 1e-12 * np.eye(len(fit.deviations) + len(fit.w)))
         at = np.concatenate([fit.deviations, fit.w])
         moved = [at, *(at + spread @ random.normal(size=len(at)) for _ in range(_DRAWS))]
-        own = len(fit.deviations)
-        drawn = self._squares(fit.hypothesis, [(one[:own], one[own:]) for one in moved])
+        nuisances = len(fit.deviations)
+        drawn = self._squares(fit.hypothesis, [(vector[:nuisances], vector[nuisances:]) for vector in moved])
         return self._closed(drawn[0], drawn)
 
     def refutes(self, fit: Fit, expected_chi2: float) -> bool:
@@ -123,36 +122,38 @@ class HeldOut:
         255; what its scale leaves open takes it to 84 by a straight line.
         """
         at = np.concatenate([fit.deviations, fit.w])
-        own = len(fit.deviations)
+        nuisances = len(fit.deviations)
         spread = np.linalg.cholesky(fit.covariance() + 1e-12 * np.eye(len(at)))
 
         def left(steps: list[Floats]) -> list[Floats]:
             moved = [at + spread @ step for step in steps]
-            points = [self._nuisances.point(one[:own], fit.hypothesis.tables(one[own:])) for one in moved]
-            return [whitened(self.floor, self.problem, one)[0] for one in self.problem.predicted_many(points)]
+            points = [
+                self._nuisances.point(vector[:nuisances], fit.hypothesis.tables(vector[nuisances:])) for vector in moved
+            ]
+            return [whitened(self.floor, self.problem, features)[0] for features in self.problem.predicted_many(points)]
 
-        rates = np.stack([one - residual for one in left(list(np.eye(len(at))))], axis=1)
+        rates = np.stack([residual_moved - residual for residual_moved in left(list(np.eye(len(at))))], axis=1)
         step = -np.linalg.solve(np.eye(len(at)) + rates.T @ rates, rates.T @ residual)
         # the features are bent: what a straight line promises is tried, and half of it
         steps = [step, 0.5 * step]
-        tried = [chi2_of(one) + chi2_of(step) for one, step in zip(left(steps), steps, strict=True)]
+        tried = [chi2_of(rest) + chi2_of(step) for rest, step in zip(left(steps), steps, strict=True)]
         return min(chi2_of(residual), *tried)
 
     def left_by(self, fit: Fit) -> float:
         """The gap under a fit, in floors."""
         return self._gap(self._squares(fit.hypothesis, [(fit.deviations, fit.w)])[0])
 
-    def closed_by_differences(self, z: Floats) -> Closed:
+    def closed_by_differences(self, z: Floats) -> GapLeft:
         """The same for differences from elsewhere [compared]."""
-        here = self._in_floors(self.floor, z)
-        return self._closed(here, [here])
+        in_floors = self._in_floors(self.floor, z)
+        return self._closed(in_floors, [in_floors])
 
-    def _closed(self, here: Floats, drawn: list[Floats]) -> Closed:
-        gap = self._gap(here)
+    def _closed(self, in_floors: Floats, drawn: list[Floats]) -> GapLeft:
+        gap = self._gap(in_floors)
         if not self.retuned - 1.0 >= _SMALLEST_GAP:  # no number where nothing can be compared
-            return Closed(gap, None, None)
+            return GapLeft(gap, None, None)
         random = np.random.default_rng(_SEED)
-        cells = len(here)
+        cells = len(in_floors)
         shares: list[float] = []
         for number in range(_RESAMPLES):
             pick = random.integers(cells, size=cells)
@@ -162,9 +163,9 @@ class HeldOut:
                 shares.append((before - after) / (before - 1.0))
         shrinkage = (self.retuned - gap) / (self.retuned - 1.0)
         if len(shares) < _RESAMPLES // 2:
-            return Closed(gap, shrinkage, None)
+            return GapLeft(gap, shrinkage, None)
         low, high = np.quantile(shares, (0.05, 0.95))
-        return Closed(gap, shrinkage, (float(min(low, shrinkage)), float(max(high, shrinkage))))
+        return GapLeft(gap, shrinkage, (float(min(low, shrinkage)), float(max(high, shrinkage))))
 
     def _left(self, fit: Fit) -> Floats:
         """What a fit leaves, whitened [compared]; its square is chi2."""
@@ -212,4 +213,4 @@ def foretells(hypothesis: Hypothesis) -> bool:
     one of 10 detection limits, named, with 0.467 for 0.487 Hz, closed 22 % of chi2.
     """
     waves = [{axis.name for axis in hypothesis.coordinates if axis.effect == name} for name in hypothesis.effects]
-    return not is_random(hypothesis) and not any({PHASE, "frequency_Hz"} <= own for own in waves)
+    return not is_random(hypothesis) and not any({PHASE, "frequency_Hz"} <= wave for wave in waves)

@@ -4,15 +4,14 @@ Fits compete by the logarithm of their evidence, in Laplace's approximation: hal
 of their parameters. The part of the fall that comes from the differences is divided by the misfit that even the best model
 leaves, so that a model that is wrong everywhere is sure of nothing (a quasi-likelihood), and by the jitter of the refits.
 `none` is the baseline. `unexplained` stands for a model outside the library that leaves as much as a right model leaves at
-most: it wins where the best fit of the library leaves more. Case histories: docs/method/verdict.md.
+most: it wins where the best fit of the library leaves more. Case histories: docs/method/diagnosis.md.
 """
 
 import math
 from collections.abc import Sequence
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from diagnosis.fits.expected import MUCH, NEVER_WITHOUT_GAP, hidden_by_noise, much_left
 from diagnosis.fits.fit import Fit
@@ -21,7 +20,6 @@ from diagnosis.gap.measure import chi2_of
 from diagnosis.verdict.probabilities import MISTAKEN_DOUBTFUL, mistaken_of, softmax, with_mistakes
 from plant.effects.library import EFFECTS
 
-Floats = npt.NDArray[np.floating[Any]]
 _NO_ALARM = 1.0  # log evidence that `unexplained` stays behind `none` up to there
 # and of what chi2 was above the expected: what a right effect's formula does not fit grows with it. Of an uneven drive one of 7
 # limits left 0.10; of 12 effects outside the library the best single one left 0.35 to 0.98, but of a seal, which the runs kept
@@ -81,8 +79,8 @@ def _left_by_right(baseline: Fit, best: RankedFit, expected_chi2: float) -> floa
     """The largest chi2 that a right explanation leaves; the expected chi2 where noise hides the slips."""
     if hidden_by_noise(baseline, expected_chi2):
         return expected_chi2
-    one = len(best.fit.hypothesis.effects) == 1 and not best.scatters and not _is_exact(best.fit)
-    mismatch = _MISMATCH_OF_ONE if one else _MISMATCH
+    single = len(best.fit.hypothesis.effects) == 1 and not best.scatters and not _is_exact(best.fit)
+    mismatch = _MISMATCH_OF_ONE if single else _MISMATCH
     return MUCH * expected_chi2 + mismatch * max(baseline.chi2 - expected_chi2, 0.0)
 
 
@@ -95,8 +93,8 @@ def occam(fit: Fit) -> float:
     """The log evidence that the freedom of the effects' coordinates costs; 0 for a fit without effects."""
     if not fit.hypothesis.coordinates:
         return 0.0
-    own = len(fit.deviations)
-    _, volume = np.linalg.slogdet(fit.covariance()[own:, own:])
+    nuisances = len(fit.deviations)
+    _, volume = np.linalg.slogdet(fit.covariance()[nuisances:, nuisances:])
     return sum(math.log(coordinate.prior) for coordinate in fit.hypothesis.coordinates) - 0.5 * float(volume)
 
 
@@ -119,15 +117,15 @@ def judge(
 
     """
     alone, doubles, scale = _models(baseline, singles, pairs, expected_chi2, random)
-    ranked = sorted(alone, key=lambda one: -one.evidence)
-    double = max(doubles, key=lambda one: one.evidence, default=None)
+    ranked = sorted(alone, key=lambda ranked_fit: -ranked_fit.evidence)
+    double = max(doubles, key=lambda double: double.evidence, default=None)
     if double is not None and ranked and not _pays(double, ranked[0], baseline, expected_chi2):
         double = None
     best = double or (ranked[0] if ranked else None)
     scores = _of_no_effect(baseline, best, scale, expected_chi2) | _of_effects(ranked, double)
     top = max(scores, key=lambda name: scores[name])
     a_load = best is not None and best.scatters and best.fit.hypothesis.effects == (LOAD,) == (top,)
-    behind = _REFUTED if refuted else _IN_BURSTS if a_load and any(one.in_bursts for one in random) else 0.0
+    behind = _REFUTED if refuted else _IN_BURSTS if a_load and any(scattered.in_bursts for scattered in random) else 0.0
     if behind > 0.0:
         scores["unexplained"] = scores[top] + behind
         top = "unexplained"
@@ -137,7 +135,7 @@ def judge(
     if best is None or top == "none":
         return Verdict("no-gap", None, probabilities, ranked[0].fit if ranked else None, tuple(ranked), scale)
     # fits whose friction can be predicted: no experiment separates two random paths
-    followed = [one.fit for one in ranked if not is_random(one.fit.hypothesis)]
+    followed = [candidate.fit for candidate in ranked if not is_random(candidate.fit.hypothesis)]
     if top == "unexplained":
         nearest = followed[0] if followed and is_random(best.fit.hypothesis) else best.fit
         gone = best.fit.hypothesis.effects if refuted else ()
@@ -156,16 +154,16 @@ def _models(
 
     def scattered(noise: float) -> list[tuple[Fit, str, Scattered]]:
         """For every random effect and every fit that it is added to: the fit, the effect's name, and both together."""
-        found: list[tuple[Fit, str, Scattered]] = []
+        scattered_fits: list[tuple[Fit, str, Scattered]] = []
         for effect in random:
-            others = [one for one in singles if effect.effect not in one.hypothesis.effects][:_UNDER_RANDOM]
+            others = [single for single in singles if effect.effect not in single.hypothesis.effects][:_UNDER_RANDOM]
             # a real track has more than the two waves of its form; without its random part the rest would be named as a load
-            own = [one for one in singles[:_UNDER_RANDOM] if effect.effect in one.hypothesis.effects]
-            found += [(fit, effect.effect, effect.on(fit, noise)) for fit in (baseline, *others, *own)]
-        return found
+            with_effect = [fit for fit in singles[:_UNDER_RANDOM] if effect.effect in fit.hypothesis.effects]
+            scattered_fits += [(fit, effect.effect, effect.on(fit, noise)) for fit in (baseline, *others, *with_effect)]
+        return scattered_fits
 
     closest = scattered(JITTER)
-    fits = [baseline, *singles, *pairs, *(one.fit for *_, one in closest)]
+    fits = [baseline, *singles, *pairs, *(scattered.fit for *_, scattered in closest)]
     scale = max(min(fit.chi2 for fit in fits) / expected_chi2, 1.0)
 
     def model(fit: Fit) -> RankedFit:
@@ -182,7 +180,7 @@ def _models(
             alone.append(RankedFit(both.fit, both.gained, scatters=True))
         elif effect in under.hypothesis.effects:
             if both.gained > 0.0:
-                alone = [one for one in alone if one.fit is not under]
+                alone = [candidate for candidate in alone if candidate.fit is not under]
                 wave = under._replace(chi2=both.fit.chi2)
                 alone.append(RankedFit(wave, model(under).evidence + both.gained, scatters=True))
         else:
@@ -222,7 +220,7 @@ def _of_no_effect(baseline: Fit, best: RankedFit | None, scale: float, expected_
 def _of_effects(ranked: list[RankedFit], double: RankedFit | None) -> dict[str, float]:
     """The log evidence of every effect of the library; the two effects of a named pair share its evidence."""
     alone = {
-        one.fit.hypothesis.effects[0]: one.evidence for one in reversed(ranked)
+        candidate.fit.hypothesis.effects[0]: candidate.evidence for candidate in reversed(ranked)
     }  # the better one of two forms last
     scores: dict[str, float] = {}
     if double is not None:  # both get one evidence, so the effect with the larger evidence alone comes first
@@ -262,7 +260,7 @@ def doubted(verdict: Verdict) -> Verdict:
     return verdict._replace(probabilities=with_mistakes(verdict.probabilities, leaders, MISTAKEN_DOUBTFUL))
 
 
-def although_outside(verdict: Verdict, imitators: frozenset[str] = frozenset()) -> Verdict:
+def with_outside(verdict: Verdict, imitators: frozenset[str] = frozenset()) -> Verdict:
     """The verdict where the runs show a vibration that no feature compares and no effect of the library makes.
 
     "No gap" becomes "unexplained", and so does a verdict that names only effects of `imitators`, which that vibration imitates.

@@ -7,7 +7,7 @@ from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.verdict.judge import JITTER, RankedFit
 
 # Log evidence within which two effects count as alike. Too small: a name stands alone although another fits as well.
-# Too large: effects that the runs separate are called alike. Counted: docs/method/verdict.md.
+# Too large: effects that the runs separate are called alike. Counted: docs/method/diagnosis.md.
 _SAME = 6.0
 _TRIED = 4  # candidates behind the named effect that are compared with it; each may cost a refit
 
@@ -27,17 +27,20 @@ def imitators(fitter: Fitter, ranked: list[RankedFit], scale: float) -> tuple[st
     perfect.measured = fitter.predicted(named.fit.deviations, named.fit.effects) + fitter.floor.bias
     imitated = fitter.for_problem(perfect)
     alike = [
-        one.fit.hypothesis.effects[0]
-        for one in ranked[1 : 1 + _TRIED]
-        if named.evidence - one.evidence < _SAME
-        or (named.evidence - one.evidence < 2.0 * _SAME and _loss(imitated, named.fit, one.fit, scale) < _SAME)
+        candidate.fit.hypothesis.effects[0]
+        for candidate in ranked[1 : 1 + _TRIED]
+        if named.evidence - candidate.evidence < _SAME
+        or (
+            named.evidence - candidate.evidence < 2.0 * _SAME
+            and _loss(imitated, named.fit, candidate.fit, scale) < _SAME
+        )
     ]
     return (named.fit.hypothesis.effects[0], *alike) if alike else ()
 
 
 def _loss(imitated: Fitter, named: Fit, other: Fit, scale: float) -> float:
     """The log evidence by which `other` is behind `named` on runs that `named` alone has made."""
-    there = imitated.judged(named)
+    judged = imitated.judged(named)
     best = imitated.refit(other.hypothesis, other.deviations, other.w)
-    closer = float(best.residual @ best.residual - there.residual @ there.residual)
-    return 0.5 * closer / (scale * JITTER) + 0.5 * ((best.chi2 - there.chi2) - closer)
+    closer = float(best.residual @ best.residual - judged.residual @ judged.residual)
+    return 0.5 * closer / (scale * JITTER) + 0.5 * ((best.chi2 - judged.chi2) - closer)

@@ -60,8 +60,8 @@ def with_mistakes(probabilities: dict[str, float], leaders: tuple[str, ...], mis
     given = dict.fromkeys(others, mistaken.other_effect / len(others))
     given |= {"none": mistaken.none, "unexplained": mistaken.unexplained}
     lost = sum(mistaken)
-    found = {
+    lowered = {
         name: value + sum(ahead.values()) * given.get(name, 0.0) - ahead.get(name, 0.0) * lost
         for name, value in probabilities.items()
     }
-    return dict(sorted(found.items(), key=lambda item: -item[1]))
+    return dict(sorted(lowered.items(), key=lambda item: -item[1]))

@@ -49,7 +49,7 @@ _WORTH_MORE = 40.0
 _HALF_A_NAME = JITTER * COST_OF_EFFECT
 
 
-class Known(NamedTuple):
+class Hints(NamedTuple):
     """What the relations say before any fit."""
 
     hinted: frozenset[str] = frozenset()  # effects of the library that they show
@@ -67,7 +67,7 @@ class Contest:
 
     """
 
-    def __init__(self, rig: Retuned, tried: list[Trial], jobs: int, known: Known = Known()) -> None:  # noqa: B008
+    def __init__(self, rig: Retuned, tried: list[Trial], jobs: int, known: Hints = Hints()) -> None:  # noqa: B008
         self.rig = rig
         self.singles: list[Fit] = []
         self.pairs: list[Fit] = []
@@ -88,14 +88,14 @@ class Contest:
         if self.verdict.kind == "unexplained" or (named is not None and named.chi2 > doubtful):
             self._try_everything(progress)
         if self._may_scatter():
-            progress("could what is left be friction that varies at random?", 0.75)
+            progress("testing whether the remainder is friction that varies at random", 0.75)
             self.random = self._random_frictions()
             self.verdict = self._judged()
         self.check()
         nearest = self._nearest()
         if self.verdict.kind == "unexplained" and nearest is not None:
             progress(
-                "nothing explains it on the floors of the rig without effects: once more on those of the nearest model",
+                "no effect explains it with the noise floors of the baseline: repeat with the floors of the nearest model",
                 0.77,
             )
             self._contest_on_floor_of(nearest)
@@ -107,9 +107,9 @@ class Contest:
 
     def check(self) -> None:
         """Let a name of little evidence stand up to several refits, or fall."""
-        found = self.verdict
-        self.singles, self.verdict = checked(self.rig, self.singles, self.random, found, self._jobs)
-        self._overturned = self.verdict is not found
+        verdict = self.verdict
+        self.singles, self.verdict = checked(self.rig, self.singles, self.random, verdict, self._jobs)
+        self._overturned = self.verdict is not verdict
 
     def refuted(self) -> Verdict:
         """The verdict where the held-out runs do not bear out what is named."""
@@ -133,8 +133,8 @@ class Contest:
         progress("every effect was tried once; the leading ones are fitted", 0.35)
         at_noise = not self._known.hinted and self.rig.fit.chi2 <= self.rig.expected_chi2
         least = _HALF_A_NAME if at_noise else 0.0
-        found = refitted(fitter, self.rig.fit.chi2, self._screening, self._known.hinted, jobs, least)
-        self.singles = self._finished(found)
+        refits = refitted(fitter, self.rig.fit.chi2, self._screening, self._known.hinted, jobs, least)
+        self.singles = self._finished(refits)
         if self._shows_more():
             # an effect must not win because its refit found a valley of the nuisances that the others had missed
             again = fitter.refit(NOTHING, self.singles[0].deviations, np.zeros(0))
@@ -173,10 +173,10 @@ class Contest:
     def _contest_on_floor_of(self, nearest: Fit) -> None:
         """The leading effects on the floors of the model that comes nearest; what they were stays where none is named there."""
         rig, singles, pairs = on_floor_of(nearest, self.rig, self.singles, self.pairs, self._jobs)
-        found = judge(rig.fit, singles, pairs, rig.expected_chi2)
-        singles, verdict = checked(rig, singles, [], found, self._jobs)
+        new_verdict = judge(rig.fit, singles, pairs, rig.expected_chi2)
+        singles, verdict = checked(rig, singles, [], new_verdict, self._jobs)
         if verdict.named is not None:
-            self._overturned = verdict is not found
+            self._overturned = verdict is not new_verdict
             self.rig, self.singles, self.pairs, self.random, self.verdict = rig, singles, pairs, [], verdict
 
     def _may_scatter(self) -> bool:
@@ -194,16 +194,16 @@ class Contest:
 
     def _random_frictions(self) -> list[RandomFriction]:
         """The random form of each effect that has one, on the rig that comes nearest without that effect."""
-        found: list[RandomFriction] = []
+        randoms: list[RandomFriction] = []
         for effect in RANDOM_EFFECTS:
             others = [self.rig.fit, *(fit for fit in self.singles if effect not in fit.hypothesis.effects)]
-            found.append(RandomFriction(effect, self.rig.fitter, min(others, key=lambda fit: fit.chi2)))
-        return found
+            randoms.append(RandomFriction(effect, self.rig.fitter, min(others, key=lambda fit: fit.chi2)))
+        return randoms
 
     def _nearest(self) -> Fit | None:
         """The model that leaves least, if it comes near."""
-        found = min((*self.singles[:1], *self.pairs[:1]), key=lambda fit: fit.chi2, default=self.rig.fit)
-        return found if self._is_near(found) else None
+        nearest = min((*self.singles[:1], *self.pairs[:1]), key=lambda fit: fit.chi2, default=self.rig.fit)
+        return nearest if self._is_near(nearest) else None
 
     def _is_near(self, fit: Fit) -> bool:
         """Whether a model closes so much that the measured rig is like it."""

@@ -1,4 +1,4 @@
-"""The drive: its spring and what damps it, and how evenly it moves.
+"""Effects of the drive: its spring, its damping, and the ripple of its motion.
 
 Sources: hardening and ripple as in Armstrong-Helouvry, Dupont & Canudas de Wit 1994; once a turn of a screw: the travel variation
 v_2pi of ISO 3408-3. Under load: a compliance c (1 + s w(angle)) between screw and drive, as its nut or thrust bearing has where
@@ -10,10 +10,10 @@ import math
 from typing import Any, Final
 
 from bridge.kernel import Record, kernel
-from plant.effects.row import WAVE_SHAPE, Effect, Form, Parameter, one_form, ratio, wave_shape
+from plant.effects.row import WAVE_SHAPE, Effect, Formula, Parameter, one_form, ratio, wave_shape
 from plant.effects.waves import TWO_PI, wave
 
-_EVENED = 200  # rounds, of half a step each: whole ones swing ever wider where the speed more than doubles
+_EVENED = 200  # rounds with half steps: whole steps diverge if the speed more than doubles
 _HALVINGS = 44
 MOST_UNEVEN: Final = 0.95  # of the velocity's ripple: a drive does not stop
 
@@ -37,7 +37,7 @@ def spring_law_N(
 
 @kernel
 def yield_m(hardening_per_m2: float) -> float:
-    """Extension at which a softening spring has its largest force: the law would let it push beyond, the further the harder."""
+    """Extension at which a softening spring has its largest force: beyond it the cubic law falls and finally pushes."""
     return math.sqrt(-1.0 / (3.0 * hardening_per_m2)) if hardening_per_m2 < 0.0 else math.inf
 
 
@@ -50,7 +50,7 @@ def spring_N(p: Record, extension_m: float) -> float:
 
 @kernel
 def extension_m(p: Record, force_N: float) -> float:
-    """Of the drive's spring, where it has this force: by halving, to 1e-12 of that of a linear spring.
+    """Extension of the drive's spring at a force: by bisection, to 1e-12 of the extension of a linear spring.
 
     The softest spring, bilinear with a ratio of -0.9, is extended ten times as far.
     """
@@ -65,7 +65,7 @@ def extension_m(p: Record, force_N: float) -> float:
 
 @kernel
 def unevenness(p: Record, t_s: float, even_m: float, force_N: float) -> float:
-    """Velocity of an uneven drive under a drive force over that of an even one, which would be at `even_m` now."""
+    """Velocity of an uneven drive under a drive force, over the velocity of an even drive that is at `even_m`."""
     turns = p.ripple_frequency_Hz * t_s
     if p.ripple_wavelength_m > 0.0:
         turns = even_m / p.ripple_wavelength_m
@@ -76,10 +76,10 @@ def unevenness(p: Record, t_s: float, even_m: float, force_N: float) -> float:
 
 @kernel
 def even_m(p: Record, drive_m: float) -> float:
-    """Where an even drive would be when one with a screw's lead errors is at `drive_m`.
+    """Position of an even drive when a drive with a screw's lead errors is at `drive_m`.
 
-    The errors are the integral of the velocity's ripple over the even position, without a mean. Those under load hang on the
-    forces on the way there and are left out: `drive_m` is at most ratio wavelength / 2 pi off by them.
+    The errors are the integral of the velocity's ripple over the even position, without a mean. Those under load depend on the
+    forces so far and are left out: they change `drive_m` by at most ratio wavelength / 2 pi.
     """
     found_m = drive_m
     if p.ripple_wavelength_m > 0.0:
@@ -128,9 +128,9 @@ DRIVE: Final = {
     "drive-damping": Effect(
         "drive",
         {
-            "viscous": Form("h_d grows by damping", (_DAMPING,)),
-            "relaxing": Form(
-                "a damper beside the spring that hangs on a spring of its own, damping / relaxation_s (Maxwell)",
+            "viscous": Formula("h_d grows by damping", (_DAMPING,)),
+            "relaxing": Formula(
+                "a damper in series with a second spring, damping / relaxation_s, parallel to the first (Maxwell)",
                 (_DAMPING, Parameter("relaxation_s", 1e-4, 100.0, 4e-3)),
             ),
         },
@@ -146,11 +146,11 @@ DRIVE: Final = {
     "drive-hardening": Effect(
         "drive",
         {
-            "cubic": Form(
+            "cubic": Formula(
                 "k_d e (1 + ratio (e / 1 mm)^2); a softening one yields at its largest force",
                 (ratio(0.05, -0.2, 10.0),),
             ),
-            "bilinear": Form(
+            "bilinear": Formula(
                 "k_d e, beyond |e| = knee_m with the stiffness k_d (1 + ratio)",
                 (ratio(0.2), Parameter("knee_m", 1e-6, 1.0, 1e-3)),
             ),
@@ -171,15 +171,15 @@ DRIVE: Final = {
     "drive-speed-ripple": Effect(
         "drive",
         {
-            "screw": Form(
+            "screw": Formula(
                 "drive velocity times 1 + ratio w(2 pi s_e / wavelength_m + phase): the motor turns evenly",
                 (_UNEVEN, _PITCH, *WAVE_SHAPE),
             ),
-            "time": Form(
+            "time": Formula(
                 "drive velocity times 1 + ratio w(2 pi frequency_Hz t + phase)",
                 (_UNEVEN, Parameter("frequency_Hz", 1e-3, 1e3, 1.0), *WAVE_SHAPE),
             ),
-            "load": Form(
+            "load": Formula(
                 "as screw, with ratio |F_d| / F_s for ratio, 0.95 at most: the screw gives way, and unloaded it is even",
                 (_UNEVEN, _PITCH, *WAVE_SHAPE),
             ),

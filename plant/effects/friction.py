@@ -1,16 +1,16 @@
-"""The level of friction: over speed, place, direction, time and load, and what it is at all."""
+"""The level of friction: over speed, position, direction, time and load, and its nominal numbers."""
 
 import math
 from typing import Any, Final
 
 from bridge.kernel import Record, kernel
-from plant.effects.row import TURN_RAD, WAVE_SHAPE, Effect, Form, Parameter, one_form, ratio, wave_shape
+from plant.effects.row import TURN_RAD, WAVE_SHAPE, Effect, Formula, Parameter, one_form, ratio, wave_shape
 from plant.effects.waves import TWO_PI, smooth_noise, wave, with_second
 
 
 @kernel
 def level(p: Record, t_s: float, x: float, v_r: float, load_sin: float, load_cos: float) -> float:
-    """What the friction is multiplied by, here and now; the load's wave has come to the angle of this sine and cosine."""
+    """Factor of the friction at the present position and time; sine and cosine give the phase of the load's wave."""
     result = 1.0 + p.drift_per_s * t_s
     if p.drift_settling_s > 0.0:
         result += p.drift_ratio * (1.0 - math.exp(-(p.drift_before_s + t_s) / p.drift_settling_s))
@@ -25,13 +25,13 @@ def level(p: Record, t_s: float, x: float, v_r: float, load_sin: float, load_cos
         result *= max(1.0 + p.load_ratio * load, 0.0)
     if p.roughness_ratio != 0.0:
         result *= max(1.0 + p.roughness_ratio * smooth_noise(x / p.roughness_length_m, p.roughness_seed), 0.0)
-    # a slide that lifts off is not this model's; nor do two factors below 0 make friction
+    # the model has no slide that lifts off; and the product of two negative factors is not friction
     return max(result * (1.0 + (p.forward_ratio if v_r >= 0.0 else p.backward_ratio)), 0.01)
 
 
 @kernel
 def _along_track(p: Record, x: float) -> float:
-    """The shape of the friction along the track: a wave, one with another beside it, bumps, or noise."""
+    """The shape of the friction along the track: a wave, two waves, bumps, or noise."""
     if p.position_seed >= 0.0:
         return smooth_noise(2.0 * x / p.position_wavelength_m, p.position_seed)
     angle_rad = TWO_PI * x / p.position_wavelength_m + p.position_phase_rad
@@ -101,8 +101,8 @@ FRICTION: Final = {
     "viscous-friction": Effect(
         "friction",
         {
-            "linear": Form("F_f grows by damping v_r", (Parameter("damping_Ns_per_m", 0.0, 1e5, 5.0),)),
-            "quadratic": Form("F_f grows by damping v_r |v_r|", (Parameter("damping_Ns2_per_m2", 0.0, 1e7, 200.0),)),
+            "linear": Formula("F_f grows by damping v_r", (Parameter("damping_Ns_per_m", 0.0, 1e5, 5.0),)),
+            "quadratic": Formula("F_f grows by damping v_r |v_r|", (Parameter("damping_Ns2_per_m2", 0.0, 1e7, 200.0),)),
         },
         _set_viscous,
         numbers=("quadratic_Ns2_per_m2",),
@@ -111,21 +111,23 @@ FRICTION: Final = {
     "position-dependent-friction": Effect(
         "friction",
         {
-            "wave": Form("friction times 1 + ratio w(2 pi x / wavelength_m + phase)", (_SWING, _PLACES, *WAVE_SHAPE)),
-            "two-waves": Form(
-                "as wave without its harmonic, and sin(2 pi x / other_wavelength_m + other_phase) beside it, of other_share",
+            "wave": Formula(
+                "friction times 1 + ratio w(2 pi x / wavelength_m + phase)", (_SWING, _PLACES, *WAVE_SHAPE)
+            ),
+            "two-waves": Formula(
+                "as wave without its harmonic, plus other_share sin(2 pi x / other_wavelength_m + other_phase)",
                 (
                     *(_SWING, _PLACES, WAVE_SHAPE[0]),
                     *(Parameter("other_share", 0.0, 3.0, 0.5), Parameter("other_wavelength_m", 1e-5, 1.0, 1e-3)),
                     Parameter("other_phase_rad", -TURN_RAD, TURN_RAD, 0.0),
                 ),
             ),
-            "bumps": Form(
+            "bumps": Formula(
                 "friction times 1 + ratio exp(-(d / width)^2 / 2), d of wavelength_m from the nearest of the places where "
                 "2 pi x / wavelength_m + phase is a whole turn",
                 (ratio(0.05, -0.9, 0.9), _PLACES, WAVE_SHAPE[0], Parameter("width", 0.01, 0.5, 0.1)),
             ),
-            "random": Form(
+            "random": Formula(
                 "friction times 1 + ratio n(x), n smooth noise of unit rms, a new value every wavelength_m / 2",
                 (_SWING, _PLACES, _SEED),
             ),
@@ -142,11 +144,11 @@ FRICTION: Final = {
     "direction-dependent-friction": Effect(
         "friction",
         {
-            "backward": Form("friction times 1 + ratio where v_r < 0", (ratio(0.1),)),
-            "both": Form(
+            "backward": Formula("friction times 1 + ratio where v_r < 0", (ratio(0.1),)),
+            "both": Formula(
                 "friction times 1 + ratio / 2 where v_r > 0, 1 - ratio / 2 where v_r < 0", (ratio(0.1, -0.9, 0.9),)
             ),
-            "kinetic": Form("F_c alone times 1 + ratio where v_r < 0, F_s kept", (ratio(0.1, -0.9, 0.9),)),
+            "kinetic": Formula("F_c alone times 1 + ratio where v_r < 0, F_s kept", (ratio(0.1, -0.9, 0.9),)),
         },
         _set_direction,
         numbers=("forward_ratio", "backward_ratio", "kinetic_backward_ratio"),
@@ -155,8 +157,8 @@ FRICTION: Final = {
     "normal-load-fluctuation": Effect(
         "friction",
         {
-            "sine": Form("friction times 1 + ratio w(2 pi frequency_Hz t + phase)", (_SWING, _TIMES, *WAVE_SHAPE)),
-            "random": Form(
+            "sine": Formula("friction times 1 + ratio w(2 pi frequency_Hz t + phase)", (_SWING, _TIMES, *WAVE_SHAPE)),
+            "random": Formula(
                 "friction times 1 + ratio n(t), n smooth noise of unit rms, a new value every 1 / (2 frequency_Hz)",
                 (_SWING, _TIMES, _SEED),
             ),
@@ -169,12 +171,12 @@ FRICTION: Final = {
     "friction-drift": Effect(
         "friction",
         {
-            "linear": Form("friction times 1 + rate_per_s t", (Parameter("rate_per_s", -0.1, 0.1, 2e-3),)),
-            "settling": Form(
+            "linear": Formula("friction times 1 + rate_per_s t", (Parameter("rate_per_s", -0.1, 0.1, 2e-3),)),
+            "settling": Formula(
                 "friction times 1 + ratio (1 - exp(-t / settling_s))",
                 (ratio(0.05, -0.9, 0.9), Parameter("settling_s", 0.1, 1e4, 5.0)),
             ),
-            "session": Form(
+            "session": Formula(
                 "as settling, on from earlier runs: t + before_s for t",
                 (
                     *(ratio(0.05, -0.9, 0.9), Parameter("settling_s", 0.1, 1e4, 15.0)),

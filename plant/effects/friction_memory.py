@@ -9,16 +9,16 @@ import math
 from typing import Any, Final
 
 from bridge.kernel import Record, kernel
-from plant.effects.row import Effect, Form, Parameter, ratio
+from plant.effects.row import Effect, Formula, Parameter, ratio
 
-LONGEST_LAG_S: Final = 0.025  # of friction behind the velocity, as a dead time
-LAG_CELL_S: Final = 2e-5  # of the line that remembers the speed: 11 of them in a period at 4.5 kHz
-_LAG_LINE = round(LONGEST_LAG_S / LAG_CELL_S) + 2  # the cells of the longest lag, the one before them, the one of now
+LONGEST_LAG_S: Final = 0.025  # longest dead time of friction behind the velocity
+LAG_CELL_S: Final = 2e-5  # of the delay line of the speed: 11 cells in a period at 4.5 kHz
+_LAG_LINE = round(LONGEST_LAG_S / LAG_CELL_S) + 2  # the cells of the longest lag, the previous and the present cell
 
 
 @kernel
 def ageing_N(p: Record, age_s: float) -> float:
-    """By how much the static friction at this age of the contact is above F_s."""
+    """Excess of the static friction over F_s at this age of the contact."""
     if p.age_exponent > 0.0:
         return p.age_growth_N * age_s**p.age_exponent - p.age_rested_N
     if p.age_settling_s > 0.0:
@@ -28,10 +28,10 @@ def ageing_N(p: Record, age_s: float) -> float:
 
 @kernel
 def late_mps(p: Record, s: Record, t_s: float, speed_mps: float) -> float:
-    """The speed as it was `lag_dead_s` ago; 0 before t = 0.
+    """The speed `lag_dead_s` ago; 0 before t = 0.
 
-    Cell k of a line holds the speed at k cells: from the last one that is filled to now the speed is taken for straight, however
-    many cells a step is long.
+    Cell k of a line holds the speed at time k LAG_CELL_S. From the last filled cell to the present the speed is interpolated
+    linearly, for steps of any number of cells.
     """
     length = len(s.lag_line)
     now = t_s / LAG_CELL_S
@@ -43,7 +43,7 @@ def late_mps(p: Record, s: Record, t_s: float, speed_mps: float) -> float:
     back = now - p.lag_dead_s / LAG_CELL_S
     whole = math.floor(back)
     older = s.lag_line[whole % length]
-    if whole >= s.lag_at:  # less than a cell ago
+    if whole >= s.lag_at:  # less than one cell ago
         return older + (back - whole) / max(now - whole, 1e-9) * (speed_mps - older)
     return older + (back - whole) * (s.lag_line[(whole + 1) % length] - older)
 
@@ -61,21 +61,21 @@ def _set_lag(p: Any, _form: str, value: dict[str, float]) -> None:
     p.late_share = value.get("share", 0.0) * (p.lag_dead_s > 0.0 or p.lag_distance_m > 0.0)
 
 
-# the age at which the static friction is F_s: it was measured after some rest
+# the age at which the static friction equals F_s, which was measured after some rest
 _RESTED = Parameter("rested_s", 0.0, 1e4, 0.0)
 _AGEING = Effect(
     "friction",
     {
-        "log": Form(
-            "F_s grows by ratio F_s ln(1 + age / age_scale_s), less what that is at an age of rested_s",
+        "log": Formula(
+            "F_s grows by ratio F_s ln(1 + age / age_scale_s), minus the growth at an age of rested_s",
             (ratio(0.02, 0.0, 1.0), Parameter("age_scale_s", 1e-4, 100.0, 0.1), _RESTED),
         ),
-        "power": Form(
-            "F_s grows by ratio F_s (age / 1 s)^exponent, less what that is at an age of rested_s",
+        "power": Formula(
+            "F_s grows by ratio F_s (age / 1 s)^exponent, minus the growth at an age of rested_s",
             (ratio(0.04, 0.0, 1.0), Parameter("exponent", 0.05, 1.0, 0.3), _RESTED),
         ),
-        "settling": Form(
-            "F_s grows by ratio F_s (1 - exp(-age / settling_s)), less what that is at an age of rested_s",
+        "settling": Formula(
+            "F_s grows by ratio F_s (1 - exp(-age / settling_s)), minus the growth at an age of rested_s",
             (ratio(0.05, 0.0, 1.0), Parameter("settling_s", 1e-4, 1e4, 0.5), _RESTED),
         ),
     },
@@ -88,12 +88,12 @@ _AGEING = Effect(
 _LAG = Effect(
     "friction",
     {
-        "time": Form("the Stribeck curve sees v_r through a first-order lag", (Parameter("lag_s", 0.0, 1.0, 2e-3),)),
-        "dead-time": Form(
-            "a share of it sees |v_r| as it was delay_s ago",
+        "time": Formula("the Stribeck curve sees v_r through a first-order lag", (Parameter("lag_s", 0.0, 1.0, 2e-3),)),
+        "dead-time": Formula(
+            "a share of it sees |v_r| of delay_s ago",
             (Parameter("delay_s", 0.0, LONGEST_LAG_S, 2e-3), Parameter("share", 0.0, 1.0, 1.0)),
         ),
-        "distance": Form(
+        "distance": Formula(
             "a share of it sees |v_r| through a lag over the path slid, and rests while the contact does",
             (Parameter("distance_m", 0.0, 1.0, 3e-6), Parameter("share", 0.0, 1.0, 1.0)),
         ),

@@ -1,8 +1,8 @@
-"""What a real rig does and the nominal one does not: every effect, and the check of what a rig file says of it.
+"""Every effect of a real rig that the nominal rig lacks, and the check of its table in a rig file.
 
 A name means a mechanism; a form is one formula for it. `[effects.NAME]` in a rig file holds `form` (the first one if left
 out) and the form's parameters. Off is bit-identical to the nominal rig: effects that only change a number of the rig are
-folded into it by `plant.records.build`, the others run in a kernel of their own (`plant.core.advance_disturbed`).
+folded into it by `plant.records.build`, the others run in a separate kernel (`plant.core.advance_disturbed`).
 """
 
 from typing import Any, Final
@@ -20,7 +20,7 @@ EFFECTS: Final[dict[str, Effect]] = FRICTION_MEMORY | FRICTION | DRIVE | STRUCTU
 
 
 def first_form(name: str) -> str:
-    """The form that is meant when a rig file names none."""
+    """The default form of an effect."""
     return next(iter(EFFECTS[name].forms))
 
 

@@ -1,4 +1,4 @@
-"""What the exciter delivers of what it is told: over frequency, under load, and as it warms up.
+"""Delivered share of the commanded amplitude: over frequency, under load, and during warm-up.
 
 Source: a mode that takes part by a share: Ewins, Modal Testing, 2000.
 """
@@ -7,23 +7,23 @@ import math
 from typing import Any, Final
 
 from bridge.kernel import Record, kernel
-from plant.effects.row import Effect, Form, Parameter, ratio
+from plant.effects.row import Effect, Formula, Parameter, ratio
 
 
 @kernel
 def roll_off(p: Record, frequency_Hz: float) -> float:
-    """What the amplitude is divided by at this frequency."""
+    """Divisor of the amplitude at this frequency."""
     r = frequency_Hz / p.rolloff_Hz
     return math.sqrt(1.0 + r * r) if p.rolloff_order == 1.0 else 1.0 + r * r
 
 
 @kernel
 def mode_gain(mode_ratio: float, r: float, damped: float, squared: float) -> float:
-    """Gain of a rigid path beside a mode that takes part by a share.
+    """Gain of a rigid path in parallel with a mode of a given share.
 
     Args:
         mode_ratio: the share.
-        r: frequency over that of the mode; damped: 2 damping_ratio r; squared: (1 - r^2)^2 + damped^2.
+        r: frequency over the mode's frequency; damped: 2 damping_ratio r; squared: (1 - r^2)^2 + damped^2.
 
     """
     moved = mode_ratio * r * r / squared
@@ -32,13 +32,13 @@ def mode_gain(mode_ratio: float, r: float, damped: float, squared: float) -> flo
 
 @kernel
 def heat_share(p: Record, vibrating_s: float) -> float:
-    """Share of the amplitude that is left after the exciter has been on so long."""
+    """Remaining share of the amplitude after this time of vibration."""
     return 1.0 - p.sag_ratio * (1.0 - math.exp(-vibrating_s / p.sag_settling_s))
 
 
 @kernel
 def load_share(sag_per_N: float, force_N: float) -> float:
-    """Share of the amplitude that is left under this drive force."""
+    """Remaining share of the amplitude under this drive force."""
     return max(1.0 - sag_per_N * math.fabs(force_N), 0.0)
 
 
@@ -50,7 +50,7 @@ def _set_resonance(p: Any, form: str, value: dict[str, float]) -> None:
     p.mount_resonance_Hz, p.mount_damping_ratio = value["resonance_Hz"], value["damping_ratio"]
     if form == "mode":
         p.mode_ratio = value["ratio"]
-        p.mount_resonance_Hz *= value["ratio"] > 0.0  # a mode that takes no part leaves a rigid mount
+        p.mount_resonance_Hz *= value["ratio"] > 0.0  # a mode of share 0 leaves a rigid mount
 
 
 def _set_sag(p: Any, _form: str, value: dict[str, float]) -> None:
@@ -63,10 +63,12 @@ PIEZO: Final = {
     "piezo-roll-off": Effect(
         "piezo",
         {
-            "first-order": Form(
+            "first-order": Formula(
                 "amplitude / sqrt(1 + (f / corner_Hz)^2)", (Parameter("corner_Hz", 50.0, 1e7, 3000.0),)
             ),
-            "second-order": Form("amplitude / (1 + (f / corner_Hz)^2)", (Parameter("corner_Hz", 50.0, 1e7, 5000.0),)),
+            "second-order": Formula(
+                "amplitude / (1 + (f / corner_Hz)^2)", (Parameter("corner_Hz", 50.0, 1e7, 5000.0),)
+            ),
         },
         _set_roll_off,
         numbers=("rolloff_Hz", "rolloff_order"),
@@ -74,10 +76,8 @@ PIEZO: Final = {
     "piezo-resonance": Effect(
         "piezo",
         {
-            "mount": Form(
-                "amplitude times the gain of a mass on a spring, instead of what the rig's own mount does", _MODE
-            ),
-            "mode": Form(
+            "mount": Formula("amplitude times the gain of a mass on a spring, in place of the rig's mount", _MODE),
+            "mode": Formula(
                 "amplitude times |1 + ratio r^2 / (1 - r^2 + 2 i damping_ratio r)|, r = f / resonance_Hz, likewise instead",
                 (ratio(0.3, 0.0, 10.0), *_MODE),
             ),
@@ -88,8 +88,8 @@ PIEZO: Final = {
     "piezo-sag": Effect(
         "piezo",
         {
-            "load": Form("amplitude times 1 - ratio |F_d| / F_s", (_SAG,)),
-            "heat": Form(
+            "load": Formula("amplitude times 1 - ratio |F_d| / F_s", (_SAG,)),
+            "heat": Formula(
                 "amplitude times 1 - ratio (1 - exp(-t / settling_s)), t since the piezo was switched on",
                 (_SAG, Parameter("settling_s", 0.05, 1e4, 3.0)),
             ),

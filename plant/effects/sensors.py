@@ -4,16 +4,16 @@ import math
 from typing import Any, Final
 
 from bridge.kernel import Record, kernel
-from plant.effects.row import Effect, Form, Parameter, one_form, ratio
+from plant.effects.row import Effect, Formula, Parameter, one_form, ratio
 
 LONGEST_DELAY: Final = 254  # samples; 12.7 ms at 20 kHz
 LAG_ORDERS: Final = {"first-order": 1, "second-order": 2, "fourth-order": 4}  # low-passes of a slow force sensor
-_DELAY_LINE = LONGEST_DELAY + 2  # the delayed sample, the one before it, the one of now
+_DELAY_LINE = LONGEST_DELAY + 2  # the delayed sample, the previous and the present sample
 
 
 @kernel
 def force_reading_N(p: Record, s: Record, force_N: float, t_s: float) -> float:
-    """What the force sensor's faults make of its signal; once a sample."""
+    """The signal of the force sensor with its faults; call it once per sample."""
     if p.force_lag_s > 0.0:
         share = 1.0 - math.exp(-p.dt_s * p.steps_per_sample / p.force_lag_s)
         for i in range(int(p.force_lag_order)):
@@ -30,7 +30,7 @@ def force_reading_N(p: Record, s: Record, force_N: float, t_s: float) -> float:
     offset_N = p.force_bias_N + p.force_drift_N_per_s * t_s
     if p.force_settling_s > 0.0:
         offset_N += p.force_drift_N * (1.0 - math.exp(-t_s / p.force_settling_s))
-    return force_N * (1.0 + p.force_ratio) + offset_N / p.force_gain  # which is applied to all of it, where it is read
+    return force_N * (1.0 + p.force_ratio) + offset_N / p.force_gain  # the gain is applied to the sum when it is read
 
 
 def _set_force_gain(p: Any, _form: str, value: dict[str, float]) -> None:
@@ -77,8 +77,8 @@ SENSORS: Final = {
     "force-sensor-drift": Effect(
         "sensor",
         {
-            "linear": Form("reading plus rate t", (Parameter("rate_N_per_s", -1e3, 1e3, 0.05),)),
-            "settling": Form(
+            "linear": Formula("reading plus rate t", (Parameter("rate_N_per_s", -1e3, 1e3, 0.05),)),
+            "settling": Formula(
                 "reading plus drift_N (1 - exp(-t / settling_s))",
                 (Parameter("drift_N", -1e5, 1e5, 0.5), Parameter("settling_s", 0.1, 1e4, 5.0)),
             ),
@@ -90,9 +90,9 @@ SENSORS: Final = {
     "force-sensor-lag": Effect(
         "sensor",
         {
-            "first-order": Form("reading through a first-order low-pass", (Parameter("lag_s", 0.0, 1.0, 1e-3),)),
-            "second-order": Form("reading through two equal low-passes", (Parameter("lag_s", 0.0, 1.0, 5e-4),)),
-            "fourth-order": Form("reading through four equal low-passes", (Parameter("lag_s", 0.0, 1.0, 2.5e-4),)),
+            "first-order": Formula("reading through a first-order low-pass", (Parameter("lag_s", 0.0, 1.0, 1e-3),)),
+            "second-order": Formula("reading through two equal low-passes", (Parameter("lag_s", 0.0, 1.0, 5e-4),)),
+            "fourth-order": Formula("reading through four equal low-passes", (Parameter("lag_s", 0.0, 1.0, 2.5e-4),)),
         },
         _set_lag,
         numbers=("force_lag_s", "force_lag_order"),
@@ -110,9 +110,9 @@ SENSORS: Final = {
     "accelerometer-gain": Effect(
         "sensor",
         {
-            "both": Form("both accelerations times 1 + ratio", (ratio(0.05),)),
-            "mass": Form("acceleration of the mass times 1 + ratio", (ratio(0.05),)),
-            "base": Form("acceleration of the base times 1 + ratio", (ratio(0.05),)),
+            "both": Formula("both accelerations times 1 + ratio", (ratio(0.05),)),
+            "mass": Formula("acceleration of the mass times 1 + ratio", (ratio(0.05),)),
+            "base": Formula("acceleration of the base times 1 + ratio", (ratio(0.05),)),
         },
         _set_accelerometer,
         numbers=("mass_accel_ratio", "base_accel_ratio"),

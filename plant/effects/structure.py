@@ -1,4 +1,4 @@
-"""What holds the drive and the base: both yield and swing, each a mass on a spring of its own."""
+"""Compliant supports of drive and base: each a mass on a spring."""
 
 from typing import Any, Final
 
@@ -17,7 +17,7 @@ def frame_gain_mps(
     frame_m: float,
     frame_mps: float,
 ) -> float:
-    """What the frame's velocity gains over a step under the drive's force: m q'' = F_d - q / c - damping, m = 1 / (c omega^2).
+    """Change of the frame's velocity over a step under the drive's force: m q'' = F_d - q / c - damping, m = 1 / (c omega^2).
 
     Args:
         dt, omega: step [s]; the frame's own frequency [rad/s].
@@ -35,7 +35,7 @@ def frame_gain_mps(
 
 @kernel
 def base_give(dt: float, omega: float, loss: float, base_m_per_N: float) -> float:
-    """Mean velocity that the base gains over a step for every newton of friction [m/(N s)]: of a mass of 1 / (c omega^2)."""
+    """Mean velocity of the base over a step per newton of friction [m/(N s)]: of a mass of 1 / (c omega^2)."""
     return 0.5 * dt * base_m_per_N * omega * omega / (1.0 + loss)
 
 
@@ -61,7 +61,7 @@ STRUCTURE: Final = {
     "frame-compliance": Effect(
         "structure",
         one_form(
-            "what holds the drive yields: stiffness k_d / ratio, its own frequency and damping ratio",
+            "the drive's support yields: stiffness k_d / ratio, with a frequency and a damping ratio",
             ratio(0.1, 0.0, 10.0),
             Parameter("frequency_Hz", 5.0, 2000.0, 80.0),
             _DAMPING_RATIO,
@@ -75,7 +75,7 @@ STRUCTURE: Final = {
     "base-compliance": Effect(
         "structure",
         one_form(
-            "what holds the base yields under the friction force, with its own frequency and damping ratio",
+            "the base's support yields under the friction force, with a frequency and a damping ratio",
             Parameter("compliance_m_per_N", 0.0, 1e-3, 1e-6),
             Parameter("frequency_Hz", 5.0, 2000.0, 150.0),
             _DAMPING_RATIO,

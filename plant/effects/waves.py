@@ -1,4 +1,4 @@
-"""Waves and smooth noise, which several effects are made of."""
+"""Waves and smooth noise used by several effects."""
 
 import math
 
@@ -9,7 +9,7 @@ TWO_PI = 2.0 * math.pi
 
 @kernel
 def lattice_value(index: float, seed: float) -> float:
-    """A number of unit variance that belongs to a lattice point: the same on every machine, no generator needed."""
+    """A number of unit variance for a lattice point: the same on every computer, without a generator."""
     mixed = math.sin(index * 12.9898 + seed * 78.233) * 43758.5453
     return (mixed - math.floor(mixed) - 0.5) * math.sqrt(12.0)
 
@@ -23,7 +23,7 @@ def smooth_noise(at: float, seed: float) -> float:
 
 @kernel
 def noise_in_cell(share: float, before: float, after: float) -> float:
-    """Smooth noise at a share of the way from one lattice point to the next, from its values there."""
+    """Smooth noise between two lattice points, from its values there and the share of the distance."""
     share = share * share * (3.0 - 2.0 * share)
     # the mean of (1 - share)^2 + share^2 over a cell is 26/35
     return (before * (1.0 - share) + after * share) / math.sqrt(26.0 / 35.0)

@@ -1,4 +1,4 @@
-"""Faults of the rig's clock: the time and the numbers that its blocks carry, while the rig itself goes on."""
+"""Faults of the rig's clock: wrong times and numbers of its blocks, while the rig itself continues."""
 
 from typing import Any
 

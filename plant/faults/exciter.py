@@ -1,4 +1,4 @@
-"""Faults of the exciter: what the base truly does of what the guard let through. They change the rig's own numbers."""
+"""Faults of the exciter: the true motion of the base under an allowed command. They change the rig's parameters."""
 
 import math
 from typing import Any
@@ -10,8 +10,8 @@ _WARMING_S = 1.0
 _LOOSE_DAMPING = 0.05
 
 
-class Exciter:
-    """Sets the exciter's numbers in `plant.records.PARAMS` from those of the healthy rig and the faults that act.
+class ExciterFaults:
+    """Sets the exciter's numbers in `plant.records.PARAMS` from the healthy rig and the acting faults.
 
     Args:
         params: record of the rig.
@@ -23,7 +23,7 @@ class Exciter:
         self._healthy = {name: float(params[name]) for name in FIELDS}
 
     def set(self, faults: list[tuple[FaultTable, float]]) -> None:
-        """`faults`: those that act, each with the time since its begin [s]."""
+        """`faults`: the acting faults, each with the time since its begin [s]."""
         now = dict(self._healthy)
         for table, since_s in faults:
             size = table.size

@@ -1,4 +1,4 @@
-"""The bus in one direction, with faults: what becomes of the messages on their way, block by block."""
+"""The bus in one direction, with faults: drops, delays and changes messages, block by block."""
 
 import heapq
 from typing import Any, NamedTuple
@@ -11,19 +11,19 @@ from bridge.wire.topics import SENSORS
 from plant.faults.table import FaultTable
 
 _CORRUPTED_BYTES = 3
-_FOREIGN_RUN = 666  # of a command that nobody of the run sent
-_MOST_WAITING = 20_000  # messages; ten seconds of two directions
+_FOREIGN_RUN = 666  # run number of a forged command
+_MOST_WAITING = 20_000  # messages: ten seconds of both directions
 
 
 class Message(NamedTuple):
-    """Bytes on their way, and what belongs to them."""
+    """The bytes of a message under way, and the object they belong to."""
 
     payload: bytes
     of: Any = None
 
 
 class Line:
-    """One direction: `send` takes the messages of a block, `arrive` gives those that are due.
+    """One direction: `send` takes the messages of a block, `arrive` returns the messages that are due.
 
     Args:
         block_s: length of a block, in which times are counted.
@@ -39,16 +39,16 @@ class Line:
 
     @property
     def empty(self) -> bool:
-        """Whether nothing is on its way."""
+        """Whether no message is under way."""
         return not self._waiting
 
     def send(self, message: Message, block: int, faults: list[tuple[FaultTable, int, np.random.Generator]]) -> None:
-        """Put a message on its way in a block.
+        """Send a message in a block.
 
         Args:
             message: the message.
             block: number of the block.
-            faults: those that act, each with the block at which it ends and its random numbers.
+            faults: the acting faults, each with its last block and its random numbers.
 
         """
         due, copies, more = float(block), [message], []
@@ -63,32 +63,32 @@ class Line:
             elif table.kind == "jittered":
                 due += random.random() * size / self._block_s
             elif table.kind == "reordered":
-                due += 1.5 * (self._sent % 2)  # after the next one, which comes a block later
+                due += 1.5 * (self._sent % 2)  # after the next message, which follows a block later
             elif table.kind == "held":
                 due = max(due, float(until))
             elif table.kind == "corrupted" and random.random() < size:
-                copies = [Message(_corrupted(one.payload, random), one.of) for one in copies]
+                copies = [Message(_corrupted(copy.payload, random), copy.of) for copy in copies]
             elif table.kind == "truncated" and random.random() < size:
-                copies = [one._replace(payload=one.payload[: random.integers(len(one.payload))]) for one in copies]
+                copies = [copy._replace(payload=copy.payload[: random.integers(len(copy.payload))]) for copy in copies]
             elif table.kind == "forged":
                 more = [Message(self._forged(message.payload), message.of)] * round(size)
-        for one in (*copies, *more):
+        for copy in (*copies, *more):
             if len(self._waiting) < _MOST_WAITING:
-                heapq.heappush(self._waiting, (due, self._sent, one))
+                heapq.heappush(self._waiting, (due, self._sent, copy))
                 self._sent += 1
 
     def arrive(self, block: int) -> list[Message]:
         """The messages that arrive in a block, in order of arrival."""
-        found: list[Message] = []
+        arrived: list[Message] = []
         while self._waiting and self._waiting[0][0] < block + 1:
-            found.append(heapq.heappop(self._waiting)[2])
-        return found
+            arrived.append(heapq.heappop(self._waiting)[2])
+        return arrived
 
     def _forged(self, payload: bytes) -> bytes:
         if self._commands:
-            said = wire.Command.FromString(payload)
-            said.run, said.amplitude_m, said.frequency_Hz = _FOREIGN_RUN, 1e-7, 4500.0
-            return said.SerializeToString()
+            command = wire.Command.FromString(payload)
+            command.run, command.amplitude_m, command.frequency_Hz = _FOREIGN_RUN, 1e-7, 4500.0
+            return command.SerializeToString()
         block = wire.SensorBlock.FromString(payload)
         block.sequence += 1 << 40
         layout = sensor_block(len(block.drive_force_N))

@@ -1,4 +1,4 @@
-"""A person's order to a running rig: a fault from now on, as a message of the topic `fault`."""
+"""An operator's fault-injection request to a running rig: a fault from now on, as a message of the topic `fault`."""
 
 import collections
 import json
@@ -12,14 +12,14 @@ from plant.faults.kinds import PROCESS
 from plant.faults.schedule import Faults
 from plant.faults.table import FaultTable
 
-_LONGEST = 10_000  # bytes of a table; one of any kind has fewer than 500
+_LONGEST = 10_000  # bytes of a table; every valid table has fewer than 500
 
 
-_REMEMBERED = 64  # orders; who says one again does so within a second
+_REMEMBERED = 64  # orders; a repeated order arrives within a second
 
 
 class Orders:
-    """The orders that a rig takes.
+    """The fault-injection requests to a rig.
 
     Args:
         faults: of the rig.
@@ -31,9 +31,9 @@ class Orders:
         self._taken: collections.deque[str] = collections.deque(maxlen=_REMEMBERED)
 
     def take(self, payload: bytes, block: int) -> None:
-        """Add the fault of a message to those of the rig, from block `block` on; one that was taken already is ignored.
+        """Add the fault of a request to the rig from block `block` on; a repeated request is ignored.
 
-        Raises Fault BAD_MESSAGE for bytes that are no order, CONFIG for a table that is no fault of a rig.
+        Raises Fault BAD_MESSAGE for a malformed request, CONFIG for an invalid fault of a rig.
         """
         order = parsed(wire.Inject, payload, FAULT.name)
         if order.id and order.id in self._taken:
@@ -52,9 +52,9 @@ def _table(text: str) -> FaultTable:
     except (ValueError, RecursionError):
         table = None
     if not isinstance(table, dict):
-        raise Fault("BAD_MESSAGE", f"{FAULT.name}: fault: is no JSON object; send a table [[fault]]")
+        raise Fault("BAD_MESSAGE", f"{FAULT.name}: fault: is not a JSON object; send a table [[fault]]")
     made = validate(FaultTable, table, FAULT.name)
     if made.group == PROCESS:
-        line = f"{FAULT.name}: target = {made.target}: a rig ends no process; must be of sensors, exciter, clock or bus"
+        line = f"{FAULT.name}: target = {made.target}: a rig cannot end a process; must be of sensors, exciter, clock or bus"
         raise Fault("CONFIG", f"{line}; end the process by its pid")
     return made

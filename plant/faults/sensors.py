@@ -1,17 +1,15 @@
-"""Faults of sensors: what a channel shows in place of its samples, before anybody reads it, the rig's guard included."""
+"""Faults of sensors: they replace the samples of a channel for every reader, including the rig's guard."""
 
 import math
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.wire.messages import CHANNELS
 from plant.faults.kinds import ALL_SENSORS, LARGEST
 from plant.faults.table import FaultTable
-
-Floats = npt.NDArray[np.float64]
 
 _JUMP_S = 0.1
 _HUM_HZ = 50.0
@@ -19,12 +17,12 @@ _LOOSE_BLOCKS = 5.0  # mean length of a burst
 
 
 class SensorFault:
-    """One fault of one channel, or of all.
+    """One fault of one channel, or of all channels.
 
     Args:
         table: the fault.
-        random: its own stream of random numbers.
-        sample_s: between two samples.
+        random: its random numbers.
+        sample_s: time between two samples.
 
     """
 
@@ -35,7 +33,7 @@ class SensorFault:
         self._makers = {name: _Channel(table.size, random, sample_s) for name in self._channels}
 
     def look(self, block: Any) -> None:
-        """Remember a healthy block, the last before the fault."""
+        """Store a healthy block, the last before the fault."""
         for name in self._channels:
             self._makers[name].before = block[name].astype(np.float64)
 
@@ -48,9 +46,9 @@ class SensorFault:
 
         """
         if self._spoil is None:
-            here = block[self._channels[0]].copy()
+            samples = block[self._channels[0]].copy()
             block[self._channels[0]][:] = block[self._other]
-            block[self._other][:] = here
+            block[self._other][:] = samples
             return
         for name in self._channels:
             samples = self._spoil(self._makers[name], block[name].astype(np.float64), since_s)
@@ -58,7 +56,7 @@ class SensorFault:
 
 
 class _Channel:
-    """What a fault knows of one channel."""
+    """The state of a fault on one channel."""
 
     def __init__(self, size: float, random: np.random.Generator, sample_s: float) -> None:
         self.size, self.random, self.sample_s = size, random, sample_s
@@ -85,7 +83,7 @@ class _Channel:
         return samples + self.size
 
     def delayed(self, samples: Floats, _s: float) -> Floats:
-        """By whole samples; until the first has come through, the channel holds."""
+        """By whole samples; until the first has arrived, the channel holds its last value."""
         count = round(self.size / self.sample_s)
         self.line = [np.concatenate([*self.line, samples])]
         missing = max(len(samples) + count - len(self.line[0]), 0)
@@ -117,7 +115,7 @@ class _Channel:
         return samples + self.size * self.random.standard_normal(samples.shape)
 
     def loose(self, samples: Floats, _s: float) -> Floats:
-        """Of two states that follow one another, so that it is off for `size` of the time."""
+        """Alternating between two states, so that it is off for `size` of the time."""
         share = min(max(self.size, 1e-6), 1.0 - 1e-6)
         odds = (1.0 - share) if self.is_off else share
         if self.random.random() < odds / (_LOOSE_BLOCKS * max(share, 1.0 - share)):
@@ -128,7 +126,7 @@ class _Channel:
         return np.round(samples / self.size) * self.size if self.size > 0.0 else samples
 
     def flipped(self, samples: Floats, _s: float) -> Floats:
-        """As the wire would carry it: of a number of four bytes."""
+        """As on the wire: in a 4-byte number."""
         if self.random.random() < self.size:
             carried = samples.astype(np.float32)
             carried.view(np.uint32)[self.random.integers(len(samples))] ^= np.uint32(1 << int(self.random.integers(32)))

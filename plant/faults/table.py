@@ -1,4 +1,4 @@
-"""One table `[[fault]]` of a scenario: what goes wrong, where, from when and for how long."""
+"""One table `[[fault]]` of a scenario: kind, target, begin and duration of a fault."""
 
 from typing import Annotated
 
@@ -8,22 +8,22 @@ from bridge.config import Strict
 from bridge.wire.messages import CHANNELS
 from plant.faults.kinds import BUS, KINDS, LARGEST, PROCESS, SENSORS, TARGETS, group_of
 
-_LONGEST_S = 1e9  # 30 years; a time far beyond is no number of blocks
+_LONGEST_S = 1e9  # 30 years; a far longer time overflows the count of blocks
 
 
 class FaultTable(Strict):
-    """A fault that a run has on purpose. The rig must be simulated."""
+    """A fault injected into a run. The rig must be simulated."""
 
     name: str = Field(
         default="", pattern=r"^[^\x00-\x1f\x7f]*$", description="In events and verdicts; KIND TARGET if not given."
     )
-    kind: str = Field(description="What goes wrong: `stickslip fault --list` has all kinds.")
+    kind: str = Field(description="Kind of the fault: `stickslip fault --list` lists all kinds.")
     target: str = Field(description="A channel, sensors, exciter, clock, blocks, commands, link, or a process.")
     from_s: Annotated[float, Field(ge=0, le=_LONGEST_S)] = Field(
         default=0.0, description="Time of the run at which it begins."
     )
-    for_s: Annotated[float, Field(ge=0, le=_LONGEST_S)] = Field(default=0.0, description="How long; 0: to the end.")
-    value: float | None = Field(default=None, description="Its size, by kind.")
+    for_s: Annotated[float, Field(ge=0, le=_LONGEST_S)] = Field(default=0.0, description="Duration; 0: to the end.")
+    value: float | None = Field(default=None, description="Size of the fault; its meaning depends on the kind.")
     other: str = Field(default="", description="Of `swapped`: the other channel.")
 
     @model_validator(mode="after")
@@ -51,28 +51,28 @@ class FaultTable(Strict):
         if self.other and (self.other not in CHANNELS or self.target not in CHANNELS or self.other == self.target):
             raise ValueError(f"other = {self.other}: must be another channel than target; known: {', '.join(CHANNELS)}")
         if self.kind == "held" and not self.for_s:
-            raise ValueError("for_s = 0: messages that are held must come some time; give for_s")
+            raise ValueError("for_s = 0: held messages must arrive some time; give for_s")
         if group == PROCESS and self.kind == "frozen" and not self.for_s:
-            raise ValueError("for_s = 0: a process that is frozen must go on some time; give for_s, or kind = killed")
+            raise ValueError("for_s = 0: a frozen process must continue some time; give for_s, or kind = killed")
         return self
 
     @property
     def group(self) -> str:
-        """Of its target."""
+        """The group of its target."""
         return group_of(self.target) or ""
 
     @property
     def size(self) -> float:
-        """Its value, or the default of its kind; 0 where the kind has none."""
+        """Its value, or the default of its kind; 0 for a kind without value."""
         return self.value if self.value is not None else KINDS[(self.group, self.kind)].default or 0.0
 
     @property
     def needs_time(self) -> bool:
-        """Whether it means nothing in lockstep, where each block waits for its command."""
+        """Whether it has no meaning in lockstep, where each block waits for its command."""
         return self.group in {BUS, PROCESS}
 
     def in_words(self) -> str:
-        """Name and what it is."""
+        """Name and short description."""
         size = f" {self.size:g}" if KINDS[(self.group, self.kind)].value else ""
-        what = f"{self.target} {self.kind}{size}{f' with {self.other}' if self.other else ''}"
-        return f"{self.name}: {what}" if self.name else what
+        text = f"{self.target} {self.kind}{size}{f' with {self.other}' if self.other else ''}"
+        return f"{self.name}: {text}" if self.name else text

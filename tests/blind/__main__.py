@@ -1,4 +1,4 @@
-"""`python -m tests.blind make`: a set of rigs with sealed answers, for `stickslip blind run` and `score`."""
+"""`python -m tests.blind make`: a set of rigs with sealed answers, for `python -m bench blind run` and `score`."""
 
 import sys
 from enum import StrEnum
@@ -25,7 +25,7 @@ class GeneratorName(StrEnum):
 
 @app.callback()
 def commands() -> None:
-    """Make sealed cases that `stickslip blind run` diagnoses and `stickslip blind score` opens."""
+    """Make sealed cases that `python -m bench blind run` diagnoses and `python -m bench blind score` opens."""
 
 
 @app.command("make")
@@ -60,7 +60,7 @@ def make(
         check_writable("--key", key)
         with writing(), watched() as progress:
             make_set(out, key, generator.value, cases, seed, jobs or cpu_count(), progress)
-        print(f"{cases} cases    {out}\nkey         {key}\nnext        stickslip blind run {out}")
+        print(f"{cases} cases    {out}\nkey         {key}\nnext        python -m bench blind run {out}")
 
     sys.exit(guarded(work))
 

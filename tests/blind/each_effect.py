@@ -12,15 +12,15 @@ from typing import Any
 import joblib
 import numpy as np
 
+from bench.blind.oracle import shrinkage_with
+from bench.blind.outcomes import Opened
+from bench.blind.scoring import score
+from bench.blind.table import TOOL, table
 from bridge.files import write_json
-from diagnosis.blind.oracle import shrinkage_with
-from diagnosis.blind.outcomes import Opened
-from diagnosis.blind.scoring import score
-from diagnosis.blind.table import TOOL, table
-from diagnosis.blind.version import tool_version
 from diagnosis.diagnose import diagnose
 from diagnosis.evidence.folder import load_evidence
 from diagnosis.result import to_json
+from diagnosis.version import tool_version
 from tests.blind.generators import Plan
 from tests.blind.plant_cases import Plant, PlantEffect, drawn
 from tests.blind.plant_sizes import EFFECT_SIZES

@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 import joblib
 import numpy as np
 
+from bench.blind.sealing import Answer, Secret, refuse_key_inside, write_key, write_set
 from bridge.faults import Fault
 from bridge.files import write_json
-from diagnosis.blind.sealing import Answer, Secret, refuse_key_inside, write_key, write_set
-from diagnosis.blind.version import tool_version
+from diagnosis.version import tool_version
 from tests.blind.generators import Effect, Generator, Plan, generator
 from tests.blind.real_logs import real_cases
 from tests.blind.sizes import OPENED, Sizes, known_sizes, write_sizes

@@ -1,7 +1,7 @@
 """Faults of a force sensor added to real logs: all else in the evidence is as it was measured.
 
 The rig tables describe what the clean logs show, so a fault differs from them. The clean rigs already have gaps of their own to
-any simple model (docs/quality/real-evidence.md): the fault is the largest new gap, and not the only one.
+any simple model (docs/quality/results.md): the fault is the largest new gap, and not the only one.
 """
 
 from collections.abc import Callable, Iterator

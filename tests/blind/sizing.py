@@ -5,7 +5,7 @@ square of the length that a matched filter would see. Both evidences have a smoo
 moves every slip to another place, which alone looks like two detection limits. The noise floor is that of the rough surface. A
 detection limit is the length at which the log evidence of a single effect with one parameter reaches 8.
 
-A linear estimate, the difference without the nuisances' directions, is not enough (docs/method/blind.md).
+A linear estimate, the difference without the nuisances' directions, is not enough (docs/method/diagnosis.md).
 """
 
 import math
@@ -99,7 +99,7 @@ class Bench:
 
 
 def _refitted(fitter: Fitter, deviations: Floats) -> Fit:
-    """The baseline, refitted further where much chi2 is left, as a single refit may stop early (docs/method/blind.md)."""
+    """The baseline, refitted further where much chi2 is left, as a single refit may stop early (docs/method/diagnosis.md)."""
     fit = fitter.refit(NOTHING, deviations, np.zeros(0))
     return fit if fit.chi2 <= _MUCH * len(fit.residual) else fitter.further(fit)
 

@@ -11,7 +11,7 @@ from unittest.mock import patch
 
 import joblib
 
-from diagnosis.blind.sealing import Answer
+from bench.blind.sealing import Answer
 from tests.blind import strata
 from tests.blind.generator.runs import Plan as RunPlan
 from tests.blind.generators import Generator, Plan

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.blind.outcomes import Opened, opened
+from bench.blind.outcomes import Opened, opened
 from tests import made_up
 from tests.blind.generators import Plan
 

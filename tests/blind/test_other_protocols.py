@@ -1,6 +1,6 @@
 """Rigs without a gap under other protocols than the blind check's: what a model cannot know must not count as a gap.
 
-The figures of the models that called these rigs a gap are in docs/method/blind.md.
+The figures of the models that called these rigs a gap are in docs/method/diagnosis.md.
 """
 
 from pathlib import Path

@@ -5,7 +5,7 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from cockpit.cli import app
+from bench.app import app
 from tests.blind import making, strata
 from tests.blind.__main__ import app as making_app
 from tests.blind.independent_cases import Independent

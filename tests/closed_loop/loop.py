@@ -5,12 +5,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from bench.control import rules
+from bench.control.loop import Hum, JudgedLoop
 from bridge.config import validate
 from bridge.wire.messages import TRACE as TRACE_LAYOUT
 from bridge.wire.messages import sealed
 from bridge.wire.topics import TRACE
-from cockpit.bank import rules
-from cockpit.bank.loop import Hum, JudgedLoop
 from controller.config import ControllerConfig
 from controller.node import ControllerNode
 from controller.records import build

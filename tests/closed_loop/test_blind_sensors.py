@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from bench.control.drawn import drawn_axes
 from bridge.log.damage import Damage
 from bridge.wire.messages import CHANNELS
-from cockpit.bank.drawn import drawn_axes
 from cockpit.judge.run_judge import RunJudge
 from cockpit.judge.verdict import RunVerdict
 from cockpit.run.in_process import run_onboard

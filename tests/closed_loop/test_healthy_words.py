@@ -3,28 +3,28 @@
 import numpy as np
 import pytest
 
-from bridge.guard.tell import Teller
-from bridge.guard.tell import changes as guard_changes
+from bridge.guard.events import GuardEvents
+from bridge.guard.events import changes as guard_changes
 from bridge.wire import stickslip_pb2 as wire
-from cockpit.run.closed_loop import Blocks, ClosedLoop
+from cockpit.run.closed_loop import ClosedLoop, StretchMessages
 from cockpit.run.scenario import load_scenario
-from controller.trips.tell import TripTeller, changes
+from controller.trips.trip_events import TripEvents, changes
 
 ARM, DISARM = wire.Operator.ARM, wire.Operator.DISARM
 
 
-def played(name: str, seconds: float, words: dict[float, int]) -> tuple[set[str], list[Blocks]]:
+def played(name: str, seconds: float, words: dict[float, int]) -> tuple[set[str], list[StretchMessages]]:
     """What guard and controller say in a run in which a person says `words`, at these times, and its blocks."""
     scenario = load_scenario(name, ["controller.policy.enabled_from_s=0.0"])
     loop = ClosedLoop(scenario.rig, scenario.seed, scenario.controller, arm=False)
     block_s = scenario.rig.solver.block_s
-    guard, trips = Teller(), TripTeller()
+    guard, trips = GuardEvents(), TripEvents()
     said: set[str] = set()
-    parts: list[Blocks] = []
+    parts: list[StretchMessages] = []
     for at_s, ends_s in zip(words, [*list(words)[1:], seconds], strict=True):
         if loop.block < round(at_s / block_s):
             parts.append(loop.advance(round(at_s / block_s) - loop.block))
-        loop.obey(words[at_s])
+        loop.apply_order(words[at_s])
         parts.append(loop.advance(round(ends_s / block_s) - loop.block))
     for part in parts:
         said |= {code for row in guard_changes(part.applied) for code, _ in guard.news(part.applied[row])}

@@ -8,7 +8,7 @@ import pytest
 from bridge.log.logfile import RunData, read_run
 from bridge.log.runlog import RunLog
 from bridge.wire import stickslip_pb2 as wire
-from cockpit.run.in_process import Word, run_onboard
+from cockpit.run.in_process import TimedAction, run_onboard
 from cockpit.run.scenario import Scenario, header, load_scenario
 from controller.codes import BLOCK, RESET, STOP
 from controller.node import ControllerNode
@@ -24,7 +24,7 @@ STOP_NS, RESET_NS, ARM_NS, CHANGE_NS = (
 TABLES = ("sensors", "applied", "command", "trace", "state")
 
 
-def block_by_block(scenario: Scenario, log: Path, changes: list[Change], words: list[Word]) -> RunData:
+def block_by_block(scenario: Scenario, log: Path, changes: list[Change], words: list[TimedAction]) -> RunData:
     """What the processes do in lockstep, without a bus."""
     plant, controller = PlantNode(scenario.rig, scenario.seed, arm=True), ControllerNode(scenario.controller)
     written = RunLog(log, lockstep=True)
@@ -35,7 +35,7 @@ def block_by_block(scenario: Scenario, log: Path, changes: list[Change], words: 
     while plant.block < round(scenario.duration_s * 1e3):
         t_ns = (plant.block + 1) * plant.block_ns
         for word in (word for word in to_say if t_ns >= word.t_ns):
-            plant.obey(word.action)
+            plant.apply_order(word.action)
         messages = [*plant.advance(commands)]
         while ahead and t_ns >= ahead[0].t_ns:
             controller.reconfigure(ahead.pop(0).config)
@@ -62,7 +62,12 @@ def test_stretches_make_the_messages_of_single_blocks(tmp_path: Path, scenario: 
     ]
     stop, reset = wire.Operator.STOP, wire.Operator.RESET
     arm = wire.Operator.ARM
-    words = [Word(STOP_NS, stop), Word(STOP_NS, reset), Word(RESET_NS, reset), Word(ARM_NS, arm)]
+    words = [
+        TimedAction(STOP_NS, stop),
+        TimedAction(STOP_NS, reset),
+        TimedAction(RESET_NS, reset),
+        TimedAction(ARM_NS, arm),
+    ]
     run_onboard(scenario, tmp_path / "run.mcap", {}, changes=changes, words=words)
     run = read_run(tmp_path / "run.mcap")
     expected = block_by_block(scenario, tmp_path / "blocks.mcap", changes, words)

@@ -17,7 +17,7 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.topics import SENSORS
 from cockpit.cli import app
 from cockpit.judge.verdict_words import headline, in_words
-from cockpit.run.in_process import Word, run_onboard
+from cockpit.run.in_process import TimedAction, run_onboard
 from cockpit.run.replay import changes_of
 from cockpit.run.scenario import Scenario, header, load_scenario
 from controller.node import ControllerNode
@@ -133,7 +133,7 @@ def test_a_controller_that_was_started_again_is_refused(log: Path) -> None:
     again["t_ns"] += 600_000_000
     restarted = run._replace(trace=np.concatenate([run.trace[:500], again]))
     with pytest.raises(
-        Fault, match=r"/trace: step 0 is there at 0.001 s and again at 0.601 s: the controller was started"
+        Fault, match=r"/trace: step 0 is recorded at 0.001 s and again at 0.601 s: the controller was started"
     ):
         replay(restarted, changes_of(run, []))
 
@@ -141,7 +141,7 @@ def test_a_controller_that_was_started_again_is_refused(log: Path) -> None:
 def test_two_controllers_that_answered_at_once_are_refused(log: Path) -> None:
     run = read_run(log)
     both = run._replace(trace=np.repeat(run.trace, 2))
-    with pytest.raises(Fault, match=r"/trace: step 0 is there at 0.001 s and again at 0.001 s: .*or two answered"):
+    with pytest.raises(Fault, match=r"/trace: step 0 is recorded at 0.001 s and again at 0.001 s: .*or two answered"):
         replay(both, changes_of(both, []))
 
 
@@ -209,9 +209,9 @@ def test_an_operators_stop_is_repeated_in_the_closed_loop_and_no_stick_slip_of_t
     stopped, again = tmp_path / "stopped.mcap", tmp_path / "again.mcap"
     run = load_scenario("from-the-start", ["duration_s=14.0"])
     words = [
-        Word(4_000_000_000, wire.Operator.STOP),
-        Word(9_000_000_000, wire.Operator.RESET),
-        Word(9_100_000_000, wire.Operator.ARM),
+        TimedAction(4_000_000_000, wire.Operator.STOP),
+        TimedAction(9_000_000_000, wire.Operator.RESET),
+        TimedAction(9_100_000_000, wire.Operator.ARM),
     ]
     run_onboard(run, stopped, {}, words=words)
     slips = verdict_of(read_run(stopped))

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from diagnosis.look.look import Known, look
+from diagnosis.look.look import RecordFacts, look
 from plant.config import RigConfig
 from plant.simulate import Simulation, simulate
 from tests.unit.diagnosis.look.rival import eight_lines
@@ -116,7 +116,7 @@ def main(seed: int, rigs: int) -> None:
             except IndexError:  # it finds no peak after a trough
                 rival = None
         rival_alike += rival is not None and abs(rival.slips - slips) <= 1
-        seen = look(t_s, force_N, None, Known(one.speed_mps))
+        seen = look(t_s, force_N, None, RecordFacts(one.speed_mps))
         if seen is None or "static_force_N" not in seen.numbers:
             silent += 1
             continue

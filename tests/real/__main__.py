@@ -1,4 +1,4 @@
-"""Diagnose the measured logs beside the repository and print the figures of docs/quality/real-evidence.md."""
+"""Diagnose the measured logs beside the repository and print the figures of docs/quality/results.md."""
 
 import argparse
 import json

@@ -1,4 +1,4 @@
-"""The figures of one diagnosis, a few lines of text: what docs/quality/real-evidence.md quotes."""
+"""The figures of one diagnosis, a few lines of text: what docs/quality/results.md quotes."""
 
 from bridge.units import percent, times
 from diagnosis.evidence.folder import Evidence

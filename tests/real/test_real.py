@@ -1,4 +1,4 @@
-"""What the diagnosis makes of measured logs, where that is robust; its errors are in docs/quality/real-evidence.md."""
+"""What the diagnosis makes of measured logs, where that is robust; its errors are in docs/quality/results.md."""
 
 from pathlib import Path
 

@@ -152,7 +152,7 @@ def test_a_second_run_leaves_the_first_alone(tmp_path: Path, runs: list[Run]) ->
     first.wait_until_recording()
     result = call("run", "--set", "duration_s=1.0", "--endpoint", endpoint, "--log", str(first.log))
     assert result.returncode == FAULTS["ENDPOINT_BUSY"].exit_status
-    assert f"{endpoint}: cannot listen there" in result.stderr
+    assert f"{endpoint}: cannot listen on it" in result.stderr
     assert len(told(result.stderr)) == 1
     assert not gone(first.process.pid)
     first.process.send_signal(signal.SIGINT)
@@ -179,7 +179,7 @@ def test_a_rig_whose_numbers_run_away_is_no_quiet_one(tmp_path: Path) -> None:
         result = call("run", *endless, *more, "--log", str(tmp_path / "run.mcap"))
         assert result.returncode == FAULTS["CONFIG"].exit_status
         assert told(result.stderr)[0].startswith(
-            "stickslip: CONFIG: paper-c45-c45: the slide's velocity is no number at 0.00"
+            "stickslip: CONFIG: paper-c45-c45: the slide's velocity is not finite at 0.00"
         )
         assert "solver.step_s = 1e-05" in result.stderr
         assert len(told(result.stderr)) == 1

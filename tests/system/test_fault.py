@@ -39,7 +39,7 @@ def test_a_fault_acts_and_a_process_is_killed() -> None:
             assert {"INJECTED", "INJECTION_ENDED"} <= told
         nobody = call("fault", "controller-killed", *where)
         assert nobody.returncode == FAULTS["NO_PEER"].exit_status
-        assert "no controller answers there" in nobody.stderr
+        assert "no controller answers: must belong to the same run" in nobody.stderr
     finally:
         plant.terminate()
         plant.wait(30)

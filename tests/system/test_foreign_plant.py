@@ -122,11 +122,6 @@ def test_the_page_has_the_table_of_topics() -> None:
     assert table == rows
 
 
-def test_the_page_has_the_schema() -> None:
-    block = PAGE.split("```proto\n")[1].split("```")[0]
-    assert block == (ROOT / "bridge" / "wire" / "stickslip.proto").read_text()
-
-
 def test_the_page_has_the_lengths_of_canonical_messages() -> None:
     layouts = (
         *(messages.COMMAND, messages.APPLIED, messages.TRACE, messages.STATE, messages.ANNOUNCE),

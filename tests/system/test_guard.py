@@ -71,7 +71,7 @@ def test_a_rig_is_armed_by_a_person_and_a_stop_outlasts_its_process(tmp_path: Pa
         finally:
             process.send_signal(signal.SIGCONT)
         assert unheard.returncode == FAULTS["NO_PEER"].exit_status
-        assert "stands still" in unheard.stderr
+        assert "does not answer" in unheard.stderr
         assert "by hand" in unheard.stderr
     with rig(endpoint, environment, "--set", "arm=true", "--set", "rig.piezo.delivered_ratio=0.5"):
         assert say("status", endpoint)[1]["state"] == "ARMED"

@@ -112,7 +112,6 @@ def test_what_a_plain_installation_does_needs_no_extra(tmp_path: Path, plain: Pa
     "arguments",
     [
         ("diagnose", "evidence"),
-        ("blind", "run", "set"),
         ("log", "export", "run.mcap", "--to", "run.csv"),
         ("log", "import", "run.csv", "--map", "map.toml", "--out", "evidence"),
         ("reproduce",),

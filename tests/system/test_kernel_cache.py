@@ -67,7 +67,7 @@ import bridge.kernel
         timeout=PATIENCE_S,
         check=True,
     )
-    assert "its home is not known" in done.stderr
+    assert "the home folder is unknown" in done.stderr
     assert done.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir())
 
@@ -104,4 +104,4 @@ def test_of_two_first_starts_at_once_one_process_compiles_each_set_and_nobody_is
         # the second process loads what the first has kept, and writes nothing
         done = next(cache.glob(f"the {role}-*")).stat().st_mtime_ns
         assert all(path.stat().st_mtime_ns <= done for path in cache.glob(f"{role}_*/*.nbc"))
-    assert not [line for line in lines if "have not found each other" in line]
+    assert not [line for line in lines if "have not connected to each other" in line]

@@ -172,7 +172,7 @@ def test_after_sigkill_only_what_is_missing_is_done(tmp_path):
     assert (index["left"], len(index["groups"][0]["rigs"])) == (["slow"], 1)
     (tmp_path / "all/slow/fast").touch()
     again = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert "1 of 2 are kept from before" in again.stderr
+    assert "1 of 2 reused from " in again.stderr
     assert (tmp_path / "all/a/done").read_text() == "once\n"
     assert (tmp_path / "all/slow/done").read_text() == "once\nonce\n"
     assert [one["evidence"] for one in json.loads((tmp_path / "all.json").read_text())["results"]] == ["a", "slow"]
@@ -195,7 +195,7 @@ def test_a_real_fleet_goes_on_after_sigkill(tmp_path):
     first.wait()
     kept = {path: path.stat().st_mtime_ns for path in (out / "results").glob("*.json")}
     again = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert f"{len(kept)} of 3 are kept from before" in again.stderr
+    assert f"{len(kept)} of 3 reused from " in again.stderr
     assert all(path.stat().st_mtime_ns == written for path, written in kept.items())
     index = json.loads((out / "index.json").read_text())
     assert (index["folders"], index["failed"], index["left"]) == (3, [], [])
@@ -203,7 +203,7 @@ def test_a_real_fleet_goes_on_after_sigkill(tmp_path):
     assert {rig["evidence"] for rig in group["rigs"]} >= {"rig-1", "rig-2"}
     assert all((out / rig["report"]).is_file() for group in index["groups"] for rig in group["rigs"])
     third = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert "3 of 3 are kept from before" in third.stderr
+    assert "3 of 3 reused from " in third.stderr
     assert third.stdout == again.stdout
 
 

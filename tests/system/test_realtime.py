@@ -152,7 +152,7 @@ def test_operator_stop_and_reset(tmp_path: Path) -> None:
     ("state", "told"),
     [
         (wire.ACTIVE, "the rig did not confirm STOP within 5 s, and is ACTIVE with a vibration of 37 nm"),
-        (None, "no rig says"),
+        (None, "no rig publishes"),
     ],
 )
 def test_a_rig_that_does_not_obey_is_said(state: int | None, told: str) -> None:
@@ -197,5 +197,5 @@ def test_rubbish_on_the_bus_stops_nobody(tmp_path: Path) -> None:
     assert int((data.trace["events"] & BLOCK).sum()) == 5000
     texts = [f"{event.code} {event.text}" for event in data.events]
     assert "BAD_MESSAGE operator: action = 7: not known: dropped" in texts
-    assert any(text.startswith("BAD_MESSAGE operator: 2 bytes are no Operator") for text in texts)
-    assert any(text.startswith("BAD_MESSAGE state: 3 bytes are no State") for text in texts)
+    assert any(text.startswith("BAD_MESSAGE operator: 2 bytes cannot be decoded as Operator") for text in texts)
+    assert any(text.startswith("BAD_MESSAGE state: 3 bytes cannot be decoded as State") for text in texts)

@@ -121,7 +121,7 @@ def test_who_stalls_says_so_and_the_run_goes_on(tmp_path: Path, role: str, for_s
 
 
 def test_a_frozen_controller_is_replaced(tmp_path: Path) -> None:
-    """Its link ends after the lease; 1.5 s on a quiet computer (docs/method/bridge.md)."""
+    """Its link ends after the lease; 1.5 s on a quiet computer (docs/method/rig.md)."""
     endpoint = free_endpoint()
     with processes(endpoint, tmp_path / "run.mcap") as started:
         await_commands(endpoint)

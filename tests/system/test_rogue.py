@@ -94,7 +94,7 @@ def test_a_stranger_ends_nobody_and_changes_no_vibration(tmp_path: Path) -> None
     assert run.returncode == FAULTS["INTERRUPTED"].exit_status, err
     assert json.loads(out)["fault"] == "INTERRUPTED"
     assert "warning" in err
-    assert "--insecure: whoever reaches this port can stop and command the exciter" in err
+    assert "--insecure: any program that reaches this port can command the exciter" in err
     data = read_run(log)
     assert len(data.sensors) > 2000
     assert data.damage.closed

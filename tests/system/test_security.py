@@ -140,7 +140,7 @@ def test_another_role_cannot_pass_for_the_rig(certificates: Path) -> None:
         "transport/link/tls/listen_certificate": str(certificates / "viewer.pem"),
         "transport/link/tls/listen_private_key": str(certificates / "viewer.key"),
     }
-    with rogue(config.endpoint, more=listening), pytest.raises(Fault, match="compare the certificates of both sides"):
+    with rogue(config.endpoint, more=listening), pytest.raises(Fault, match="check the certificates: both sides"):
         Bus(config, "controller", lockstep=False, patience_s=0.5)
 
 
@@ -162,6 +162,6 @@ def test_a_rig_that_others_reach_needs_tls(tmp_path: Path, arguments: list[str])
     more = ["--log", str(tmp_path / "run.mcap")] if arguments == ["run"] else []
     refused = call(*arguments, "--set", "duration_s=0.1", "--endpoint", f"tcp/0.0.0.0:{port}", *more)
     assert refused.returncode == FAULTS["NOT_SECURE"].exit_status
-    assert f"NOT_SECURE: tcp/0.0.0.0:{port}: others can reach it" in refused.stderr
+    assert f"NOT_SECURE: tcp/0.0.0.0:{port}: other computers can reach it" in refused.stderr
     assert "--insecure allows it" in refused.stderr
     assert not list(tmp_path.iterdir())

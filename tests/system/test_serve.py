@@ -147,7 +147,7 @@ async def _look(driven: str, page: str, token: str, pid: int) -> None:
             "document.getElementById('said').textContent", lambda text: text.startswith("FAULT: STOP_BY_PERSON"), 5.0
         )
         await tab.run("document.querySelector('[data-word=RESET]').click()")
-        await tab.until("document.getElementById('told').textContent", lambda text: "not the token" in text, 5.0)
+        await tab.until("document.getElementById('told').textContent", lambda text: "wrong token" in text, 5.0)
         await tab.run(f"document.getElementById('token').value = {json.dumps(token)}")
         await tab.run("document.querySelector('[data-word=RESET]').click()")
         await tab.until(

@@ -119,7 +119,7 @@ def test_a_rig_alone_ends_with_status_1(config: BusConfig) -> None:
 
 
 def test_nobody_is_told_soon(config: BusConfig) -> None:
-    with pytest.raises(Fault, match=r"no rig answers there within 0\.4 s") as raised:
+    with pytest.raises(Fault, match=r"no rig answered within 0\.4 s") as raised:
         look(config)
     assert raised.value.kind is FAULTS["NO_PEER"]
 
@@ -127,5 +127,7 @@ def test_nobody_is_told_soon(config: BusConfig) -> None:
 def test_another_prefix_is_told(config: BusConfig) -> None:
     with Bus(config, "plant", lockstep=False) as plant:
         plant.announce()
-        with pytest.raises(Fault, match="neither rig nor controller is on it: --prefix must be that of the run"):
+        with pytest.raises(
+            Fault, match="neither rig nor controller is on this bus: --prefix must equal the prefix of the run"
+        ):
             look(BusConfig(endpoint=config.endpoint, prefix="other"))

@@ -7,14 +7,14 @@ import pytest
 
 from bridge.wire.messages import CHANNELS
 from diagnosis.features.grid import SIGNALS
-from diagnosis.features.segments import Commands
+from diagnosis.features.segments import CommandedRun
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.hypotheses.trials import trials
 from diagnosis.model import predict as twin
 from diagnosis.model.per_run import as_in_rig_file
 from diagnosis.model.predict import predict, predict_many
-from diagnosis.model.rig import Entry, Roughness, Start, built, rig_config
+from diagnosis.model.rig import Roughness, Start, StartState, built, rig_config
 from diagnosis.model.sensor_chain import SENSOR_EFFECTS
 from plant.core import advance, advance_disturbed
 from plant.effects.library import EFFECTS
@@ -50,13 +50,13 @@ def tables(ladder):
     return tried
 
 
-def there_and_back(seconds_a_leg: float = 0.6) -> Commands:
+def there_and_back(seconds_a_leg: float = 0.6) -> CommandedRun:
     """Stick-slip, then under vibration, the same backwards, and at rest."""
     blocks = round(1e3 * seconds_a_leg)
     drive = np.repeat([3e-3, 3e-3, -3e-3, -3e-3, 0.0], blocks)
     frequency_Hz = np.repeat([0.0, 2000.0, 3300.0, 0.0, 0.0], blocks)
     amplitude_m = np.repeat([0.0, 2.6e-7, 1.5e-7, 0.0, 0.0], blocks)
-    return Commands(drive, frequency_Hz, amplitude_m, (), None)
+    return CommandedRun(drive, frequency_Hz, amplitude_m, (), None)
 
 
 def alone(config, commands, start):
@@ -142,7 +142,7 @@ def test_to_the_last_bit_the_same_in_any_company(ladder, tables):
     """More rigs than go side by side, each with another effect, entered where runs are entered."""
     rig, _ = ladder
     commands, start = there_and_back(0.1), Start(0.5 * rig.coulomb_force_N, 0.0)
-    entries = (Entry(130, 9.0, 0.4), Entry(260, -11.0, None))
+    entries = (StartState(130, 9.0, 0.4), StartState(260, -11.0, None))
     configs = [rig_config(rig, {}, tables[key], None) for key in FORMS]
     assert len(configs) > 2 * LANES
     together = predict_many(configs, False, commands, [start] * len(configs), [entries] * len(configs))
@@ -157,7 +157,7 @@ def test_to_the_last_bit_the_same_whether_four_or_eight_are_stepped_at_once(ladd
     keys = ["frictional-lag", "static-friction-ageing", "drive-speed-ripple", "piezo-sag", "normal-load-fluctuation"]
     configs = [rig_config(rig, {}, tables[next(key for key in FORMS if key[0] == name)], None) for name in keys]
     configs += rigs(rig, {}, Roughness(0.01, 2e-5, 7), count=3)
-    entries = (Entry(130, 9.0, 0.4),)
+    entries = (StartState(130, 9.0, 0.4),)
     at_once, in_halves = (
         [
             signals

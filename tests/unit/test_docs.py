@@ -1,5 +1,6 @@
-"""Pages keep what they promise: links lead somewhere, files that they name exist, made pages are those of the code."""
+"""Links lead somewhere, named files exist, and the pages that `make docs` generates can be generated."""
 
+import ast
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,7 +11,9 @@ from docs import generate, readme, zenoh_files
 
 ROOT = Path(__file__).parent.parent.parent
 _OUTSIDE = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "bridge/wire/PROTOCOL.md")
-PAGES = sorted((*(ROOT / name for name in _OUTSIDE), *(ROOT / "docs").rglob("*.md")))
+GENERATED = {generate.FOLDER / name: text for name, text in generate.pages().items()}  # not in git
+KEPT = sorted({*(ROOT / name for name in _OUTSIDE), *(ROOT / "docs").rglob("*.md")} - GENERATED.keys())
+PAGES = sorted((*KEPT, *GENERATED))
 _LINK = re.compile(r"\]\(([^)\s]+)\)")
 _CODE = re.compile(r"^(```|~~~).*?^\1", re.MULTILINE | re.DOTALL)
 # of folders of the repository; `deploy/rigs/*.toml` is one, `runs/demo.mcap` is not
@@ -21,9 +24,13 @@ def _name(page: Path) -> str:
     return str(page.relative_to(ROOT))
 
 
+def _text(page: Path) -> str:
+    return GENERATED.get(page) or page.read_text(encoding="utf-8")
+
+
 def _anchors(page: Path) -> Iterator[str]:
     """Anchors of a page's headings, as the host and mkdocs make them, and those that are written out."""
-    text = _CODE.sub("", page.read_text(encoding="utf-8"))
+    text = _CODE.sub("", _text(page))
     for heading in re.findall(r"^#+ (.+)$", text, re.MULTILINE):
         plain = re.sub(r"\[([^]]*)]\([^)]*\)", r"\1", heading).lower()
         yield re.sub(r"\s+", "-", re.sub(r"[^\w\s-]", "", plain).strip())
@@ -33,19 +40,26 @@ def _anchors(page: Path) -> Iterator[str]:
 @pytest.mark.parametrize("page", PAGES, ids=_name)
 def test_links_lead_somewhere(page: Path) -> None:
     dead: list[str] = []
-    for link in _LINK.findall(_CODE.sub("", page.read_text(encoding="utf-8"))):
+    for link in _LINK.findall(_CODE.sub("", _text(page))):
         if re.match(r"[a-z]+:", link):
             continue
         file, _, anchor = link.partition("#")
         target = (page.parent / file).resolve() if file else page
-        if not target.is_file() or (anchor and anchor not in _anchors(target)):
+        there = target in GENERATED or target.is_file()
+        if not there or (anchor and anchor not in _anchors(target)):
             dead.append(link)
     assert not dead
 
 
+@pytest.mark.parametrize("name", _OUTSIDE)
+def test_pages_outside_of_docs_link_to_no_generated_page(name: str) -> None:
+    links = _LINK.findall((ROOT / name).read_text(encoding="utf-8"))
+    assert not [link for link in links if ((ROOT / name).parent / link.partition("#")[0]).resolve() in GENERATED]
+
+
 @pytest.mark.parametrize("page", PAGES, ids=_name)
 def test_named_files_exist(page: Path) -> None:
-    named = set(_FILE.findall(page.read_text(encoding="utf-8")))
+    named = set(_FILE.findall(_text(page)))
     assert not [one for one in sorted(named) if not any(ROOT.glob(one.rstrip("/")))]
 
 
@@ -59,11 +73,9 @@ def test_pages_that_the_code_names_exist() -> None:
     assert not [one for one in sorted(named) if not (ROOT / one).is_file()]
 
 
-def test_made_pages_are_those_of_the_code() -> None:
-    stale = [
-        name for name, text in generate.pages().items() if (generate.FOLDER / name).read_text(encoding="utf-8") != text
-    ]
-    assert not stale, "make reference"
+def test_generated_pages_are_not_in_git() -> None:
+    ignored = (ROOT / ".gitignore").read_text(encoding="utf-8").splitlines()
+    assert {f"docs/reference/{page.name}" for page in GENERATED} <= set(ignored)
 
 
 def test_the_configurations_of_zenoh_are_those_of_the_code() -> None:
@@ -89,7 +101,7 @@ def test_readme_shows_what_its_commands_print() -> None:
     assert number in (ROOT / "docs/start/first-diagnosis.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("package", ["bridge", "controller", "plant", "diagnosis", "cockpit", "deploy"])
+@pytest.mark.parametrize("package", ["bridge", "controller", "plant", "diagnosis", "cockpit", "bench", "deploy"])
 def test_readme_names_the_folders_that_there_are(package: str) -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     (row,) = re.findall(rf"^    {package}/ (.*(?:\n     .*)*)", text, re.MULTILINE)
@@ -107,3 +119,19 @@ def test_every_decision_has_its_four_headings() -> None:
     for page in (ROOT / "docs/decisions").glob("[0-9]*.md"):
         headings = re.findall(r"^## (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
         assert headings == ["Status", "Context", "Decision", "Consequences"], page.name
+
+
+def _packages() -> list[Path]:
+    tops = ("bridge", "controller", "plant", "diagnosis", "cockpit", "bench")
+    return [init for top in tops for init in sorted((ROOT / top).rglob("__init__.py"))]
+
+
+@pytest.mark.parametrize("init", _packages(), ids=lambda init: _name(init.parent))
+def test_the_note_of_a_package_names_its_folders_and_modules(init: Path) -> None:
+    note = ast.get_docstring(ast.parse(init.read_text(encoding="utf-8"))) or ""
+    folders = {path.parent.name for path in init.parent.glob("*/__init__.py")}
+    modules = {path.stem for path in init.parent.glob("*.py")} - {"__init__", "__main__", "stickslip_pb2"}
+    assert not {f"{name}/" for name in folders} - set(re.findall(r"\w+/", note))
+    assert not modules - set(re.findall(r"\w+", note))
+    rows = re.findall(r"^(\w+(?:, \w+)*/?) {2,}", note, re.MULTILINE)
+    assert not {name for row in rows for name in row.rstrip("/").split(", ")} - folders - modules

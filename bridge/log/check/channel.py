@@ -1,4 +1,4 @@
-"""Faults of one channel by itself: no finite numbers, dead or clipped. One rule for `log check` and for the verdict."""
+"""Faults of a single channel: not finite, dead or clipped. The same rule serves `log check` and the verdict."""
 
 import math
 from collections.abc import Mapping
@@ -14,22 +14,22 @@ _ACCEL = "accel_noise_mps2", "accel_resolution_mps2", "", "accel_range_mps2"
 _POSITION = "position_noise_m", "position_resolution_m", "position_lowest_m", "position_range_m"
 _FORCE = "force_noise_N", "force_resolution_N", "force_lowest_N", "force_range_N"
 _KEYS = dict(zip(CHANNELS, (_FORCE, _ACCEL, _ACCEL, _POSITION, _POSITION), strict=True))
-# Noise over resolution from which a live channel never repeats a value for long; 2 sigma are half a step then. Larger: a dead
-# channel of coarse steps passes; smaller: a channel at rest, whose samples are all the same step, counts as dead.
+# Noise over resolution from which a live channel never repeats a value for long: 2 sigma are then half a step. Larger: a dead
+# channel of coarse steps passes. Smaller: a channel at rest, whose samples all fall on the same step, counts as dead.
 _NOISY = 0.25
-_DEAD_S = 1.0  # of equal samples. Larger: a shorter failure passes; smaller: a position at rest counts as dead
-# Samples at the largest value of a channel with noise from which it is clipped, although no two of them follow each other: more
-# than chance gives, in a short log, and as a share in a long one. Larger: a clipped channel passes.
+_DEAD_S = 1.0  # duration of equal samples. Larger: a shorter failure passes; smaller: a position at rest counts as dead
+# Samples at the largest value from which a noisy channel is clipped although no two of them are neighbours: a count for short
+# logs and a share for long ones, both above chance. Larger: a clipped channel passes.
 FEW_AT_END, _SHARE_AT_END = 20, 1e-5
-# Range of the values over the noise, up to which a channel shows noise alone and may have more samples at its end: noise alone
-# spans 8 sigma. Smaller: 41 samples of an accelerometer at rest count as clipped; larger: a clipped channel passes.
+# Range of the values over the noise up to which a channel shows noise alone (which spans 8 sigma) and may have more samples at
+# its extreme. Smaller: 41 samples of an accelerometer at rest count as clipped. Larger: a clipped channel passes.
 _NOISE_ALONE = 20.0
-_BEYOND = 1e-3  # of the range, by which a value is beyond it. Smaller: rounding to float32, 1e-7, counts; larger: units of 1 %
-_ROUNDING = 1e-6  # of an end of the range, to which a value reaches it. Smaller than 6e-8: float32 misses it; larger: spare range
+_BEYOND = 1e-3  # excess over the range, as a share. Smaller: float32 rounding, 1e-7, counts; larger: wrong units pass
+_ROUNDING = 1e-6  # tolerance at an end of the range. Below 6e-8: float32 misses it; larger: sound signals fail
 
 
-class Channel(NamedTuple):
-    """The description of a channel, in its unit; NaN, or infinite ends, for a number that a log does not have."""
+class ChannelLimits(NamedTuple):
+    """The description of a channel, in its unit; NaN or infinite for a number that the log lacks."""
 
     noise: float = math.nan  # rms of a sample
     step: float = math.nan  # resolution
@@ -38,12 +38,12 @@ class Channel(NamedTuple):
 
     @property
     def is_noisy(self) -> bool:
-        """Whether a live channel of this kind repeats no value for long."""
+        """Whether a live channel of this noise and resolution repeats no value for long."""
         return self.noise > 0.0 and self.noise >= _NOISY * self.step
 
 
-def channels_of(plant: Any) -> dict[str, Channel]:
-    """By channel, from the configuration of a plant, which may be anything."""
+def channels_of(plant: Any) -> dict[str, ChannelLimits]:
+    """The channels described by the configuration of a plant, which may be malformed."""
     for name in ("rig", "sensors"):
         plant = plant.get(name) if isinstance(plant, Mapping) else None
     sensors: Mapping[str, Any] = plant if isinstance(plant, Mapping) else {}
@@ -51,29 +51,29 @@ def channels_of(plant: Any) -> dict[str, Channel]:
     def number(key: str, otherwise: float) -> float:
         return float(sensors[key]) if is_number(sensors.get(key)) else otherwise
 
-    found: dict[str, Channel] = {}
+    channels: dict[str, ChannelLimits] = {}
     for name, (noise, step, lowest, highest) in _KEYS.items():
         high = number(highest, math.inf)
         low = number(lowest, -math.inf) if lowest else -high
-        found[name] = Channel(number(noise, math.nan), number(step, math.nan), low, high)
-    return found
+        channels[name] = ChannelLimits(number(noise, math.nan), number(step, math.nan), low, high)
+    return channels
 
 
-def channel_findings(name: str, seen: SignalLook, sample_s: float, of: Channel) -> list[Finding]:
-    """Findings on a channel of `/sensors`, whose samples are `sample_s` apart; `times` are the samples concerned."""
-    where, found = "/sensors " + name, not_finite(name, seen, sample_s)
+def channel_findings(name: str, seen: SignalLook, sample_s: float, of: ChannelLimits) -> list[Finding]:
+    """Findings on a channel of `/sensors` with samples `sample_s` apart; `times` counts the samples concerned."""
+    where, findings = "/sensors " + name, not_finite(name, seen, sample_s)
     if seen.constant:
-        return [*found, Finding("dead", where, f"constant at {seen.lowest:g} over the whole log", seen.samples)]
+        return [*findings, Finding("dead", where, f"constant at {seen.lowest:g} over the whole log", seen.samples)]
     live = of.is_noisy or not math.isfinite(of.noise)  # equal samples are a fault
     if live and seen.longest_run * sample_s > _DEAD_S:
         from_s = (seen.longest_run_end - seen.longest_run + 1) * sample_s
         text = f"constant for {seen.longest_run * sample_s:.2f} s from {from_s:.3f} s on"
-        found.append(Finding("dead", where, text, seen.longest_run))
-    return [*found, *_clipped(where, seen, of, dwells=name.endswith("_m"))]
+        findings.append(Finding("dead", where, text, seen.longest_run))
+    return [*findings, *_clipped(where, seen, of, dwells=name.endswith("_m"))]
 
 
 def not_finite(name: str, seen: SignalLook, sample_s: float) -> list[Finding]:
-    """A finding where samples of a channel are no finite number."""
+    """A finding if the channel has samples that are not finite."""
     if not seen.not_finite:
         return []
     at_s = seen.first_not_finite * sample_s
@@ -83,8 +83,8 @@ def not_finite(name: str, seen: SignalLook, sample_s: float) -> list[Finding]:
     return [Finding("not-finite", f"/sensors {name}", text, seen.not_finite)]
 
 
-def _clipped(where: str, seen: SignalLook, of: Channel, dwells: bool) -> list[Finding]:
-    beyond = _BEYOND * (of.high - of.low)  # infinite where an end is not known
+def _clipped(where: str, seen: SignalLook, of: ChannelLimits, dwells: bool) -> list[Finding]:
+    beyond = _BEYOND * (of.high - of.low)  # infinite for an unknown end
     shows_more = of.is_noisy and not dwells and seen.highest - seen.lowest > _NOISE_ALONE * of.noise
     many = max(FEW_AT_END, _SHARE_AT_END * seen.samples) if shows_more else math.inf
     parts: list[str] = []
@@ -96,7 +96,7 @@ def _clipped(where: str, seen: SignalLook, of: Channel, dwells: bool) -> list[Fi
         if over > beyond:
             text = f"shows {value:.4g}, beyond the end of its range, {end:g}: another signal or unit"
             return [Finding("clipped", where, text, seen.samples)]
-        if value == 0.0 and end == 0.0:  # a sensor of one sign at rest clips its noise there, and nothing is lost
+        if value == 0.0 and end == 0.0:  # a sensor of one sign at rest clips its noise at 0; no signal is lost
             continue
         if runs or (at > many and value != 0.0):
             parts.append(f"{counted(max(runs, at if at > many else 0), 'sample')} at {value:g}")
@@ -106,4 +106,4 @@ def _clipped(where: str, seen: SignalLook, of: Channel, dwells: bool) -> list[Fi
     if not parts and math.isnan(reached):
         return []
     text = " and ".join(parts) or f"reaches the end of its range, {reached:g}"
-    return [Finding("clipped", where, f"{text}: more was there than the sensor shows", times)]
+    return [Finding("clipped", where, f"{text}: the signal went beyond", times)]

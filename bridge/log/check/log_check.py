@@ -6,20 +6,20 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from bridge.arrays import Indices
 from bridge.faults import Fault
-from bridge.log.check.channel import Channel, channel_findings, channels_of
+from bridge.log.check.channel import ChannelLimits, channel_findings, channels_of
 from bridge.log.check.schema_check import schema_findings
-from bridge.log.check.signal_range import Signal
+from bridge.log.check.signal_range import CheckedSignal
 from bridge.log.damage import damage_findings
 from bridge.log.finding import Finding
 from bridge.log.in_charge import ChargeWatch
 from bridge.log.log_reader import LogReader
 from bridge.log.logfile import STREAMING, block_period_ns, check_log_file, iter_pieces
 from bridge.log.metadata import configuration_of, number_of
-from bridge.log.storage.chain import Chain, chain_findings, chain_of
+from bridge.log.storage.chain import HashChain, chain_findings, chain_of
 from bridge.log.storage.parts import chain_of_log
 from bridge.log.topic_watch import TopicWatch
-from bridge.log.watches.arrays import Integers
 from bridge.log.watches.event_watch import EventWatch, is_weighty
 from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
@@ -27,11 +27,10 @@ from bridge.wire.messages import CHANNELS, Records
 from bridge.wire.payloads import READABLE_VERSIONS, parsed
 from bridge.wire.topics import BY_NAME
 
-LATE_NS = 1_000_000  # 1 ms, the usual block: a later answer comes after the next block is due
-# Share of late messages from which a rig does not keep up. Smaller: every desktop is late now and then; larger: a slow controller
-# passes.
+LATE_NS = 1_000_000  # 1 ms, the usual block: a later answer arrives after the next block is due
+# Share of late messages from which a rig is too slow. Smaller: any desktop fails; larger: a slow controller passes.
 LATE_SHARE = 0.01
-_OF_EVERY_BLOCK = {"plant": ("applied",), "controller": ("command", "trace")}  # topics by who sends them
+_OF_EVERY_BLOCK = {"plant": ("applied",), "controller": ("command", "trace")}  # topics by sender
 
 
 class LogCheck(NamedTuple):
@@ -42,8 +41,8 @@ class LogCheck(NamedTuple):
     messages: dict[str, int]  # by streaming topic
     seconds: float  # of sensor blocks
     late_share: dict[str, float]  # share of messages later than 1 ms: /applied (block sent), /trace (answer ready)
-    chain: Chain  # whether the bytes are those that were written
-    foreign: dict[str, int]  # messages of topics of other programs, which are no finding
+    chain: HashChain  # result of the hash chain
+    foreign: dict[str, int]  # messages in topics of other programs, not counted as findings
 
     def as_dict(self) -> dict[str, Any]:
         """The result as an object for `--json`."""
@@ -52,11 +51,11 @@ class LogCheck(NamedTuple):
 
 
 class LogWatch:
-    """Looks at one log, piece by piece, in file order; the memory does not grow with the log."""
+    """Collects the findings of one log, piece by piece, in file order; the memory does not grow with the log."""
 
     def __init__(self) -> None:
         self.topics = {name: TopicWatch(name) for name in STREAMING}
-        self.signals = {name: Signal(dwells=name.endswith("_m")) for name in CHANNELS}
+        self.signals = {name: CheckedSignal(dwells=name.endswith("_m")) for name in CHANNELS}
         self.late = {"applied": 0, "trace": 0}
         self.period_ns = 0.0
         self.samples_per_block = 1
@@ -69,7 +68,7 @@ class LogWatch:
         """Time between two samples."""
         return self.period_ns / 1e9 / max(self.samples_per_block, 1)
 
-    def add(self, topic: str, records: Records, log_time_ns: Integers) -> None:
+    def add(self, topic: str, records: Records, log_time_ns: Indices) -> None:
         """Take messages of a streaming topic, [messages]."""
         if not len(records):
             return
@@ -93,7 +92,7 @@ class LogWatch:
         elif topic not in BY_NAME:
             self.unknown[topic] = self.unknown.get(topic, 0) + len(payloads)
 
-    def result(self, reader: LogReader, chain: Chain) -> LogCheck:
+    def result(self, reader: LogReader, chain: HashChain) -> LogCheck:
         """All findings, once the reader is at the end of the log."""
         path = reader.path
         findings = chain_findings(chain, path.name)
@@ -119,17 +118,17 @@ class LogWatch:
 
 
 def check_log(path: Path, progress: Callable[[float], None] | None = None) -> LogCheck:
-    """Check a log. Raises Fault BAD_LOG when it is not a run log.
+    """Check a log. Raises Fault BAD_LOG for a file that is not a run log.
 
-    `progress` is called with the share of the log that was read, 0 to 1.
+    `progress` is called with the share of the log read so far, 0 to 1.
     """
     check_log_file(path)
     reader, seen = LogReader(path), LogWatch()
     return seen.result(reader, feed(reader, seen, progress))
 
 
-def feed(reader: LogReader, watch: Any, progress: Callable[[float], None] | None = None) -> Chain:
-    """Give every message of a log to a watch with the methods of `LogWatch`; returns the chain, checked by a second thread."""
+def feed(reader: LogReader, watch: Any, progress: Callable[[float], None] | None = None) -> HashChain:
+    """Pass every message of a log to a watch with the methods of `LogWatch`; a second thread checks and returns the chain."""
     with ThreadPoolExecutor(max_workers=1) as worker:
         chain = worker.submit(chain_of if reader.alone else chain_of_log, reader.path)
         for piece in iter_pieces(reader):
@@ -142,7 +141,7 @@ def feed(reader: LogReader, watch: Any, progress: Callable[[float], None] | None
         return chain.result()
 
 
-def _channels(reader: LogReader) -> dict[str, Channel]:
+def _channels(reader: LogReader) -> dict[str, ChannelLimits]:
     try:
         return channels_of(configuration_of(reader.metadata, "plant", reader.path))
     except Fault:
@@ -150,10 +149,10 @@ def _channels(reader: LogReader) -> dict[str, Channel]:
 
 
 def _of_configurations(reader: LogReader) -> list[Finding]:
-    """A finding for each process whose configuration cannot be used; an imported log has none."""
-    found: list[Finding] = []
+    """A finding for each process whose configuration cannot be used. Imported logs have none."""
+    findings: list[Finding] = []
     if "import" in reader.metadata:
-        return found
+        return findings
     for role in ("controller", "plant"):
         try:
             table = configuration_of(reader.metadata, role, reader.path)
@@ -161,58 +160,56 @@ def _of_configurations(reader: LogReader) -> list[Finding]:
                 number_of(table, "block_s", reader.path)
         except Fault as fault:
             text = fault.line.removeprefix(f"{reader.path}: ").partition("; ")[0]
-            found.append(Finding("configuration", reader.path.name, text))
-    return found
+            findings.append(Finding("configuration", reader.path.name, text))
+    return findings
 
 
 def _of_file(path: Path, reader: LogReader, seen: LogWatch) -> list[Finding]:
-    found = damage_findings(reader.damage, path)
+    findings = damage_findings(reader.damage, path)
     for role, table in reader.metadata.items():
         version = table.get("schema_version")
         if version is not None and version not in map(str, READABLE_VERSIONS):
-            text = f"the {role} speaks schema version {version}: must be {' or '.join(map(str, READABLE_VERSIONS))}"
-            found.append(Finding("schema-version", path.name, text))
-    found += [
+            text = f"the {role} has schema version {version}: must be {' or '.join(map(str, READABLE_VERSIONS))}"
+            findings.append(Finding("schema-version", path.name, text))
+    findings += [
         Finding(
             "unknown-topic",
             "/" + topic,
-            f"{counted(times, 'message')} of a topic that this version does not know",
+            f"{counted(times, 'message')} of a topic unknown to this version",
             times,
         )
         for topic, times in seen.unknown.items()
     ]
     if seen.topics["sensors"].messages == 0:
-        found.append(Finding("empty", path.name, "holds no sensor block"))
+        findings.append(Finding("empty", path.name, "holds no sensor block"))
     else:
-        found += _of_absent_topics(reader, seen)
+        findings += _of_absent_topics(reader, seen)
     events, listed = seen.events, set[tuple[str, str]]()
     for event in events.kept:
         key = event.source, event.code
         dropped = re.search(r"dropped=(\d{1,18})\b", event.text)
-        # a gap is a finding of its topic already
+        # a gap is already a finding of its topic
         if event.code != "GAP" and is_weighty(event.code):
             if key not in listed:
                 listed.add(key)
                 times = events.counts[key]
                 text = event.text + (f" (the first of {times})" if times > 1 else "")
-                found.append(Finding(event.code.lower().replace("_", "-"), f"/event/{event.source}", text, times))
+                findings.append(Finding(event.code.lower().replace("_", "-"), f"/event/{event.source}", text, times))
         elif dropped and int(dropped[1]):
             text = f"the {event.source} dropped {counted(int(dropped[1]), 'message')} because it was too slow"
-            found.append(Finding("dropped", f"/event/{event.source}", text, int(dropped[1])))
+            findings.append(Finding("dropped", f"/event/{event.source}", text, int(dropped[1])))
     if reader.damage.closed and events.has("plant", "START") and not events.has("plant", "END"):
-        found.append(Finding("no-end", "/event/plant", "the plant began its run and never ended it"))
-    return found
+        findings.append(Finding("no-end", "/event/plant", "the plant started its run and never sent END"))
+    return findings
 
 
 def _of_absent_topics(reader: LogReader, seen: LogWatch) -> list[Finding]:
-    """A finding for each topic without a message that a process of the run sends for every block; an imported log has none."""
+    """A finding for each empty topic that a process of the run must send for every block. Imported logs have none."""
     if "import" in reader.metadata:
         return []
     blocks = counted(seen.topics["sensors"].messages, "block")
     return [
-        Finding(
-            "absent", f"/{name}", f"no message beside {blocks}: the {role} sent none, or a program left the topic out"
-        )
+        Finding("absent", f"/{name}", f"no message for {blocks}: the {role} sent none, or a program left the topic out")
         for role, names in _OF_EVERY_BLOCK.items()
         for name in names
         if role in reader.metadata and not seen.topics[name].messages

@@ -7,14 +7,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.floating[Any]]
+from bridge.arrays import Floats
 
 # A clipped signal meets its limit at full slope; a real peak slows down. A parabola that leaves a run of L equal samples with the
-# slope s would rise by s L / 4 above them. A signal is clipped when this rise is more than the following share of its range.
-# Too small: round peaks count as clipped; too large: flat clipping stays unseen.
+# slope s would rise by s L / 4 above them. A signal is clipped if this rise exceeds the following share of its range.
+# Smaller: round peaks count as clipped; larger: flat clipping passes.
 _OVERSHOOT_SHARE = 1e-3
-_LONGEST_DWELL = 40.0  # samples that a run of a position counts at most, as a position may rest at an end of its range
-_SHORTEST_RUN = 3.0  # equal samples at the limit; noise alone hardly ever makes three
+_LONGEST_DWELL = 40.0  # most samples counted in a run of a position, which may rest at an end of its range
+_SHORTEST_RUN = 3.0  # equal samples at the limit; noise alone rarely makes three
 _STEPS_OF_RESOLUTION = 2.5  # smallest step into a clipped run, in resolutions; a real peak ends in steps of 1 or 2
 
 
@@ -30,7 +30,7 @@ class SignalLook(NamedTuple):
     clipped_low: int
     longest_run: int  # of equal samples
     longest_run_end: int  # index of its last sample
-    at_highest: int  # samples that equal the largest; a live signal with noise and many of them is clipped
+    at_highest: int  # samples equal to the largest; many of them on a noisy signal mean clipping
     at_lowest: int
 
     @property
@@ -40,14 +40,14 @@ class SignalLook(NamedTuple):
 
 
 class _Side:
-    """The runs of equal samples at one extreme of a signal; a lower one is seen mirrored."""
+    """The runs of equal samples at one extreme of a signal; the lower extreme is handled on the mirrored signal."""
 
     def __init__(self, longest: float) -> None:
         self.extreme = -math.inf
         self.at_extreme = 0  # samples
         self._longest = longest
         self.runs = self.overshoot = 0.0  # samples in runs that count; the largest overshoot
-        # length of the run that the signal begins with, and the step out of it
+        # the first run of the signal: its length, and the step out of it
         self.begin: tuple[float, float] | None = None
         # length of the run that goes on, and the step into it
         self._open: tuple[float, float] | None = None
@@ -109,7 +109,7 @@ class _Side:
         return int(side.runs) if side.overshoot > limit else 0
 
 
-class Signal:
+class CheckedSignal:
     """A signal that is checked piece by piece; a signal that `dwells`, such as a position, may rest at its extremes."""
 
     def __init__(self, dwells: bool) -> None:
@@ -187,6 +187,6 @@ class Signal:
 
 def look(values: npt.NDArray[Any], dwells: bool) -> SignalLook:
     """Range and faults of a whole signal, [samples]; see `Signal`."""
-    signal = Signal(dwells)
+    signal = CheckedSignal(dwells)
     signal.add(values)
     return signal.result()

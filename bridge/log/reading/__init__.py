@@ -1,5 +1,5 @@
-"""What the reader of logs needs of the MCAP format.
+"""Parts of the MCAP format for the reader of logs.
 
-chunk_bytes   one chunk: unpacked and checked, whatever its compression; the next whole one after damage
-definitions   schemas and channels of a file: which topic a channel is, and whose
+chunk_bytes   one chunk of any compression, unpacked and checked; search for the next whole chunk after damage
+definitions   schemas and channels of a file: the topic of each channel, and whether it belongs to this project
 """

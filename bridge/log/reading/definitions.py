@@ -1,7 +1,7 @@
-"""Schemas and channels of one file of a log: which topic a channel is, and whether it is one of this project.
+"""Schemas and channels of one file of a log: the topic of each channel, and whether it belongs to this project.
 
-A channel is known by its definition and never by its number: other programs number the channels anew. The definition of a
-channel stands before its first message, in a chunk or outside, and again in the summary at the end of the file.
+A channel is identified by its definition, never by its number, because other programs renumber channels. The definition comes
+before the first message of the channel, inside or outside of a chunk, and again in the summary at the end of the file.
 """
 
 import contextlib
@@ -19,16 +19,16 @@ from bridge.wire.stickslip_pb2 import DESCRIPTOR
 from bridge.wire.topics import BY_NAME, SCOPE
 
 _OWN = DESCRIPTOR.package + "."
-# topics of the recorder that say again for viewers what others say
+# topics that the recorder derives from other topics for viewers
 DERIVED = {SCOPE.name: SCOPE.message.DESCRIPTOR.full_name, foxglove_log.TOPIC: foxglove_log.SCHEMA}
 _KNOWN = BY_NAME.keys() | DERIVED.keys()
 
 
 class Definitions:
-    """What a file says of its channels.
+    """The schemas and channels defined by a file.
 
     Args:
-        path: the file, whose summary is looked into where a definition is missing.
+        path: the file; its summary is read if a definition is missing.
 
     """
 
@@ -49,7 +49,7 @@ class Definitions:
             self.channels[channel.id] = channel
 
     def find(self, channel_id: int) -> bool:
-        """Whether the channel is defined; where its definition is missing or makes no sense, by the one in the summary."""
+        """Whether the channel is defined; a missing or wrong definition is taken from the summary."""
         channel = self.channels.get(channel_id)
         if channel is not None and channel.schema_id in self.schemas and _name(channel) in _KNOWN:
             return True
@@ -62,7 +62,7 @@ class Definitions:
         return channel is not None
 
     def of_summary(self) -> "Definitions":
-        """The definitions in the summary of the file; none where it has no summary that can be read."""
+        """The definitions in the summary of the file; empty without a readable summary."""
         if self._summary is None:
             self._summary = Definitions(self._path)
             with contextlib.suppress(OSError, ValueError, *UNREADABLE), self._path.open("rb") as file:
@@ -73,21 +73,21 @@ class Definitions:
         return self._summary
 
     def topic(self, channel_id: int) -> str | None:
-        """The topic of a channel of this project without its stroke; None for a channel of another program."""
+        """The topic of a channel of this project without the leading slash; None for a channel of another program."""
         channel = self.channels[channel_id]
         name = _name(channel)
         schema = self.schemas.get(channel.schema_id)
-        if schema is None:  # the definition of the schema is lost; the messages are read as what the topic is
+        if schema is None:  # schema lost: the topic's name decides
             return name if name in BY_NAME else None
         return name if schema.name.startswith(_OWN) or DERIVED.get(name) == schema.name else None
 
     def any_own(self) -> bool:
-        """Whether a channel is one of this project."""
+        """Whether any channel belongs to this project."""
         topics = {self.topic(channel_id) for channel_id in self.channels}
         return bool(topics - {None, foxglove_log.TOPIC})
 
     def foreign_schemas(self) -> list[str]:
-        """The names of the schemas that are not of this project."""
+        """The names of the schemas of other programs."""
         return sorted({schema.name for schema in self.schemas.values() if not schema.name.startswith(_OWN)})
 
 

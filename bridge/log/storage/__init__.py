@@ -1,8 +1,8 @@
-"""The files of a log, and proof that they are as they were written.
+"""The files of a log, and proof that no byte was changed.
 
 chain        a hash over all bytes, link by link
-parts        which files belong to one log
+parts        the files that belong to one log
 part_file    one file that is being written
-log_files    the next file where one is full, lost or long enough
-afterwards   a table in a log that is closed
+log_files    the next file after a full, lost or long file
+afterwards   a table added to a closed log
 """

@@ -1,4 +1,4 @@
-"""A table written into a log that is closed: its end is written anew, with one more link of the chain and a new index."""
+"""A table added to a closed log: the end of the file is rewritten with one more link of the chain and a new index."""
 
 import hashlib
 import json
@@ -15,25 +15,25 @@ from mcap.records import Footer, McapRecord, Metadata, MetadataIndex, Statistics
 from bridge.log.library import HEAD, MAGIC
 from bridge.log.live import locked
 from bridge.log.reading.chunk_bytes import UNREADABLE
-from bridge.log.storage.chain import CHAIN, Chain, link_record
+from bridge.log.storage.chain import CHAIN, HashChain, link_record
 from bridge.log.storage.parts import parts_of
 
 _FOOTER_BYTES = HEAD.size + 20
 _DATA_END_BYTES = HEAD.size + 4
 _LINK_BYTES = 512  # within which the last link is, before the end of the data
-_LARGEST_INDEX_BYTES = 1 << 28  # of a log of a month; a larger one stays as it is
+_LARGEST_INDEX_BYTES = 1 << 28  # for a log of a month; a log with a larger index is not changed
 
 
-def note_afterwards(path: Path, name: str, fields: dict[str, Any], chain: Chain) -> Chain:
-    """Write a table of values, each as JSON, behind the last chunk of a log. Returns the chain as it is then.
+def add_table(path: Path, name: str, fields: dict[str, Any], chain: HashChain) -> HashChain:
+    """Write a table of values, each as JSON, behind the last chunk of a log. Returns the new chain.
 
-    A log stays as it is where it is not closed, is being recorded, or was not written by this project's recorder alone.
+    A log is not changed unless it is closed, not being recorded, and written by this project's recorder alone.
 
     Args:
         path: the log; of several files the last one gets the table.
         name: of the table.
         fields: of the table.
-        chain: what the log's chain said before.
+        chain: the log's chain so far.
 
     """
     if not (chain.closed and chain.ended) or chain.changes:
@@ -56,13 +56,13 @@ def file_end(path: Path) -> int:
 
 
 def _summary_start(file: IO[bytes]) -> int:
-    """Where the index begins; 0 where there is none."""
+    """Start of the index; 0 without an index."""
     file.seek(-_FOOTER_BYTES - len(MAGIC), 2)
     return Footer.read(ReadDataStream(BytesIO(file.read(_FOOTER_BYTES)[HEAD.size :]))).summary_start
 
 
 def _added(file: IO[bytes], table: Metadata) -> bytes:
-    """Write the table and what follows it; returns the hash of the new last link, or nothing where the end is another's."""
+    """Write the table and the new end; returns the hash of the new last link, or nothing if another program wrote the end."""
     start = _summary_start(file)
     size = file.seek(0, 2)
     if not start or size - start > _LARGEST_INDEX_BYTES:
@@ -89,7 +89,7 @@ def _added(file: IO[bytes], table: Metadata) -> bytes:
 
 
 def _index(summary: bytes, place: MetadataIndex, start: int) -> bytes:
-    """The index that begins at `start`, from the one that is there and the place of a new table; with footer and magic."""
+    """The index that begins at `start`: the old index plus the place of the new table; with footer and magic."""
     groups: dict[int, bytes] = {}
     at = 0
     while at < len(summary):

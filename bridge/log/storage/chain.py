@@ -1,12 +1,12 @@
 """The hash chain of a log: a link after each chunk, SHA-256 over all bytes since the link before and over that link's own hash.
 
-A link is a metadata record of the name `chain`, which other programs pass over. One changed byte before the last link is found,
-in messages, definitions and configurations alike; behind it the checksum of the index counts. A log that was killed can be
-verified up to its last whole chunk. There is no secret in it: who can write the file can also compute the chain anew, unless its
-last hash was noted elsewhere.
+A link is a metadata record named `chain`, which other programs skip. Any changed byte before the last link is detected, in
+messages, definitions and configurations alike; the checksum of the index covers the rest. A killed log can be verified up to its
+last whole chunk. The chain has no secret: whoever can write the file can also compute a new chain, unless its last hash was
+noted elsewhere.
 
-A program that writes a log anew, as `mcap compress` or `mcap filter` do, leaves the links out or copies them to places where
-not one of them fits. A changed byte is another thing: all links but one or two fit. What a log written anew held is not proved.
+A program that rewrites a log, as `mcap compress` or `mcap filter` do, drops the links or copies them to places where none of them
+fits. After a changed byte all links but one or two fit. The original content of a rewritten log is not proved.
 """
 
 import contextlib
@@ -28,35 +28,35 @@ from bridge.log.reading.chunk_bytes import UNREADABLE
 from bridge.units import counted
 
 CHAIN = "chain"  # the name of the metadata records
-_LONGEST_HEADER_BYTES = 4096  # of the content; a longer one is another program's
+_LONGEST_HEADER_BYTES = 4096  # of the content; a longer header belongs to another program
 _ANOTHER = "another program"
-_LONGEST_LINK_BYTES = 256  # of the content of a link; a longer record is none
+_LONGEST_LINK_BYTES = 256  # of the content; a longer record is not a link
 _PIECE_BYTES = 1 << 20
 _FOOTER_BYTES = 20
 _ENDING_BYTES = HEAD.size + _FOOTER_BYTES + len(MAGIC)  # from the footer on
-_STRETCHES = 16  # changed stretches that are told one by one
+_STRETCHES = 16  # most changed stretches listed one by one
 
 
 class Stretch(NamedTuple):
-    """Bytes of a file that are not those that were written."""
+    """Bytes of a file that were changed after writing."""
 
     file: str
     from_bytes: int
     until_bytes: int
 
 
-class Chain(NamedTuple):
-    """What the chain says of a log, or of one file of it."""
+class HashChain(NamedTuple):
+    """The result of the hash chain of a log, or of one of its files."""
 
     links: int  # 0: the log has no chain
     first: str  # SHA-256 of the first link, hexadecimal; empty without one
     last: str
     changed: list[Stretch]  # at most 16
     changes: int  # all of them
-    ended: bool  # the last link says that it is the last
+    ended: bool  # the last link is marked as the last
     covered_bytes: int  # end of the last link
     closed: bool  # the file has its footer
-    rewritten_by: str = ""  # the library of a program that wrote the log anew, after which the chain says nothing
+    rewritten_by: str = ""  # the library of a program that rewrote the log, after which the chain proves nothing
 
     def as_dict(self) -> dict[str, Any]:
         """For `--json`."""
@@ -80,9 +80,9 @@ class _Walk:
         self.hash = hashlib.sha256()
         self.since = 0  # end of the last link
         self.links, self.first, self.last = 0, "", ""
-        self.fits = 0  # links that are right and have something to cover
+        self.fits = 0  # links with the right hash over at least one byte
         self.library = ""
-        self.lost = False  # the way through the records
+        self.lost = False  # the record boundaries are lost
         self.changed: list[Stretch] = []
         self.changes = 0
         self.ended = self.closed = False
@@ -143,7 +143,7 @@ class _Walk:
             self.take(length)
 
     def link(self, record: bytes, content: bytes) -> bool:
-        """Compare a link; False where a metadata record is none."""
+        """Compare a link; False for any other metadata record."""
         try:
             metadata = Metadata.read(ReadDataStream(BytesIO(content)))
             stored = bytes.fromhex(metadata.metadata["sha256"])
@@ -166,7 +166,7 @@ class _Walk:
         return True
 
     def end(self, start: int, head: bytes) -> None:
-        """Compare what follows the data, of which the footer has a checksum."""
+        """Compare the bytes after the data with the checksum in the footer."""
         if self.links and self.since < start:
             self.change(self.since, start)
         data_end = head + self.file.read(4)
@@ -180,21 +180,21 @@ class _Walk:
             else (0, 0, 0)
         )
         footer = HEAD.pack(Opcode.FOOTER, _FOOTER_BYTES) + struct.pack("<QQI", summary_start, offset_start, crc) + MAGIC
-        # other writers may give a checksum of the data, and none of the summary
+        # other programs may write a checksum of the data, and none of the summary
         own_end = data_end == HEAD.pack(Opcode.DATA_END, 4) + bytes(4)
         right = ending == footer and (own_end or not self.links)
         if summary_start:
             right &= summary_start == begins and (crc == self.summary_crc(begins) or not (crc or self.links))
         else:
             right &= self.size - begins == _ENDING_BYTES and not (offset_start or crc)
-        # a file that was cut within its index is no changed one
+        # a file that was cut within its index does not count as changed
         if not right and (self.closed or ending.startswith(HEAD.pack(Opcode.FOOTER, _FOOTER_BYTES))):
             self.change(start, self.size)
 
     def rewritten_by(self) -> str:
-        """The library of the program that wrote the file anew after its recording; empty where none did."""
+        """The library of the program that rewrote the file after its recording; empty if it was not rewritten."""
         ours = self.library in READABLE
-        if self.lost:  # it may be a changed byte that makes the library another's, and the links cannot be found
+        if self.lost:  # a changed byte may have altered the library name, and the links cannot be found
             return ""
         if self.links > 1 and not self.fits:
             return _ANOTHER if ours else self.library or _ANOTHER
@@ -214,8 +214,8 @@ class _Walk:
         return crc
 
 
-def chain_of(path: Path) -> Chain:
-    """What the chain of one file says. Raises Fault BAD_LOG when the file cannot be read."""
+def chain_of(path: Path) -> HashChain:
+    """The chain of one file. Raises Fault BAD_LOG if the file cannot be read."""
     try:
         with path.open("rb") as file:
             walk = _Walk(file, path.name, path.stat().st_size)
@@ -223,40 +223,43 @@ def chain_of(path: Path) -> Chain:
     except OSError as error:
         raise Fault("BAD_LOG", f"{path}: cannot be read: {error.strerror}; give the path of a .mcap file") from None
     if by := walk.rewritten_by():
-        return Chain(walk.links, walk.first, walk.last, [], 0, walk.ended, 0, walk.closed, by)
-    return Chain(walk.links, walk.first, walk.last, walk.changed, walk.changes, walk.ended, walk.since, walk.closed)
+        return HashChain(walk.links, walk.first, walk.last, [], 0, walk.ended, 0, walk.closed, by)
+    return HashChain(walk.links, walk.first, walk.last, walk.changed, walk.changes, walk.ended, walk.since, walk.closed)
 
 
-def chain_findings(chain: Chain, name: str) -> list[Finding]:
+def chain_findings(chain: HashChain, name: str) -> list[Finding]:
     """A finding for each stretch of bytes that was changed after it was written."""
-    found = [Finding("changed", one.file, _in_words(one), one.until_bytes - one.from_bytes) for one in chain.changed]
+    findings = [
+        Finding("changed", stretch.file, _in_words(stretch), stretch.until_bytes - stretch.from_bytes)
+        for stretch in chain.changed
+    ]
     if chain.changes > len(chain.changed):
         more = chain.changes - len(chain.changed)
-        found.append(Finding("changed", name, f"and {counted(more, 'more stretch', 'more stretches')}", more))
+        findings.append(Finding("changed", name, f"and {counted(more, 'more stretch', 'more stretches')}", more))
     if chain.links and chain.closed and not chain.ended and not chain.rewritten_by:
-        text = "is closed without the end of its hash chain: what came last was not written, or was taken away"
-        found.append(Finding("changed", name, text))
-    return found
+        text = "is closed without the end of its hash chain: its last bytes were not written, or were removed"
+        findings.append(Finding("changed", name, text))
+    return findings
 
 
 def _in_words(stretch: Stretch) -> str:
     if not stretch.until_bytes:
-        return "does not go on from the file before it, which was changed or taken away"
+        return "does not continue the file before it, which was changed or removed"
     where = f"bytes {stretch.from_bytes} to {stretch.until_bytes}"
-    return f"{where} are not those that were written; do not trust what they hold"
+    return f"{where} were changed after writing; do not trust them"
 
 
-def chain_in_words(chain: Chain) -> str:
-    """One line for a person."""
+def chain_in_words(chain: HashChain) -> str:
+    """One line for the operator."""
     if chain.rewritten_by:
         return (
-            f"chain    fits no more: the log was written anew by {chain.rewritten_by!r} after its recording; "
-            "whether a byte was changed cannot be seen"
+            f"chain    does not fit: the log was rewritten by {chain.rewritten_by!r} after its recording; "
+            "whether a byte was changed cannot be checked"
         )
     if not (chain.links or chain.changes):
-        where = "this log was written without one" if chain.closed else "no link is in what is left of this log"
-        return f"chain    none: {where}, so a changed byte outside of its chunks cannot be seen"
+        where = "this log was written without one" if chain.closed else "the rest of this log holds no link"
+        return f"chain    none: {where}, so a changed byte outside of its chunks cannot be detected"
     if chain.changes:
         return f"chain    BROKEN at {counted(chain.changes, 'place')} of {counted(chain.links, 'link')}"
-    until = "every byte is" if chain.ended and chain.closed else "up to the last whole chunk every byte is"
-    return f"chain    {counted(chain.links, 'link')}: {until} as it was written; SHA-256 {chain.last}"
+    until = "intact" if chain.ended and chain.closed else "intact up to the last whole chunk"
+    return f"file     {until} ({counted(chain.links, 'checksum')}); SHA-256 {chain.last}"

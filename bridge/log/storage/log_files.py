@@ -1,4 +1,4 @@
-"""The files of a log that is being written: the present one is watched; where it is full, lost or long, the next follows."""
+"""The files of a log that is being written: a full, lost or long file is closed, and the next file begins."""
 
 import os
 import time
@@ -13,32 +13,32 @@ from bridge.log.storage.part_file import PartFile
 from bridge.log.storage.parts import part_path
 from bridge.units import counted
 
-_LOOK_S = 1.0  # between two looks at the path of the file, and at a disk without room
-_LONGEST_WAIT_S = 64.0  # between two tries to go on, which double: a quota is not seen before it is met
-_ROOM_BYTES = 16 << 20  # free on a disk that was full before the log goes on: half a minute of it
-_SLOW_S = 1.0  # a chunk that takes longer to write is told
+_LOOK_S = 1.0  # between two checks of the path of the file, and of a full disk
+_LONGEST_WAIT_S = 64.0  # longest wait between two tries; it doubles each time, as a quota shows only on writing
+_ROOM_BYTES = 16 << 20  # free space on a full disk from which the log continues: half a minute of it
+_SLOW_S = 1.0  # writing time of a chunk from which the disk is reported as slow
 
 
 class Rotation(NamedTuple):
-    """When a log goes on in a new file; 0: never for that reason."""
+    """When a log continues in a new file; 0: never for that reason."""
 
     bytes: int = 0
     seconds: float = 0.0  # of the run
 
 
 class Owner(Protocol):
-    """Whose log it is: it fills the beginning of each file, and tells what happened."""
+    """The owner of the log: it fills the beginning of each file, and reports events."""
 
     def begin(self, writer: ChunkWriter, number: int, begins: str, follows: str) -> None:
-        """Write what each file begins with: definitions, tables, and its place in the log."""
+        """Write the beginning of a file: definitions, tables, and its place in the log."""
         ...
 
     def add_event(self, code: str, text: str) -> object:
-        """Tell in the log and on the bus."""
+        """Report an event in the log and on the bus."""
         ...
 
-    def say_again(self) -> None:
-        """Tell in the log what was told at its beginning and holds for all of it."""
+    def repeat_events(self) -> None:
+        """Repeat the events that are valid for the whole log."""
         ...
 
     @property
@@ -48,13 +48,13 @@ class Owner(Protocol):
 
 
 class LogFiles:
-    """The files of one log. Where one cannot be written any more, `fault` is why, and is raised at the end.
+    """The files of one log. If a file cannot be written any more, the fault is kept and raised at the end.
 
     Args:
         path: the first file.
-        owner: whose log it is.
-        rotation: when to go on in a new file.
-        patient: a full disk is no end: the log waits for room.
+        owner: the log's owner.
+        rotation: when to continue in a new file.
+        patient: a full disk does not end the log: it waits for space.
 
     Raises Fault CONFIG, LOG_WRITE.
 
@@ -62,8 +62,8 @@ class LogFiles:
 
     def __init__(self, path: Path, owner: Owner, rotation: Rotation, patient: bool) -> None:
         self.path = path
-        self.unwritten = 0  # messages since there was no room
-        self.whole_t_ns: int | None = None  # of the latest message in a chunk that is whole in a file
+        self.unwritten = 0  # messages lost since the disk was full
+        self.whole_t_ns: int | None = None  # time of the latest message in a chunk that is whole in a file
         self._owner, self._rotation, self._patient = owner, rotation, patient
         self._number = 0
         self.begins = ""  # first link of the first file
@@ -73,23 +73,23 @@ class LogFiles:
         self._began_ns = 0
         self._wait_s = _LOOK_S
         self._look_s = time.monotonic() + _LOOK_S
-        self._lost_s = 0.0  # time of the run from which there was no room
+        self._lost_s = 0.0  # time of the run at which the disk was full
         self._fault: Fault | None = None
         self._part: PartFile | None = PartFile(path, replace=True)
 
     def begin(self) -> None:
         """Write the beginning of the first file."""
         self.guarded(lambda writer: self._owner.begin(writer, 0, "", ""))
-        if self._fault is not None:  # what cannot even begin is a fault for the patient too
+        if self._fault is not None:  # a log that cannot begin fails even if patient
             raise self._fault
 
     @property
     def writer(self) -> ChunkWriter | None:
-        """The writer of the present file; None where there is no room."""
+        """The writer of the present file; None while the disk is full."""
         return self._part and self._part.writer
 
     def guarded(self, write: Callable[[ChunkWriter], None]) -> None:
-        """Call `write` with the writer, and bring what it wrote to the operating system. Raises Fault LOG_WRITE."""
+        """Call `write` with the writer, and pass the bytes to the operating system. Raises Fault LOG_WRITE."""
         part = self._part
         if part is not None and (cut := part.size_trouble()) is not None:
             self._lose(part, "LOG_LOST", cut)
@@ -107,7 +107,7 @@ class LogFiles:
             self.whole_t_ns = self._owner.t_ns
 
     def look_after(self) -> None:
-        """Go on in a new file where that is due; tell of a file that was taken away and of a slow disk."""
+        """Start a new file if due; report a file that was taken away and a slow disk."""
         part = self._part
         if part is not None and self._is_long(part):
             self._end(part)
@@ -119,19 +119,19 @@ class LogFiles:
             if self._has_room():
                 self._go_on()
             return
-        if self._patient and part.slowest_s > _SLOW_S:  # a run that can be repeated writes the same log on any disk
+        if self._patient and part.slowest_s > _SLOW_S:  # lockstep runs write the same log on any disk
             self._owner.add_event("DISK_SLOW", f"a chunk of the log took {part.slowest_s:.1f} s to write")
             part.slowest_s = 0.0
-        if self._part is part and (found := part.trouble()) is not None:
-            self._lose(part, *found)
+        if self._part is part and (trouble := part.trouble()) is not None:
+            self._lose(part, *trouble)
 
     def close(self) -> None:
-        """Close the present file. Raises Fault LOG_WRITE, LOG_LOST, also of files before."""
+        """Close the present file. Raises Fault LOG_WRITE, LOG_LOST, also of earlier files."""
         part = self._part
         if part is not None and not part.closed:
-            found = part.trouble()
-            if found is not None:
-                self._lose(part, *found)
+            trouble = part.trouble()
+            if trouble is not None:
+                self._lose(part, *trouble)
             if self._part is not None:
                 self._end(self._part)
         if self._fault is not None:
@@ -161,7 +161,7 @@ class LogFiles:
             self._give_up(part, error)
 
     def _lose(self, part: PartFile, code: str, text: str) -> None:
-        """A file that was taken away is closed where it is, and the log goes on in the next, with the chunk that is open."""
+        """Close a file that was taken away; the log continues in the next file, with the open chunk."""
         self._note(Fault("LOG_LOST", f"{part.path}: {text}"))
         self._go_on()
         if self._part is None:
@@ -172,7 +172,7 @@ class LogFiles:
         goes_on = f"the log goes on in {self._name()}" if self._part else "the log waits for a place to go on"
         self._owner.add_event(code, f"{part.path.name} {text}; {goes_on}")
         if self._part:
-            self._owner.say_again()
+            self._owner.repeat_events()
 
     def _name(self) -> str:
         return part_path(self.path, self._number).name
@@ -181,7 +181,7 @@ class LogFiles:
         """Close a file that cannot be written any more. Raises Fault LOG_WRITE unless patient."""
         self._lost_s = self._owner.t_ns * 1e-9
         text = (
-            f"{part.path.name}: {error.strerror}: nothing is recorded from {self._lost_s:.2f} s on, until there is room"
+            f"{part.path.name}: {error.strerror}: nothing is recorded from {self._lost_s:.2f} s on, until space is free"
         )
         self.unwritten += part.writer.unsure_messages
         part.close_without_index(lambda: self._owner.add_event("LOG_WRITE", text))
@@ -195,12 +195,12 @@ class LogFiles:
             raise fault
 
     def _kept(self, path: Path) -> str:
-        """What is in the file that a fault has closed, and what to do."""
+        """The state of the closed file, and the remedy."""
         if self.whole_t_ns is None:
             return "the log was closed before anything was recorded; free space, or choose another --log"
         return (
-            f"the log was closed at {self.whole_t_ns * 1e-9:.2f} s, what came before is kept; free space, then "
-            f"`stickslip log recover {path}` gives it its index back"
+            f"the log was closed at {self.whole_t_ns * 1e-9:.2f} s, everything before is kept; free space, then "
+            f"`stickslip log recover {path}` restores its index"
         )
 
     def _has_room(self) -> bool:
@@ -211,7 +211,7 @@ class LogFiles:
         return disk.f_bavail * disk.f_frsize > _ROOM_BYTES
 
     def _go_on(self) -> None:
-        """Begin the next file; where that cannot be, the log waits twice as long before it tries again."""
+        """Begin the next file; if that fails, wait twice as long before the next try."""
         before, self._part = self._part, None
         if before is not None:
             self._follows = before.writer.last_link
@@ -235,6 +235,6 @@ class LogFiles:
         self._part, self._number, self._began_ns = part, number, self._owner.t_ns
         self._wait_s = _LOOK_S
         if self.unwritten:
-            text = f"there is room again: {counted(self.unwritten, 'message')} since {self._lost_s:.2f} s were not recorded"
+            text = f"space is free again: {counted(self.unwritten, 'message')} since {self._lost_s:.2f} s were not recorded"
             self.unwritten = 0
             self._owner.add_event("LOG_WRITE", text)

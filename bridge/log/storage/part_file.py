@@ -1,4 +1,4 @@
-"""One file of a log while it is being written: opened, locked, watched, closed, also where the disk is full."""
+"""One file of a log while it is being written: opened, locked, watched, closed, also on a full disk."""
 
 import contextlib
 import os
@@ -19,7 +19,7 @@ class PartFile:
 
     Args:
         path: the file. Its folder is made.
-        replace: whether a log that is there may be replaced.
+        replace: whether an existing log may be replaced.
 
     Raises Fault CONFIG, LOG_WRITE; FileExistsError where it may not be replaced.
 
@@ -30,7 +30,7 @@ class PartFile:
             refuse_to_replace(path, LOG, str(path))
         self.path = path
         self.whole_bytes = 0
-        self.slowest_s = 0.0  # longest write since it was last set to 0
+        self.slowest_s = 0.0  # longest write since the last reset
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             if replace:
@@ -41,7 +41,7 @@ class PartFile:
                 self._file = open_new(path)
             if not locked(self._file):
                 self._file.close()
-                line = f"{path}: is being recorded: must be another file than that of a run that goes on"
+                line = f"{path}: is being recorded: must not be the log of a run in progress"
                 raise Fault("LOG_WRITE", f"{line}; wait for the end of that one, or choose another --log")
             if path.is_file():
                 self._file.truncate(0)
@@ -57,7 +57,7 @@ class PartFile:
         return self._file.closed
 
     def guarded(self, write: Callable[[], None]) -> None:
-        """Call `write`, and see what it wrote to the operating system. Raises OSError."""
+        """Call `write`, and pass the bytes to the operating system. Raises OSError."""
         began_s = time.monotonic()
         write()
         self._file.flush()
@@ -66,36 +66,36 @@ class PartFile:
         self.writer.note_whole()
 
     def size_trouble(self) -> str | None:
-        """What is wrong with the size of the file, in words; asked before each write, which would hide it behind a hole."""
-        here = os.fstat(self._file.fileno())
-        if here.st_size == self.whole_bytes or not stat.S_ISREG(here.st_mode):
+        """A foreign change of the file's size, as text; checked before each write, which would hide it behind a hole."""
+        opened = os.fstat(self._file.fileno())
+        if opened.st_size == self.whole_bytes or not stat.S_ISREG(opened.st_mode):
             return None
-        how = "cut" if here.st_size < self.whole_bytes else "written to by another program"
-        return f"was {how}: {self.whole_bytes} bytes were written, {here.st_size} are there"
+        how = "cut" if opened.st_size < self.whole_bytes else "written to by another program"
+        return f"was {how}: {self.whole_bytes} bytes were written, the file has {opened.st_size}"
 
     def trouble(self) -> tuple[str, str] | None:
-        """Code and words for a file that is not at its path any more, or not as it was written; None where all is well."""
+        """Code and text for a file that was moved, replaced or changed; None for an intact file."""
         try:
-            here = os.fstat(self._file.fileno())
-            if not stat.S_ISREG(here.st_mode):
+            opened = os.fstat(self._file.fileno())
+            if not stat.S_ISREG(opened.st_mode):
                 return None
             if (size := self.size_trouble()) is not None:
                 return "LOG_LOST", size
             try:
-                there = self.path.stat()
+                named = self.path.stat()
             except FileNotFoundError:
-                if here.st_nlink:
-                    return "LOG_LOST", "was renamed: it is whole, and under another name"
-                return "LOG_LOST", "was deleted: what was recorded until now is lost"
-            if (there.st_dev, there.st_ino) != (here.st_dev, here.st_ino):
-                kept = "is whole under another name" if here.st_nlink else "is lost"
-                return "LOG_REPLACED", f"was replaced by another file: what was recorded until now {kept}"
+                if opened.st_nlink:
+                    return "LOG_LOST", "was renamed: it is whole, under another name"
+                return "LOG_LOST", "was deleted: the recording so far is lost"
+            if (named.st_dev, named.st_ino) != (opened.st_dev, opened.st_ino):
+                kept = "is whole under another name" if opened.st_nlink else "is lost"
+                return "LOG_REPLACED", f"was replaced by another file: the recording so far {kept}"
         except OSError as error:
-            return "LOG_LOST", f"cannot be seen any more: {error.strerror}"
+            return "LOG_LOST", f"cannot be accessed any more: {error.strerror}"
         return None
 
     def leave(self) -> None:
-        """Close a file that was taken away: with its index where it is still whole, under whatever name."""
+        """Close a file that was taken away; with its index if it is still whole under another name."""
         with contextlib.suppress(OSError):
             if self.size_trouble() is None and os.fstat(self._file.fileno()).st_nlink:
                 self.guarded(self.writer.finish)
@@ -108,15 +108,15 @@ class PartFile:
         self._file.close()
 
     def abandon(self) -> None:
-        """Close and remove a file that could not even begin."""
+        """Close and remove a file whose beginning could not be written."""
         with contextlib.suppress(OSError):
             self._file.close()
         self.path.unlink(missing_ok=True)
 
     def close_without_index(self, last_words: Callable[[], object]) -> None:
-        """Close the file after its last whole chunk where it cannot be written any more.
+        """Close the file after its last whole chunk because it cannot be written any more.
 
-        Removing the chunk that did not fit makes room for the end, and mostly for one more small chunk with `last_words`, which
+        Removing the chunk that did not fit frees space for the end, and mostly for one more small chunk with `last_words`, which
         adds messages to `writer`.
         """
         with contextlib.suppress(OSError):

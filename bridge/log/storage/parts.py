@@ -1,4 +1,4 @@
-"""The files of one log: `run.mcap`, `run-0001.mcap`, `run-0002.mcap`, ... Each says whose part it is, and begins the rest."""
+"""The files of one log: `run.mcap`, `run-0001.mcap`, `run-0002.mcap`, ... Each later file names the log it belongs to."""
 
 import glob
 import json
@@ -12,31 +12,31 @@ from mcap.opcode import Opcode
 from mcap.records import Metadata
 
 from bridge.log.library import HEAD, MAGIC
-from bridge.log.storage.chain import CHAIN, Chain, Stretch, chain_of
+from bridge.log.storage.chain import CHAIN, HashChain, Stretch, chain_of
 
 PART = "part"  # the metadata record of every file but the first
 RECOVERED = "recovered"  # the metadata record of a file that `stickslip log recover` wrote; before the record above
-LOST = "lost"  # the metadata record at the end of such a file, where the log that it was saved from was not whole
-OF_FILES = frozenset({CHAIN, PART, RECOVERED, LOST})  # what a file says of itself and not of its run
-_BEGINNING_BYTES = 1 << 21  # within which the first link is: definitions, configurations and one chunk
+LOST = "lost"  # the metadata record at the end of such a file, if the original log was not whole
+OF_FILES = frozenset({CHAIN, PART, RECOVERED, LOST})  # records about the file, not about its run
+_BEGINNING_BYTES = 1 << 21  # the first link is within: definitions, configurations and one chunk
 
 
-class Part(NamedTuple):
-    """What a file says of its place in a log of several."""
+class LogPart(NamedTuple):
+    """The place of a file in a log of several files."""
 
     number: int  # of the file, from 0
     begins: str  # SHA-256 of the first link of the log's first file
     follows: str  # SHA-256 of the last link of the file before
-    recovered: bool = False  # it was written anew, and its links are others than when the next file was begun
+    recovered: bool = False  # it was rewritten, and its links differ from those known to the next file
 
 
 def part_path(first: Path, number: int) -> Path:
-    """The name of the file of this number in a log that begins with `first`."""
+    """The name of the file with this number in a log that begins with `first`."""
     return first.with_name(f"{first.stem}-{number:04d}{first.suffix}") if number else first
 
 
-def part_of(path: Path) -> Part | None:
-    """What a file says of its place; number 0 for a first file. None where it says nothing that can be read."""
+def part_of(path: Path) -> LogPart | None:
+    """The place of a file; number 0 for a first file. None if it cannot be read."""
     try:
         with path.open("rb") as file:
             data = file.read(_BEGINNING_BYTES)
@@ -50,11 +50,11 @@ def part_of(path: Path) -> Part | None:
                 if record.name == PART:
                     value = {key: json.loads(text) for key, text in record.metadata.items()}
                     place = int(value["number"]), str(value["begins"]), str(value["follows"])
-                    return Part(*place, recovered is not None)
+                    return LogPart(*place, recovered is not None)
                 if record.name == RECOVERED:
                     recovered = record.metadata["begins"]
                 if record.name == CHAIN:
-                    return Part(0, recovered or record.metadata["sha256"], "", recovered is not None)
+                    return LogPart(0, recovered or record.metadata["sha256"], "", recovered is not None)
             at += length
     except Exception:
         return None
@@ -62,54 +62,54 @@ def part_of(path: Path) -> Part | None:
 
 
 def parts_of(path: Path) -> list[Path]:
-    """The files of a log from `path` on, in order; `path` alone where no other file says that it goes on from it."""
-    found = re.fullmatch(r"(.*)-(\d{4,})", path.stem)
+    """The files of a log from `path` on, in order; `path` alone if no other file continues it."""
+    numbered = re.fullmatch(r"(.*)-(\d{4,})", path.stem)
     others = _numbered(path.stem, path)
-    own = part_of(path) if others or found else None
-    if own is None:
+    place = part_of(path) if others or numbered else None
+    if place is None:
         return [path]
-    if own.number:
-        others = _numbered(found[1], path) if found else {}
-    rest = {number: other for number, other in others.items() if number > own.number}
-    mine = [rest[number] for number in sorted(rest) if _belongs(rest[number], number, own.begins)]
+    if place.number:
+        others = _numbered(numbered[1], path) if numbered else {}
+    rest = {number: other for number, other in others.items() if number > place.number}
+    mine = [rest[number] for number in sorted(rest) if _belongs(rest[number], number, place.begins)]
     return [path, *mine]
 
 
 def later_names(path: Path) -> list[Path]:
-    """Files that are named as further files of the log `path`, in order."""
+    """Files named like further files of the log `path`, in order."""
     named = _numbered(path.stem, path)
     return [named[number] for number in sorted(named)]
 
 
-def _numbered(stem: str, beside: Path) -> dict[int, Path]:
-    """Files beside another that are named as further files of the log `stem`."""
-    named = re.compile(rf"{re.escape(stem)}-(\d{{4,}}){re.escape(beside.suffix)}")
-    likely = beside.parent.glob(f"{glob.escape(stem)}-[0-9][0-9][0-9][0-9]*")
+def _numbered(stem: str, first: Path) -> dict[int, Path]:
+    """Files in the folder of `first` named like further files of the log `stem`."""
+    named = re.compile(rf"{re.escape(stem)}-(\d{{4,}}){re.escape(first.suffix)}")
+    likely = first.parent.glob(f"{glob.escape(stem)}-[0-9][0-9][0-9][0-9]*")
     matches = ((named.fullmatch(other.name), other) for other in likely)
     return {int(match[1]): other for match, other in matches if match}
 
 
 def _belongs(path: Path, number: int, begins: str) -> bool:
-    said = part_of(path)
-    return said is not None and said.number == number and said.begins == begins
+    part = part_of(path)
+    return part is not None and part.number == number and part.begins == begins
 
 
-def chain_of_log(path: Path) -> Chain:
-    """What the chains of all files of a log say, and whether each goes on from the one before. Raises Fault BAD_LOG."""
+def chain_of_log(path: Path) -> HashChain:
+    """The chain of all files of a log, including whether each file continues the one before. Raises Fault BAD_LOG."""
     parts = parts_of(path)
     chains = [chain_of(part) for part in parts]
     whole = chains[0]
     before = part_of(path) if len(parts) > 1 else None
     for part, chain in zip(parts[1:], chains[1:], strict=True):
-        said = part_of(part)
+        place = part_of(part)
         changed = [*whole.changed, *chain.changed]
         changes = whole.changes + chain.changes
         anew = (before is not None and before.recovered) or whole.rewritten_by or chain.rewritten_by
-        if said is not None and whole.last and said.follows != whole.last and not anew:
+        if place is not None and whole.last and place.follows != whole.last and not anew:
             changed.append(Stretch(part.name, 0, 0))
             changes += 1
-        before = said
-        whole = Chain(
+        before = place
+        whole = HashChain(
             whole.links + chain.links,
             whole.first,
             chain.last or whole.last,

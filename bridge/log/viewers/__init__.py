@@ -1,6 +1,6 @@
-"""What the recorder adds to a log so that other programs' viewers show it: nothing of it is on the bus or read back.
+"""Topics that the recorder adds to a log for other programs' viewers: not on the bus, and never read back.
 
 stretches      smallest, mean and largest of each signal over 5 ms
-scope          topic /scope: smallest, mean and largest of each signal, 200 times a second, and what was in force
+scope          topic /scope: smallest, mean and largest of each signal, 200 times a second, with the applied command
 foxglove_log   topic /log: events as the well-known message foxglove.Log
 """

@@ -1,7 +1,7 @@
 """Events as `foxglove.Log`, the well-known message that the log panels of viewers show.
 
-Its definition is https://docs.foxglove.dev/docs/sdk/schemas/log. It is built here, in a pool of its own, so that no other
-package's definition of the same name gets in the way.
+Its definition is https://docs.foxglove.dev/docs/sdk/schemas/log. It is built here in a private pool, so that another package's
+definition of the same name does not conflict.
 """
 
 from typing import Any
@@ -51,11 +51,11 @@ Log: Any = GetMessageClass(_pool.FindMessageTypeByName(SCHEMA))
 
 
 def of_event(event: wire.Event, log_time_ns: int) -> bytes:
-    """The message for an event that was written at `log_time_ns`; its level is that of the event's code."""
+    """The message for an event written at `log_time_ns`, with the level of the event's code."""
     seconds, nanos = divmod(log_time_ns, 1_000_000_000)
     known = EVENTS.get(event.code)
     level = _LEVEL[known.letter] if known else _LEVEL[OUTSIDE]
     text = f"{event.code}: {event.text}"
-    said = Log(level=level, message=text, name=event.source)
-    said.timestamp.seconds, said.timestamp.nanos = seconds, nanos
-    return said.SerializeToString()
+    message = Log(level=level, message=text, name=event.source)
+    message.timestamp.seconds, message.timestamp.nanos = seconds, nanos
+    return message.SerializeToString()

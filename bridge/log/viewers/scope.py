@@ -6,30 +6,32 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from bridge.log.block_rows import FIELDS_BYTES, Rows, rows
+from bridge.log.block_rows import FIELDS_BYTES, MessageRows, rows
 from bridge.log.chunk_messages import HEAD, Bytes, Column, cut
-from bridge.log.viewers.stretches import Blocks, Stretches, last_of_stretches
+from bridge.log.viewers.stretches import ScopeBlocks, Stretches, last_of_stretches
 from bridge.wire import topics
 from bridge.wire.messages import APPLIED, CHANNELS, TRACE, Layout, sensor_block
 
-# Blocks that are made into messages at once, those of a second. Fewer: numpy's calls cost more than their work, a third of what
-# writing the log costs with the 100 blocks of a chunk; more: a kill loses more of this topic, and viewers look further ahead.
+# Blocks that become messages at once: one second. Fewer: numpy's call overhead dominates; with the 100 blocks of a chunk it is a
+# third of the cost of writing the log. More: a kill loses more of this topic, and viewers must look further ahead.
 AT_ONCE_BLOCKS = 1000
-_ENTRY_BYTES = 16  # of an index
+_ENTRY_BYTES = 16  # of an index entry
 
 
 class ScopeMaker:
     """Makes the messages of the topic from chunks of a log, in order."""
 
     def __init__(self) -> None:
-        self.ends = False  # no block comes after the next chunk
-        self._waiting: list[tuple[bytes, dict[str, bytes]]] = []  # chunks, and the indexes of what is taken from them
+        self.ends = False  # no block follows the next chunk
+        self._waiting: list[tuple[bytes, dict[str, bytes]]] = []  # chunks, and the indexes of the topics used
         self._blocks_waiting = 0
         self._layout: Layout | None = None  # of the blocks
         self._stretches = Stretches()
 
-    def of_chunk(self, data: bytes, entries: Mapping[int, Sequence[bytes]], channels: Mapping[str, int]) -> Rows | None:
-        """The messages that are due with this chunk; None for none.
+    def of_chunk(
+        self, data: bytes, entries: Mapping[int, Sequence[bytes]], channels: Mapping[str, int]
+    ) -> MessageRows | None:
+        """The messages due with this chunk; None for none.
 
         Args:
             data: of the chunk, uncompressed.
@@ -44,11 +46,11 @@ class ScopeMaker:
         due = self.ends or self._blocks_waiting >= AT_ONCE_BLOCKS
         return self._made(channels, last=self.ends) if due else None
 
-    def rest(self, channels: Mapping[str, int]) -> Rows | None:
-        """The messages of what still waits, as no more blocks come; None for none."""
+    def rest(self, channels: Mapping[str, int]) -> MessageRows | None:
+        """The messages of the remaining blocks at the end of a run; None for none."""
         return self._made(channels, last=True)
 
-    def _made(self, channels: Mapping[str, int], last: bool) -> Rows | None:
+    def _made(self, channels: Mapping[str, int], last: bool) -> MessageRows | None:
         waiting, self._waiting, self._blocks_waiting = self._waiting, [], 0
         joined = waiting[0][0] if len(waiting) == 1 else b"".join([data for data, _ in waiting])
         data = np.frombuffer(joined, np.uint8)
@@ -62,8 +64,8 @@ class ScopeMaker:
         records, log_ns = self._stretches.made(blocks, last)
         return None if records is None else rows({channels[topics.SCOPE.name]: records}, {}, log_ns)
 
-    def _blocks(self, data: Bytes, heads: npt.NDArray[Any], starts: Column) -> Blocks | None:
-        """Blocks by their heads and starts; None for none. Another number of samples than before begins anew."""
+    def _blocks(self, data: Bytes, heads: npt.NDArray[Any], starts: Column) -> ScopeBlocks | None:
+        """Blocks by their heads and starts; None for none. A change of the number of samples starts a new layout."""
         if not len(starts):
             return None
         lengths, t_ns, log_ns = (heads[name].astype(np.int64) for name in ("length", "publish_ns", "log_ns"))
@@ -78,11 +80,11 @@ class ScopeMaker:
         places = np.array([fields[name][1] for name in CHANNELS])
         samples = cut(data, (places[:, None] + starts).ravel(), 4 * self._layout.samples).view("<f4")
         samples = samples.reshape(len(CHANNELS), len(starts), self._layout.samples)
-        return Blocks(t_ns[right], log_ns[right], samples)
+        return ScopeBlocks(t_ns[right], log_ns[right], samples)
 
 
 def _found(data: Bytes, indexes: Sequence[bytes], begins: Column) -> tuple[npt.NDArray[Any], Column]:
-    """Heads of the messages in the joined data of chunks, whose publish time is their `t_ns`, and where their payloads start."""
+    """Heads of the messages in the joined chunks (publish time = `t_ns`), and the starts of their payloads."""
     each = [np.frombuffer(index, "<i8")[1::2] + begin for index, begin in zip(indexes, begins, strict=False)]
     offsets = np.concatenate([np.empty(0, np.int64), *each])
     return cut(data, offsets, HEAD.itemsize).view(HEAD), offsets + HEAD.itemsize

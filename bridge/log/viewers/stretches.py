@@ -38,7 +38,7 @@ def last_of_stretches(t_ns: Column) -> Column:
     return np.flatnonzero(np.diff((t_ns - 1) // PERIOD_NS, append=-1))
 
 
-class Blocks(NamedTuple):
+class ScopeBlocks(NamedTuple):
     """Blocks, in order."""
 
     t_ns: Column  # [blocks]
@@ -46,16 +46,16 @@ class Blocks(NamedTuple):
     samples: npt.NDArray[np.float32]  # [channels, blocks, samples]
 
 
-class _Said:
-    """What one topic says. Kept are the messages that were not used, and the newest that was."""
+class _Latest:
+    """The newest used message of one topic, and all messages after it."""
 
     def __init__(self, layout: Layout, fields: Sequence[str]) -> None:
         self._fields = fields
         self._kept = np.empty(0, layout.dtype)
 
     def add(self, messages: Records) -> None:
-        """Canonical messages, in order, of which only the last of each stretch is of use."""
-        whole = f"V{messages.dtype.itemsize}"  # numpy joins these as a whole, and records with fields one field after the other
+        """Add canonical messages, in order; only the last of each stretch is needed."""
+        whole = f"V{messages.dtype.itemsize}"  # numpy joins raw elements in one go, and records field by field
         self._kept = np.concatenate([self._kept.view(whole), messages.view(whole)]).view(messages.dtype)
 
     def fill(self, records: Records) -> None:
@@ -73,21 +73,20 @@ class Stretches:
 
     def __init__(self) -> None:
         self._sequence = 0
-        self._rest: Blocks | None = None  # those of the stretch that is not over
-        self._said = {
-            topics.APPLIED.name: _Said(APPLIED, _OF_APPLIED),
-            topics.TRACE.name: _Said(TRACE, _OF_TRACE),
+        self._rest: ScopeBlocks | None = None  # blocks of the unfinished stretch
+        self._latest = {
+            topics.APPLIED.name: _Latest(APPLIED, _OF_APPLIED),
+            topics.TRACE.name: _Latest(TRACE, _OF_TRACE),
         }
 
     def say(self, topic: str, messages: Records) -> None:
-        """Take canonical messages of the topic `applied` or `trace`, in order; of each stretch its last is enough."""
-        self._said[topic].add(messages)
+        """Add canonical messages of the topic `applied` or `trace`, in order; the last of each stretch is enough."""
+        self._latest[topic].add(messages)
 
-    def made(self, blocks: Blocks | None, last: bool) -> tuple[Records | None, Column]:
-        """Messages of the stretches that are over with these blocks, and their log times; None for none.
+    def made(self, blocks: ScopeBlocks | None, last: bool) -> tuple[Records | None, Column]:
+        """Messages of the stretches that end within these blocks, and their log times; None for none.
 
-        A block of another number of samples than those before begins anew. `last`: no more blocks come, so the last stretch
-        is over, too.
+        A change of the number of samples drops the unfinished stretch. `last`: no block follows, so the last stretch ends too.
         """
         blocks = self._with_the_rest(blocks)
         if blocks is None:
@@ -95,9 +94,9 @@ class Stretches:
         starts = np.flatnonzero(np.diff((blocks.t_ns - 1) // PERIOD_NS, prepend=-1))
         ends = np.append(starts[1:], len(blocks.t_ns))
         self._rest = None
-        if not last:  # what the other topics say of it may come later
+        if not last:  # later messages of the other topics may belong to it
             few = slice(int(starts[-1]), None)
-            self._rest = Blocks(blocks.t_ns[few].copy(), blocks.log_ns[few].copy(), blocks.samples[:, few].copy())
+            self._rest = ScopeBlocks(blocks.t_ns[few].copy(), blocks.log_ns[few].copy(), blocks.samples[:, few].copy())
             starts, ends = starts[:-1], ends[:-1]
         if not len(starts):
             return None, ends
@@ -116,15 +115,15 @@ class Stretches:
         for which, figure in figures.items():
             for row, field in enumerate(_NAMES[which]):
                 records[field] = figure[row]
-        for said in self._said.values():
-            said.fill(records)
+        for latest in self._latest.values():
+            latest.fill(records)
         return records, blocks.log_ns[ends - 1]
 
-    def _with_the_rest(self, blocks: Blocks | None) -> Blocks | None:
+    def _with_the_rest(self, blocks: ScopeBlocks | None) -> ScopeBlocks | None:
         before = self._rest
         if blocks is None or before is None or before.samples.shape[2] != blocks.samples.shape[2]:
             return before if blocks is None else blocks
-        return Blocks(
+        return ScopeBlocks(
             np.concatenate([before.t_ns, blocks.t_ns]),
             np.concatenate([before.log_ns, blocks.log_ns]),
             np.concatenate([before.samples, blocks.samples], axis=1),

@@ -1,6 +1,6 @@
-"""Statistics of a log, message by message, in a memory that does not grow with it.
+"""Statistics of a log, message by message, in constant memory.
 
-event_watch   the first events of each source and code, and how many there were
+event_watch   the first events of each source and code, and their counts
 histogram     percentiles to 0.25 %
 arrays        differences, medians, noise and runs, without the parts of numpy that are slow to import
 """

@@ -1,23 +1,23 @@
-"""Functions of arrays that numpy lacks, or that are slow in numpy."""
+"""Array functions that are missing or slow in numpy."""
 
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-Integers = npt.NDArray[np.int64]
+from bridge.arrays import Indices
 
 
-def steps(values: Integers, before: int) -> Integers:
+def steps(values: Indices, before: int) -> Indices:
     """Differences of values, the first from `before`; `numpy.diff` with `prepend` takes far longer for a short piece."""
-    found = np.empty(len(values), np.int64)
-    found[:1] = values[:1] - before
-    np.subtract(values[1:], values[:-1], out=found[1:])
-    return found
+    differences = np.empty(len(values), np.int64)
+    differences[:1] = values[:1] - before
+    np.subtract(values[1:], values[:-1], out=differences[1:])
+    return differences
 
 
 def median(values: npt.NDArray[Any]) -> float:
-    """As `numpy.median` of at least one finite number; the first call of that imports the masked arrays, which takes 30 ms."""
+    """Like `numpy.median` for at least one finite number; numpy's first call imports the masked arrays, which takes 30 ms."""
     return float(_medians(values))
 
 
@@ -29,7 +29,7 @@ def _medians(values: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
 
 
 def noise_of(values: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.float64]:
-    """Standard deviation of the white noise on a signal that is mostly smooth, along the last axis; by second differences."""
+    """Standard deviation of the white noise on a mostly smooth signal, along the last axis, from second differences."""
     if values.shape[-1] < 3:
         return np.zeros(values.shape[:-1])
     return 1.4826 * _medians(np.abs(np.diff(values, 2))) / 6.0**0.5

@@ -8,15 +8,15 @@ from bridge.log.pause_events import CORE_PAUSE, PAUSE, RunPause, not_watched, pa
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.event_codes import EVENTS, FAILURE, MAINTENANCE, OUTSIDE
 
-# Events of one source and code that are kept: a storm of them must not fill the memory, and no reader wants more. Stalls are all
-# kept, as two numbers each.
+# Events of one source and code that are kept, to bound the memory during a storm of events. Stalls are all kept, as two numbers
+# each.
 KEPT = 20
-_BLOCKS = re.compile(r"\bblocks=(\d{1,18})\b")  # in the plant's END; a foreign rig may leave it out
+_BLOCKS = re.compile(r"\bblocks=(\d{1,18})\b")  # in the plant's END; foreign rigs may leave it out
 _WEIGHTY = {FAILURE, OUTSIDE, MAINTENANCE}
 
 
 class EventWatch:
-    """Looks at the events of one log, in file order."""
+    """Collects the events of one log, in file order."""
 
     def __init__(self) -> None:
         self.kept: list[wire.Event] = []
@@ -35,15 +35,15 @@ class EventWatch:
 
     @property
     def not_watched(self) -> str:
-        """Why the stalls of the computer are not known, or not all of them; empty where they were watched to the end."""
+        """Why the computer's stalls are unknown in part or in whole; empty if they were watched to the end."""
         return not_watched(self.kept)
 
     @property
     def blocks_sent(self) -> int | None:
-        """Blocks that the plant sent, by its END; None where the log has no END or the END no count."""
+        """Number of blocks the plant sent, from its END; None without an END or without a count in it."""
         ends = (_BLOCKS.search(event.text) for event in self.kept if (event.source, event.code) == ("plant", "END"))
-        found = [int(end[1]) for end in ends if end]
-        return found[-1] if found else None
+        counts = [int(end[1]) for end in ends if end]
+        return counts[-1] if counts else None
 
     def has(self, source: str, code: str) -> bool:
         """Whether there was such an event."""

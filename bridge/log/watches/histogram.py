@@ -1,12 +1,12 @@
-"""A distribution in a memory that does not grow with the number of values: counts in bins of equal ratio."""
+"""A distribution in constant memory: counts in bins of equal ratio."""
 
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-# Ratio of two edges. A quantile is off by half of it at most, 0.25 %, which is less than the scatter of repeated runs. Smaller:
-# more memory (now 5500 bins of 8 bytes); larger: percentiles that visibly come in steps.
+# Ratio of two edges. A quantile is off by at most half of it, 0.25 %, below the scatter of repeated runs. Smaller: more memory
+# (now 5500 bins of 8 bytes). Larger: visibly stepped percentiles.
 _RATIO = 1.005
 _LOWEST, _HIGHEST = 1e-3, 1e9  # values beyond count in the first or last bin
 _BINS = int(np.ceil(np.log(_HIGHEST / _LOWEST) / np.log(_RATIO)))

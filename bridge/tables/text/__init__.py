@@ -1,7 +1,8 @@
-"""Tables written as text, as other programs write them.
+"""Text tables of other programs.
 
-dialect     what a map may say of the text, and what is found where it says nothing
+dialect     delimiter, decimals and more, from the map or detected
 encoding    bytes to text
 head        title lines, names and units above the first row
 text_table  the rows, read by Arrow
+unit_cells  cells with a number and its unit, as gauges write them
 """

@@ -1,7 +1,7 @@
-"""How a text table is written: delimiter, marks of decimals and thousands.
+"""The dialect of a text table: delimiter, marks of decimals and thousands.
 
-CleverCSV finds the delimiter and the quotes (docs/decisions/29-sniffing.md). It knows no decimal comma, so the form of the
-numbers is found here: the one in which most cells are numbers.
+CleverCSV detects the delimiter and the quotes (docs/decisions/29-sniffing.md). It does not support decimal commas, so the form of
+the numbers is detected here: the form in which most cells are numbers.
 """
 
 import csv
@@ -13,32 +13,32 @@ from typing import NamedTuple
 from bridge.tables.cells import APOSTROPHES, BLANKS, is_time
 from bridge.tables.text.unit_cells import number_and_unit
 
-BLANK = " "  # the delimiter of columns that are parted by any number of blanks and tabs
+BLANK = " "  # the delimiter of columns separated by any number of blanks and tabs
 _DELIMITERS = (",", ";", "\t", "|", " ")
 _SNIFFED_LINES = 60  # CleverCSV takes 30 ms for these, and its time grows with them
 _NO_NUMBER = frozenset(("", *"- -- --- nan #nv #n/a n/a na null none inf -inf ovl ovr ovrflw #nan 1.#qnan".split(" ")))  # noqa: SIM905
-_FIRST_LINES = 2000  # in which a time that begins at 0 is still below 1 s, up to 2 kHz
+_FIRST_LINES = 2000  # lines in which a time that begins at 0 is still below 1 s, up to 2 kHz
 _BELOW_ONE = re.compile(r"[-+]?0([.,])\d+")
 # decimals and thousands in the order in which equally good ones are chosen
 _FORMS = ((".", ""), (",", ""), (".", ","), (",", "."), (".", "'"), (",", "'"), (".", " "), (",", " "))
 
 
 class Dialect(NamedTuple):
-    """What a map says of a text table, keys of [source]; None: it is found."""
+    """Keys of [source] of a map for a text table; None: detect it."""
 
     delimiter: str | None = None
     decimal: str | None = None
     skip_rows: int | None = None  # lines before the line of the names
     encoding: str | None = None
     thousands: str | None = None
-    names: tuple[str, ...] | None = None  # of the columns; the file has none, or others
+    names: tuple[str, ...] | None = None  # of the columns, instead of names in the file
     units_row: bool | None = None  # whether a line of units follows the names
-    comment: str | None = None  # what a line begins with that is passed over
+    comment: str | None = None  # start of lines to skip
     sheet: str | None = None  # of a workbook
 
 
-class Form(NamedTuple):
-    """How a text table is written, with nothing left open."""
+class TextLayout(NamedTuple):
+    """The detected dialect of a text table."""
 
     delimiter: str
     quote: str
@@ -59,44 +59,44 @@ class Form(NamedTuple):
         return _pattern(self.decimal, self.thousands).fullmatch(number_and_unit(cell)[0]) is not None
 
     def is_value(self, cell: str) -> bool:
-        """Whether a cell is a number, a time, empty, or a word that stands for a missing number."""
+        """Whether a cell is a number, a time, empty, or a word for a missing number."""
         return cell.strip().lower() in _NO_NUMBER or self.is_number(cell) or is_time(cell)
 
 
-def form_of(lines: Sequence[str], given: Dialect, quoted: bool, begin: Sequence[str] = ()) -> Form:
-    """The form of a table from lines of its body; what `given` states is taken as it is.
+def form_of(lines: Sequence[str], given: Dialect, quoted: bool, begin: Sequence[str] = ()) -> TextLayout:
+    """The form of a table from lines of its body; values in `given` are kept.
 
-    `quoted`: names have quotes. `begin`: the first lines, where a time below 1 s shows which mark is that of decimals.
+    `quoted`: names have quotes. `begin`: the first lines, where a time below 1 s reveals the decimal mark.
     """
     lines = [line for line in lines if line.strip()]
     sniffed = lines[:: max(len(lines) // _SNIFFED_LINES, 1)][:_SNIFFED_LINES]
     delimiter, quote = _delimiter(sniffed, lines, given, '"' if quoted else "")
     decimal, thousands = _numbers(lines, begin[:_FIRST_LINES], delimiter, quote, given)
-    return Form(delimiter, quote, decimal, thousands)
+    return TextLayout(delimiter, quote, decimal, thousands)
 
 
 def _delimiter(lines: Sequence[str], whole: Sequence[str], given: Dialect, quote: str) -> tuple[str, str]:
     if given.delimiter is not None:
         return given.delimiter, quote
-    # no number has these marks: where every line has as many of them, they part columns, and commas are decimal ones
+    # numbers never contain these marks: if all lines have equally many, they separate columns, and commas are decimal
     for mark in (";", "\t"):
         counts = {line.rstrip("\r\n").count(mark) for line in lines}
         if len(counts) == 1 and counts != {0}:
             return mark, quote
     from clevercsv.detect import Detector
 
-    found = Detector().detect("\n".join(lines), delimiters=_DELIMITERS) if lines else None
-    if found is None or not found.delimiter:
+    result = Detector().detect("\n".join(lines), delimiters=_DELIMITERS) if lines else None
+    if result is None or not result.delimiter:
         return ",", quote
-    if found.delimiter == "," and given.decimal != "." and _one_column_with_commas(whole):
+    if result.delimiter == "," and given.decimal != "." and _one_column_with_commas(whole):
         return ";", quote
-    return found.delimiter, found.quotechar or quote
+    return result.delimiter, result.quotechar or quote
 
 
 def _one_column_with_commas(lines: Sequence[str]) -> bool:
-    """Whether the lines are a single column of numbers with a decimal comma, and no two columns of integers.
+    """Whether the lines are a single column of numbers with a decimal comma, rather than two columns of integers.
 
-    Decimals have the same number of digits in most lines, or leading zeros.
+    Decimals are several digits in most lines, and some have a leading zero.
     """
     parts = [re.fullmatch(r"\s*[-+]?(\d+),(\d+)(?:[eE][-+]?\d+)?\s*", line) for line in lines]
     digits = Counter(len(part[2]) for part in parts if part is not None)
@@ -107,10 +107,10 @@ def _one_column_with_commas(lines: Sequence[str]) -> bool:
 
 def _numbers(lines: Sequence[str], begin: Sequence[str], delimiter: str, quote: str, given: Dialect) -> tuple[str, str]:
     """Marks of decimals and thousands with which most cells are numbers."""
-    trial = Form(delimiter, quote, ".", "")
+    trial = TextLayout(delimiter, quote, ".", "")
     cells = [number_and_unit(cell)[0] for line in lines for cell in trial.cells(line)]
     decimals = {
-        found[1] for line in begin for cell in trial.cells(line) if (found := _BELOW_ONE.fullmatch(cell.strip()))
+        match[1] for line in begin for cell in trial.cells(line) if (match := _BELOW_ONE.fullmatch(cell.strip()))
     }
     best, most = (given.decimal or ".", given.thousands or ""), -1
     for decimal, thousands in _FORMS:
@@ -129,7 +129,7 @@ _PATTERNS: dict[tuple[str, str], re.Pattern[str]] = {}
 
 
 def _pattern(decimal: str, thousands: str) -> re.Pattern[str]:
-    """Of a number: digits with a decimal mark, or in groups of three."""
+    """Pattern of a number: digits with a decimal mark, or in groups of three."""
     key = (decimal, thousands)
     if key not in _PATTERNS:
         point = re.escape(decimal)
@@ -137,7 +137,7 @@ def _pattern(decimal: str, thousands: str) -> re.Pattern[str]:
         if thousands:
             marks = BLANKS if thousands == " " else APOSTROPHES if thousands == "'" else (thousands,)
             between = "[" + "".join(re.escape(mark) for mark in marks) + "]"
-            # no number of thousands begins with 0: `0,001` has a decimal comma
+            # a number with thousands does not begin with 0: `0,001` has a decimal comma
             grouped = rf"|[1-9]\d{{0,2}}(?:{between}\d{{3}})+(?:{point}\d*)?"
         _PATTERNS[key] = re.compile(
             rf"[-+]?(?:\d+(?:{point}\d*)?|{point}\d+{grouped})(?:[eEdD][-+]?\d+)?|[-+]?(?:nan|inf)", re.I

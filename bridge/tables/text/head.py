@@ -1,4 +1,4 @@
-"""What stands above the rows of a text table: title lines, the names of the columns, their units, a rate."""
+"""The lines above the rows of a text table: titles, names of the columns, their units, a rate."""
 
 import re
 from collections import Counter
@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from bridge.faults import Fault
-from bridge.tables.text.dialect import BLANK, Dialect, Form
+from bridge.tables.text.dialect import BLANK, Dialect, TextLayout
 from bridge.tables.unit_words import is_unit_row, known_unit
 
 COMMENTS = ("#", "%", "//", "!", "*", ";;", "'")
-_CONFIRMED = 5  # rows under the first one, of which most must be rows too
-_LABEL = "Y_Unit_Label"  # with which LabVIEW begins a line of units, each above its column
-_MOST_ABOVE = 6  # lines above the first row among which the names are looked for
+_CONFIRMED = 5  # lines after the first row, of which most must be rows too
+_LABEL = "Y_Unit_Label"  # start of a line of units of LabVIEW, each above its column
+_MOST_ABOVE = 6  # lines above the first row in which names are searched
 _RATE = re.compile(
     r"(?:sampl|abtast|scan|acqui|messrate|datenrate|data\s*rate)[\w .\-/]*?(?:rate|freq\w*|messrate)?"
     r"[^\w+-]*(?:\[(?P<u1>\w+)\]\W*)?"
@@ -30,11 +30,11 @@ class Head(NamedTuple):
     """The lines above the rows. `lines` counts all of them."""
 
     lines: int
-    names_line: int  # from 0; -1: there is none
+    names_line: int  # from 0; -1: missing
     names: list[str]  # as many as there are columns
     units: list[str]  # as many, or none
-    units_line: int  # from 0; -1: there is none
-    step_s: float | None  # between rows, as a line above states
+    units_line: int  # from 0; -1: missing
+    step_s: float | None  # between rows, as stated by a line above them
 
     @property
     def unit_of(self) -> dict[str, str]:
@@ -42,23 +42,23 @@ class Head(NamedTuple):
         return {name: unit for name, unit in zip(self.names, self.units, strict=False) if unit}
 
 
-def read_head(lines: Sequence[str], body: Sequence[str], form: Form, given: Dialect, file: str) -> Head:
+def read_head(lines: Sequence[str], body: Sequence[str], form: TextLayout, given: Dialect, file: str) -> Head:
     """The head of a table.
 
     Args:
-        lines: the first ones of the file.
-        body: lines from further down, of rows alone.
-        form: how the cells are written.
-        given: what a map says.
-        file: for errors.
+        lines: the first lines of the file.
+        body: lines from further down, only rows.
+        form: dialect of the cells.
+        given: settings of a map.
+        file: name for messages.
 
-    Raises Fault BAD_TABLE when no row of numbers is found.
+    Raises Fault BAD_TABLE without a row of numbers.
 
     """
     width, numeric = _columns(body, form)
     first = _first_row(lines, form, width, numeric, given)
     if first is None:
-        line = f"{file}: no row of numbers with {width} cells, parted by {form.delimiter!r}, in the first {len(lines)} lines"
+        line = f"{file}: no row of numbers with {width} cells, separated by {form.delimiter!r}, in the first {len(lines)} lines"
         raise Fault("BAD_TABLE", f"{line}; state source.delimiter and source.skip_rows")
     names_line, units_line = _names_above(lines, first, form, width, given)
     names = list(given.names or [])
@@ -72,8 +72,8 @@ def read_head(lines: Sequence[str], body: Sequence[str], form: Form, given: Dial
     return Head(first, names_line, names, units, units_line, _step_s(lines[:first]))
 
 
-def _columns(body: Sequence[str], form: Form) -> tuple[int, list[bool]]:
-    """Cells of most rows, and whether each column has a value in most of them."""
+def _columns(body: Sequence[str], form: TextLayout) -> tuple[int, list[bool]]:
+    """The most frequent number of cells in a row, and whether each column has values in most rows."""
     rows = [form.cells(line) for line in body if line.strip()]
     if not rows:
         return 1, [True]
@@ -82,8 +82,8 @@ def _columns(body: Sequence[str], form: Form) -> tuple[int, list[bool]]:
     return width, [sum(form.is_value(row[i]) for row in whole) > 0.9 * len(whole) for i in range(width)]
 
 
-def _first_row(lines: Sequence[str], form: Form, width: int, numeric: list[bool], given: Dialect) -> int | None:
-    """The line from which on there are rows."""
+def _first_row(lines: Sequence[str], form: TextLayout, width: int, numeric: list[bool], given: Dialect) -> int | None:
+    """The line of the first row."""
 
     def is_row(line: str) -> bool:
         if line.lstrip().startswith(given.comment or COMMENTS):
@@ -103,12 +103,12 @@ def _first_row(lines: Sequence[str], form: Form, width: int, numeric: list[bool]
     return None
 
 
-def _names_above(lines: Sequence[str], first: int, form: Form, width: int, given: Dialect) -> tuple[int, int]:
-    """The lines of names and of units above the first row, -1 where there is none."""
+def _names_above(lines: Sequence[str], first: int, form: TextLayout, width: int, given: Dialect) -> tuple[int, int]:
+    """The lines of names and of units above the first row; -1 if missing."""
     if given.skip_rows is not None and not given.names:
         units = range(given.skip_rows + 1, first)
-        found = [at for at in units if is_unit_row(_named(lines[at], form, width)) and given.units_row is not False]
-        return given.skip_rows, found[0] if found else -1
+        unit_rows = [at for at in units if is_unit_row(_named(lines[at], form, width)) and given.units_row is not False]
+        return given.skip_rows, unit_rows[0] if unit_rows else -1
     fitting: list[int] = []
     for at in range(first - 1, max(first - 1 - _MOST_ABOVE, -1), -1):
         if not lines[at].strip():
@@ -133,13 +133,13 @@ def _names_above(lines: Sequence[str], first: int, form: Form, width: int, given
         left = [at for at in left if at < units_line] or left
     if width == 1:
         return (left[0] if left else -1), units_line
-    # the line with most different names; of equally good ones the nearest
+    # the line with most different names, or the nearest of several
     many = {at: len({cell.strip() for cell in _named(lines[at], form, width) if cell.strip()}) for at in left}
     return max(left, key=lambda at: (many[at], at), default=-1), units_line
 
 
-def _named(line: str, form: Form, width: int) -> list[str]:
-    """The cells of a line of names, without the mark of a comment and without empty ones behind the last column."""
+def _named(line: str, form: TextLayout, width: int) -> list[str]:
+    """The cells of a line of names, without a comment mark and without empty cells after the last column."""
     text = line.strip("\r\n\ufeff")
     for mark in COMMENTS:
         if text.lstrip().startswith(mark) and (mark != "%" or text.lstrip()[1:2].isspace()):  # `%time` of ROS is a name
@@ -160,7 +160,7 @@ def _named(line: str, form: Form, width: int) -> list[str]:
 
 
 def _each_once(names: list[str], width: int) -> list[str]:
-    """A name for each column: its number where it has none, and `NAME.1` for one that comes again."""
+    """A unique name for each column: its number if it has no name, and `NAME.1` for a repeated name."""
     seen: Counter[str] = Counter()
     result: list[str] = []
     for number in range(width):
@@ -171,18 +171,18 @@ def _each_once(names: list[str], width: int) -> list[str]:
 
 
 def _step_s(lines: Sequence[str]) -> float | None:
-    """Seconds between rows, as a line above the rows states them."""
+    """Time between rows [s], if a line above the rows states it."""
     for line in lines:
         for pattern, is_rate in ((_STEP, False), (_RATE, True)):
-            found = pattern.search(line)
-            if found is None:
+            match = pattern.search(line)
+            if match is None:
                 continue
-            text = found["value"]
+            text = match["value"]
             try:
                 value = float(text.replace(",", ".") if "," in text and "." not in text else text.replace(",", ""))
             except ValueError:
                 continue
-            unit = (found["unit"] or found["u1"] or "").replace("S/s", "Hz").replace("sps", "Hz")
+            unit = (match["unit"] or match["u1"] or "").replace("S/s", "Hz").replace("sps", "Hz")
             known = known_unit(unit) if unit else None
             if value <= 0.0 or (is_rate and known is None and "hz" not in line.lower()):
                 continue

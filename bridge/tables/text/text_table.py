@@ -1,4 +1,4 @@
-"""The rows of a text table as columns. Arrow reads them; what it cannot part or count is told, or made readable before."""
+"""The rows of a text table as columns. Arrow reads them, after a conversion of forms that it does not support."""
 
 import re
 from pathlib import Path
@@ -12,29 +12,29 @@ from bridge.faults import Fault
 from bridge.log.finding import Finding
 from bridge.tables.cells import is_text, texts_of
 from bridge.tables.table import Table
-from bridge.tables.text.dialect import BLANK, Dialect, Form, form_of
+from bridge.tables.text.dialect import BLANK, Dialect, TextLayout, form_of
 from bridge.tables.text.encoding import decoded
 from bridge.tables.text.head import COMMENTS, Head, read_head
 from bridge.tables.text.unit_cells import units_apart
 from bridge.tables.unit_words import unknown_units
 from bridge.units import counted
 
-# Arrow handles Ctrl-C and SIGTERM itself while it reads a CSV file, and loses a signal that comes near the end.
+# While reading a CSV file, Arrow handles Ctrl-C and SIGTERM itself, and loses a signal near the end.
 pa.enable_signal_handlers(False)
 
-_HEAD_CHARACTERS = 1 << 18  # in which the rows must begin; LabVIEW and DIAdem write some 10 kB above them
-_PIECES, _PIECE_CHARACTERS = 12, 4096  # of the rest, in which the form of the rows is found
-_MOST_LEFT_OUT = 0.1  # share of rows with too many or too few cells, from which it is another kind of file
-# a quoted name over several lines, as spreadsheets write a cell with line breaks; a quote elsewhere is an inch
+_HEAD_CHARACTERS = 1 << 18  # within which the rows must begin; LabVIEW and DIAdem write about 10 kB above them
+_PIECES, _PIECE_CHARACTERS = 12, 4096  # samples of the rest, from which the form of the rows is detected
+_MOST_LEFT_OUT = 0.1  # share of rows with too many or too few cells, from which the file is refused
+# a quoted name over several lines, as spreadsheets write a cell with line breaks; other quotes may be inch marks
 _NAME_OF_LINES = re.compile(r'(?:^|(?<=[,;\t|]))"[^"\r\n]{0,80}[\r\n][^"]{0,80}"(?=[,;\t|\r\n]|\Z)', re.MULTILINE)
-# as word processors write a minus, which no reader of numbers knows: the one of typographers, a dash, and the wide one
+# signs of word processors in place of the ASCII minus: U+2212, a dash, and the full-width minus
 _MINUS = ("\u2212", "\u2013", "\uff0d")
 _MINUS_OF_NUMBER = re.compile(rf'(?<![^\n\r;,\t |"eE])[{"".join(_MINUS)}](?=[\d.,])')
 _SHOWN = 60  # characters of a line in a finding
 
 
 def read_text(path: Path, given: Dialect) -> Table:
-    """Read a text table; what `given` leaves open is found and said. Raises Fault BAD_TABLE."""
+    """Read a text table; properties missing in `given` are detected and reported as findings. Raises Fault BAD_TABLE."""
     text, encoding = decoded(path.read_bytes(), given.encoding, path.name)
     if any(minus in text for minus in _MINUS):
         text = _MINUS_OF_NUMBER.sub("-", text)
@@ -47,9 +47,9 @@ def read_text(path: Path, given: Dialect) -> Table:
     body = _spread(text, head_lines, given)
     form = form_of(body, given, any('"' in line for line in (*head_lines, *body)), head_lines)
     head = read_head(head_lines, body, form, given, path.name)
-    rows, left_out, some = _rows(text, head, form, given)
+    rows, left_out, example = _rows(text, head, form, given)
     columns: dict[str, Any] = {name: rows.column(i) for i, name in enumerate(head.names)}
-    findings = [*_told(path.name, head, form, encoding, given), *_lost(path.name, left_out, some, rows.num_rows)]
+    findings = [*_assumed(path.name, head, form, encoding, given), *_lost(path.name, left_out, example, rows.num_rows)]
     units = head.unit_of
     for name, column in columns.items():
         if is_text(column.type) and (apart := units_apart(texts_of(column), form.decimal, form.thousands)):
@@ -71,7 +71,7 @@ def read_text(path: Path, given: Dialect) -> Table:
 
 
 def _spread(text: str, head_lines: list[str], given: Dialect) -> list[str]:
-    """Lines of the rows alone, from all over the file, without those that are cut."""
+    """Complete lines of rows, sampled from the whole file."""
     if len(text) <= _HEAD_CHARACTERS:
         filled = [
             line for line in head_lines if line.strip() and not line.lstrip().startswith(given.comment or COMMENTS)
@@ -85,8 +85,8 @@ def _spread(text: str, head_lines: list[str], given: Dialect) -> list[str]:
     return lines
 
 
-def _rows(text: str, head: Head, form: Form, given: Dialect) -> tuple[Any, int, str]:
-    """The rows as an Arrow table, how many were left out, and one of them."""
+def _rows(text: str, head: Head, form: TextLayout, given: Dialect) -> tuple[Any, int, str]:
+    """The rows as an Arrow table, the number of omitted rows, and the first of them."""
     at = _offset(text, head.lines)
     rows = text[at:]
     delimiter = form.delimiter
@@ -114,42 +114,42 @@ def _rows(text: str, head: Head, form: Form, given: Dialect) -> tuple[Any, int, 
 
 
 def _offset(text: str, lines: int) -> int:
-    """Characters before line `lines`, from 0; lines end as `splitlines` says for CR, LF and both."""
+    """Characters before line number `lines`, from 0; lines end with CR, LF or both."""
     at = 0
     for _ in range(lines):
-        found = re.compile(r"\r\n|\n|\r").search(text, at)
-        if found is None:
+        line_end = re.compile(r"\r\n|\n|\r").search(text, at)
+        if line_end is None:
             return len(text)
-        at = found.end()
+        at = line_end.end()
     return at
 
 
-def _told(file: str, head: Head, form: Form, encoding: str, given: Dialect) -> list[Finding]:
-    """What was assumed where the map says nothing, where it is not what most files have."""
-    found: list[Finding] = []
+def _assumed(file: str, head: Head, form: TextLayout, encoding: str, given: Dialect) -> list[Finding]:
+    """Findings for detected properties that the map does not state and that are not the usual ones."""
+    findings: list[Finding] = []
     parts = [
         (given.delimiter is None and form.delimiter != ",", f"delimiter = {form.delimiter!r}"),
         (given.decimal is None and form.decimal != ".", f"decimal = {form.decimal!r}"),
         (given.thousands is None and bool(form.thousands), f"thousands = {form.thousands!r}"),
         (given.encoding is None and encoding != "utf-8", f"encoding = {encoding!r}"),
         (given.skip_rows is None and head.names_line > 0, f"skip_rows = {head.names_line}"),
-        (given.names is None and head.names_line < 0, "no line of names: columns have numbers"),
+        (given.names is None and head.names_line < 0, "no line of names: columns are numbered"),
     ]
-    if told := [text for wanted, text in parts if wanted]:
-        found.append(Finding("assumed", file, ", ".join(told)))
+    if texts := [text for wanted, text in parts if wanted]:
+        findings.append(Finding("assumed", file, ", ".join(texts)))
     if head.units:
-        found.append(
-            Finding("assumed", file, f"line {head.units_line + 1} is of units: {', '.join(filter(None, head.units))}")
+        findings.append(
+            Finding("assumed", file, f"line {head.units_line + 1} holds units: {', '.join(filter(None, head.units))}")
         )
         if unknown := unknown_units(head.unit_of):
-            found.append(Finding("units", file, f"no known unit: {unknown}; taken as it is"))
-    return found
+            findings.append(Finding("units", file, f"unknown unit: {unknown}; kept as written"))
+    return findings
 
 
-def _lost(file: str, left_out: int, some: str, rows: int) -> list[Finding]:
+def _lost(file: str, left_out: int, example: str, rows: int) -> list[Finding]:
     if not left_out:
         return []
-    text = f"{counted(left_out, 'line')} with another number of cells left out, first {some[:_SHOWN]!r}"
+    text = f"{counted(left_out, 'line')} with another number of cells left out, first {example[:_SHOWN]!r}"
     if left_out > _MOST_LEFT_OUT * (rows + left_out):
         raise Fault(
             "BAD_TABLE", f"{file}: {text}, of {rows + left_out}: must be few; cut the file, or state source.delimiter"

@@ -1,35 +1,35 @@
-"""Cells that hold a number and its unit, as gauges write them: `12.3 N`, and after a change of range `980 mN`."""
+"""Cells with a number and its unit, as gauges write them: `12.3 N`, and after a change of range `980 mN`."""
 
 import re
 
 from bridge.tables.cells import number_in
 from bridge.tables.unit_words import known_unit, si_unit
 
-_LOOKED_AT = 50  # cells in which a column shows whether it has units
+_LOOKED_AT = 50  # first cells of a column that decide whether it has units
 _WITH_UNIT = re.compile(r"(?P<number>[-+]?[\d.,]*\d[.,]?(?:[eE][-+]?\d+)?)\s*(?P<unit>[A-Za-zµμ°%][A-Za-zµμ°/²*·]*\d?)")
 
 
 def number_and_unit(cell: str) -> tuple[str, str]:
-    """The text of the number in a cell, and the unit behind it; the cell itself and "" where no known unit is."""
+    """The text of the number in a cell, and its unit; without a known unit, the cell itself and ""."""
     word = cell.strip()
-    if not word or (word[-1].isdigit() and "/" not in word):  # most cells, at no cost; `m/s2` ends in a digit as well
+    if not word or (word[-1].isdigit() and "/" not in word):  # a quick exit for most cells; `m/s2` ends in a digit too
         return word, ""
-    found = _WITH_UNIT.fullmatch(word)
-    return (found["number"], found["unit"]) if found is not None and known_unit(found["unit"]) else (word, "")
+    match = _WITH_UNIT.fullmatch(word)
+    return (match["number"], match["unit"]) if match is not None and known_unit(match["unit"]) else (word, "")
 
 
 def units_apart(texts: list[str], decimal: str, thousands: str) -> tuple[list[str], str] | None:
-    """The numbers of a column without their units, and the unit; None where most of its first cells have none.
+    """The numbers of a column without their units, and the unit; None if most of its first cells have no unit.
 
-    Where the unit changes from cell to cell the numbers are in the SI unit of what all of them measure.
+    If the unit changes from cell to cell, the numbers are converted to the SI unit of their quantity.
     """
     first = [number_and_unit(text)[1] for text in texts[:_LOOKED_AT]]
     if 2 * sum(map(bool, first)) <= len(first):
         return None
     parts = [number_and_unit(text) for text in texts]
     factors = {unit: known_unit(unit) for _, unit in parts if unit}
-    known = [one for one in factors.values() if one is not None]
-    if len({what for what, _ in known}) != 1:
+    known = [factor for factor in factors.values() if factor is not None]
+    if len({quantity for quantity, _ in known}) != 1:
         return None
     if len(factors) == 1:
         return [number for number, _ in parts], next(iter(factors))

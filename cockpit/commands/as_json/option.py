@@ -1,4 +1,4 @@
-"""`--json`, the same for every command: which word is its file, where the result goes, and errors as JSON."""
+"""The option `--json` of every command: its file name, the output of the result, and faults as JSON."""
 
 import json
 import sys
@@ -20,9 +20,9 @@ from cockpit.run.writable import check_output, writing
 STDOUT = Path("-")
 _OPTION = "--json"
 _SUFFIX = ".json"
-# the word after `--json`, which is an input where it does not end in .json
+# the word after `--json`; it is an input of the command unless it ends in .json
 _AFTER: ContextVar[Sequence[str]] = ContextVar("after", default=())
-# typer has click inside since 0.27 and beside it before; what it exports is of the same kind in both
+# typer contains click since 0.27 and depended on it before; BadParameter has the same base classes in both
 _UsageError: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "UsageError")
 
 Json = Annotated[
@@ -30,16 +30,16 @@ Json = Annotated[
     typer.Option(
         _OPTION,
         metavar="[FILE.json]",
-        help="Print the result as JSON on stdout, or write it to a file whose name ends in .json; words go to stdout then.",
+        help="Print the result as JSON on stdout, or write it to a file that ends in .json and print text on stdout.",
     ),
 ]
 
 
 class JsonGroup(TyperGroup):
-    """A group of commands in which `--json` needs no value; with JSON on stdout a wrong command line is JSON as well."""
+    """A group of commands in which `--json` needs no value; with JSON on stdout a usage error is JSON as well."""
 
     def main(self, args: Sequence[str] | None = None, *more: Any, **options: Any) -> Any:
-        """Run a command line, that of the process if none is given."""
+        """Run a command line; `sys.argv` if none is given."""
         given = list(sys.argv[1:] if args is None else args)
         words = with_places(given)
         COMMAND.set(given)
@@ -51,14 +51,14 @@ class JsonGroup(TyperGroup):
         except _UsageError as error:
             wrong: Any = error
             command = wrong.ctx.command_path if wrong.ctx else "stickslip"
-            told = wrong.format_message().rstrip(".")
-            line = f"{command}: {told}{_perhaps_meant(told)}; see {command} --help"
+            message = wrong.format_message().rstrip(".")
+            line = f"{command}: {message}{_perhaps_meant(message)}; see {command} --help"
             status = guarded(lambda: report(Fault("CONFIG", line), as_json=True))
         sys.exit(status or 0)
 
 
 def with_places(words: Sequence[str]) -> list[str]:
-    """The command line with a place for every `--json`: the next word where that is `-` or ends in .json, else stdout."""
+    """Give every `--json` of a command line a value: the next word if it is `-` or ends in .json, else stdout."""
     result: list[str] = []
     left = list(words)
     while left:
@@ -73,7 +73,7 @@ def with_places(words: Sequence[str]) -> list[str]:
 
 
 def carry_out(work: Callable[[], int | None], as_json: Path | None) -> NoReturn:
-    """Do the work of a command and end with its exit status; a file for JSON that cannot be written is told before."""
+    """Do the work of a command and end with its exit status; a JSON file that cannot be written is refused before."""
 
     def checked() -> int | None:
         _check(as_json)
@@ -85,19 +85,19 @@ def carry_out(work: Callable[[], int | None], as_json: Path | None) -> NoReturn:
     sys.exit(guarded(checked, as_json == STDOUT))
 
 
-def _perhaps_meant(told: str) -> str:
-    """What to add to an error about a word too many, or an input that is not there: that it may be meant as the file."""
-    about = [word for word in _AFTER.get() if told.startswith(f"{word}: no ") or f"({word})" in told]
+def _perhaps_meant(message: str) -> str:
+    """Hint for an error about a superfluous word or a missing input: the word may be meant as the JSON file."""
+    about = [word for word in _AFTER.get() if message.startswith(f"{word}: no ") or f"({word})" in message]
     return f"; if it is meant as the file of {_OPTION}, it must end in {_SUFFIX}" if about else ""
 
 
 def tell(as_json: Path | None, result: Any, words: Iterable[str], indent: int | None = None) -> None:
-    """Print a result, or write it and print its words. Raises Fault LOG_WRITE.
+    """Print a result as JSON, or write it to a file and print its lines. Raises Fault LOG_WRITE.
 
     Args:
-        as_json: what `--json` says.
+        as_json: value of `--json`.
         result: named tuples, dictionaries, lists, numbers and texts.
-        words: lines for a person.
+        words: lines for the operator.
         indent: of JSON on stdout; one line if not given.
 
     """
@@ -106,14 +106,14 @@ def tell(as_json: Path | None, result: Any, words: Iterable[str], indent: int | 
         return
     if as_json is not None:
         refuse_to_replace(as_json, JSON, f"{_OPTION} {as_json}")  # the command itself may have written its log there
-        with writing(as_json):  # before anything is printed, which ends where nobody reads on
+        with writing(as_json):  # before the lines: a reader that closes stdout ends the command
             write_json(as_json, result)
     for line in words:
         print(plain(line))
 
 
 def _check(as_json: Path | None) -> None:
-    """Raise Fault CONFIG or LOG_WRITE for what is no place for JSON."""
+    """Raise Fault CONFIG or LOG_WRITE for a path that cannot hold JSON."""
     if as_json is None or as_json == STDOUT:
         return
     if as_json.suffix.lower() != _SUFFIX:

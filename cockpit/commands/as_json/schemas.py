@@ -14,20 +14,20 @@ class Format(NamedTuple):
     make: Callable[[], dict[str, Any]]
 
     def schema(self) -> dict[str, Any]:
-        """Its JSON Schema."""
+        """The JSON Schema of this format."""
         return {"$schema": DIALECT, "title": self.name} | _untitled(self.make()) | {"description": self.about}
 
 
 def _untitled(schema: Any) -> Any:
-    """Without the titles that pydantic makes of the names."""
+    """Remove the titles that pydantic derives from the names."""
     if isinstance(schema, list):
-        return [_untitled(one) for one in schema]
+        return [_untitled(item) for item in schema]
     if not isinstance(schema, dict):
         return schema
-    return {key: _untitled(one) for key, one in schema.items() if key != "title" or not isinstance(one, str)}
+    return {key: _untitled(value) for key, value in schema.items() if key != "title" or not isinstance(value, str)}
 
 
-# TOML: the models check more than a schema can say, and a schema takes whatever they take
+# TOML: a schema accepts every file that the models accept; the models check more than a schema can express
 
 
 def _rig() -> dict[str, Any]:
@@ -39,48 +39,28 @@ def _rig() -> dict[str, Any]:
     return _with_pairs_and_effects(schema)
 
 
-def _scenario() -> dict[str, Any]:
+def scenario() -> dict[str, Any]:
+    """The schema of a scenario file."""
     from cockpit.run.scenario import Scenario
 
     schema = Scenario.model_json_schema()
     known = schema["$defs"]
-    # `file` names a rig, and any key beside it overrides one of that rig
+    # `file` names a rig; the other keys of the table override keys of that rig
     del known["ContactConfig"]["required"], known["RigConfig"]["required"]
-    file = {"type": "string", "description": "Name of a rig in deploy/rigs, or a .toml file; keys beside it override."}
+    file = {
+        "type": "string",
+        "description": "Name of a rig in deploy/rigs, or a .toml file; the other keys here override its keys.",
+    }
     known["RigConfig"]["properties"] = {"file": file} | known["RigConfig"]["properties"]
     return _with_pairs_and_effects(schema)
 
 
-def _bank() -> dict[str, Any]:
-    from cockpit.bank.scenario import BankConfig
-
-    schema, bank = _scenario(), BankConfig.model_json_schema()
-    schema["$defs"] |= bank.pop("$defs") | {"BankConfig": bank}
-    tables = {name: schema["properties"][name] for name in ("duration_s", "seed", "rig", "controller")}
-    tables |= {"bank": {"$ref": "#/$defs/BankConfig"}}
-    words = {name: {"type": "string"} for name in ("name", "description")}
-    one = {"type": "object", "properties": words | tables, "required": [*words], "additionalProperties": False}
-    several = {
-        "type": "array",
-        "minItems": 1,
-        "items": one,
-        "description": "Each is the tables above, and what it says itself.",
-    }
-    return {
-        "$defs": schema["$defs"],
-        "type": "object",
-        "properties": {"description": words["description"]} | tables | {"scenario": several},
-        "required": ["description", "scenario"],
-        "additionalProperties": False,
-    }
-
-
 def _with_pairs_and_effects(schema: dict[str, Any]) -> dict[str, Any]:
     from plant.effects.library import EFFECTS
-    from plant.effects.row import Form
+    from plant.effects.row import Formula
     from plant.pairs import PAIRS
 
-    def form(name: str, formula: Form, first: bool) -> dict[str, Any]:
+    def form(name: str, formula: Formula, first: bool) -> dict[str, Any]:
         numbers = {
             row.name: {"type": "number", "minimum": row.low, "maximum": row.high, "default": row.default}
             for row in formula.parameters
@@ -120,7 +100,7 @@ def _import_map() -> dict[str, Any]:
 
     schema = ImportMap.model_json_schema()
     rig = RigTable.model_json_schema()
-    del rig["required"]  # an import into a log needs none, and what an owner can hardly know is assumed
+    del rig["required"]  # an import into a log needs no number of the rig; unknown numbers are assumed
     schema["$defs"]["RigTable"] = rig
     schema["properties"]["rig"] = {"$ref": "#/$defs/RigTable"}
     return _with_channels(schema)
@@ -130,8 +110,8 @@ def _with_channels(schema: dict[str, Any]) -> dict[str, Any]:
     from diagnosis.evidence.manifest import RigTable
     from diagnosis.evidence.manifest_keys import STANDARD
 
-    column = {"type": "string", "minLength": 1, "description": "The column alone."}
-    number = {"type": "integer", "minimum": 1, "description": "The number of the column."}
+    column = {"type": "string", "minLength": 1, "description": "Name of the column."}
+    number = {"type": "integer", "minimum": 1, "description": "Number of the column, from 1 on."}
     channel = {"anyOf": [column, number, {"$ref": "#/$defs/ChannelMap"}]}
     of_channel = schema["$defs"]["ChannelMap"]["properties"]
     of_channel["column"] = {"anyOf": [of_channel["column"], number]}
@@ -140,7 +120,7 @@ def _with_channels(schema: dict[str, Any]) -> dict[str, Any]:
         channels = table["properties"]["channels"]
         channels |= {"properties": dict.fromkeys(STANDARD, channel), "additionalProperties": False}
     rig = schema["$defs"]["RigTable"]
-    # what an owner can hardly know is assumed
+    # numbers that the owner of a rig rarely knows are optional; the diagnosis assumes them
     rig |= (
         {
             "required": [
@@ -183,28 +163,8 @@ def _diagnoses() -> dict[str, Any]:
     from cockpit.commands.diagnose_output import MANY_FORMAT
 
     fault = objects("FolderFault", {"fault": str, "line": str})
-    one = {"evidence": str, "diagnosis": NotRequired[_diagnosis_type()], "fault": NotRequired[fault]}
-    return schema_of(objects("Diagnoses", {"format": Literal[MANY_FORMAT], "results": list[objects("Folder", one)]}))
-
-
-def _blind_scores() -> dict[str, Any]:
-    from cockpit.commands.as_json.types import objects, schema_of
-    from diagnosis.blind.pooling import FORMAT
-    from diagnosis.blind.scoring import Scores
-
-    fields = {"format": Literal[FORMAT], "sealed": bool, "tool": str, "methods": dict[str, Scores]}
-    return schema_of(objects("BlindScores", fields | {"cases": list[dict[str, Any]]}))
-
-
-def _bench_control() -> dict[str, Any]:
-    from cockpit.bank.bars import Bar
-    from cockpit.bank.figures import Figures
-    from cockpit.bank.least import Least
-    from cockpit.commands.as_json.types import objects, schema_of
-
-    fields = {"passed": bool, "bars": list[Bar], "runs": list[Figures], "least": dict[str, Least]}
-    fields |= {"step_cost_ratio": float, "elapsed_s": float}
-    return schema_of(objects("BenchControl", fields))
+    folder = {"evidence": str, "diagnosis": NotRequired[_diagnosis_type()], "fault": NotRequired[fault]}
+    return schema_of(objects("Diagnoses", {"format": Literal[MANY_FORMAT], "results": list[objects("Folder", folder)]}))
 
 
 def _fault() -> dict[str, Any]:
@@ -234,9 +194,11 @@ def _run() -> dict[str, Any]:
 
 def _log_info() -> dict[str, Any]:
     from bridge.log.finding import Finding
-    from cockpit.commands.as_json.types import schema_of
+    from cockpit.commands.as_json.types import objects, schema_of
 
-    return schema_of(_verdict(findings=list[Finding]))
+    one = _verdict(findings=list[Finding])
+    fault = objects("LogFault", {"fault": str, "line": str, "exit_status": int})
+    return schema_of(one | list[one | fault])
 
 
 def _plot() -> dict[str, Any]:
@@ -282,11 +244,11 @@ def _log_recover() -> dict[str, Any]:
 
 def _explain() -> dict[str, Any]:
     from bridge.wire.event_codes import EventCode
-    from bridge.wire.words import Word
+    from bridge.wire.words import ColumnWord
     from cockpit.commands.as_json.types import schema_of
     from cockpit.commands.explain import Meaning
 
-    return schema_of(list[Meaning | Word | EventCode])
+    return schema_of(list[Meaning | ColumnWord | EventCode])
 
 
 def _reproduce() -> dict[str, Any]:
@@ -297,28 +259,21 @@ def _reproduce() -> dict[str, Any]:
 
 
 def _faults() -> dict[str, Any]:
-    from cockpit.faults.catalogue import Group
+    from cockpit.faults.catalogue import FaultGroup
 
-    return Group.model_json_schema()
+    return FaultGroup.model_json_schema()
 
 
 def _soak() -> dict[str, Any]:
     from cockpit.commands.as_json.types import schema_of
     from cockpit.run.soak import Memory, Period
 
-    own = {"scenario": str, "wanted_s": float, "interrupted": bool, "memory": list[Memory], "periods": list[Period]}
-    return schema_of(_verdict(**own))
+    more = {"scenario": str, "wanted_s": float, "interrupted": bool, "memory": list[Memory], "periods": list[Period]}
+    return schema_of(_verdict(**more))
 
 
-def _bench_faults() -> dict[str, Any]:
-    from cockpit.commands.as_json.types import schema_of, table
-    from cockpit.faults.bench import FaultBench
-
-    return schema_of(table(FaultBench, {"counts": dict[str, int], "worse_than_known": list[str]}))
-
-
-def _result_of(module: str, kind: str, many: bool = False) -> Callable[[], dict[str, Any]]:
-    """The schema of a command whose result is one named tuple, or a list of such."""
+def result_of(module: str, kind: str, many: bool = False) -> Callable[[], dict[str, Any]]:
+    """The schema of a command whose result is a named tuple, or a list of named tuples."""
 
     def make() -> dict[str, Any]:
         from importlib import import_module
@@ -333,9 +288,8 @@ def _result_of(module: str, kind: str, many: bool = False) -> Callable[[], dict[
 
 TOML = (
     Format("rig", "A rig file, as in deploy/rigs: `--rig FILE.toml`.", _rig),
-    Format("scenario", "A scenario file, as in deploy/scenarios: `--scenario FILE.toml`.", _scenario),
-    Format("bank", "A family of the bank of `stickslip bench control`, as in deploy/scenarios/bank.", _bank),
-    Format("faults", "A group of the catalogue of `stickslip bench faults`, as in deploy/faults.", _faults),
+    Format("scenario", "A scenario file, as in deploy/scenarios: `--scenario FILE.toml`.", scenario),
+    Format("faults", "A group of the catalogue of `python -m bench faults`, as in deploy/faults.", _faults),
     Format("controller", "The table [controller] of a scenario, and the configuration in a log.", _controller),
     Format("evidence-1", "manifest.toml of an evidence folder, evidence/1.", _evidence),
     Format("import-map", "A channel map: `stickslip log import --map FILE.toml`.", _import_map),
@@ -346,46 +300,44 @@ JSON = (
     Format(
         "fleet-1",
         "index.json that `stickslip diagnose --report DIR` of several folders writes.",
-        _result_of("cockpit.fleet.groups", "Fleet"),
+        result_of("cockpit.fleet.groups", "Fleet"),
     ),
-    Format("blind-scores-2", "`stickslip blind score --json` and `blind pool --json`, blind-scores/2.", _blind_scores),
     Format("fault", "Any command that fails with JSON on stdout.", _fault),
     Format("run-result", "`stickslip run --json`.", _run),
-    Format("plant-result", "`stickslip plant --json`.", _result_of("cockpit.commands.processes", "Served")),
-    Format("controller-result", "`stickslip controller --json`.", _result_of("cockpit.commands.processes", "Served")),
-    Format("record-result", "`stickslip record --json`.", _result_of("cockpit.commands.processes", "Recorded")),
-    Format("status-result", "`stickslip status --json`.", _result_of("cockpit.run.status", "Status")),
+    Format("plant-result", "`stickslip plant --json`.", result_of("cockpit.commands.processes", "Served")),
+    Format("controller-result", "`stickslip controller --json`.", result_of("cockpit.commands.processes", "Served")),
+    Format("record-result", "`stickslip record --json`.", result_of("cockpit.commands.processes", "Recorded")),
+    Format("status-result", "`stickslip status --json`.", result_of("cockpit.run.status", "Status")),
     Format(
         "word-result",
-        "`stickslip arm --json`, and the same of disarm, stop and reset.",
-        _result_of("cockpit.run.operator", "Obeyed"),
+        "`stickslip arm --json`; disarm, stop and reset print the same format.",
+        result_of("cockpit.run.operator", "CommandOutcome"),
     ),
-    Format("fault-result", "`stickslip fault --json`.", _result_of("cockpit.faults.injection", "Injected")),
-    Format("fault-list", "`stickslip fault --list --json`.", _result_of("cockpit.faults.catalogue", "Known")),
+    Format("fault-result", "`stickslip fault --json`.", result_of("cockpit.faults.injection", "Injected")),
+    Format("fault-list", "`stickslip fault --list --json`.", result_of("cockpit.faults.catalogue", "FaultList")),
     Format("soak-result", "`stickslip soak --json`.", _soak),
-    Format("certs-result", "`stickslip certs --json`.", _result_of("cockpit.run.authority", "Made")),
-    Format("replay-result", "`stickslip replay --json`.", _result_of("cockpit.run.replay", "Replayed", many=True)),
+    Format("certs-result", "`stickslip certs --json`.", result_of("cockpit.run.authority", "Made")),
+    Format("replay-result", "`stickslip replay --json`.", result_of("cockpit.run.replay", "Replayed", many=True)),
     Format(
-        "closed-loop-result", "`stickslip replay --closed-loop --json`.", _result_of("cockpit.run.replay", "Compared")
+        "closed-loop-result", "`stickslip replay --closed-loop --json`.", result_of("cockpit.run.replay", "Compared")
     ),
     Format("plot-result", "`stickslip plot --json`.", _plot),
     Format("review-result", "`stickslip review --json`.", _review),
     Format("look-result", "`stickslip look --json`.", _look),
-    Format("map-result", "`stickslip map --json`.", _result_of("cockpit.judge.stability_map", "MapResult")),
+    Format("map-result", "`stickslip map --json`.", result_of("cockpit.judge.stability_map", "MapResult")),
     Format("reproduce-result", "`stickslip reproduce --json`.", _reproduce),
-    Format("example-result", "`stickslip example --json`.", _result_of("cockpit.commands.example", "Example")),
-    Format("log-info-result", "`stickslip log info --json`.", _log_info),
-    Format("log-check-result", "`stickslip log check --json`.", _result_of("bridge.log.check.log_check", "LogCheck")),
+    Format("example-result", "`stickslip example --json`.", result_of("cockpit.commands.example", "Example")),
+    Format("log-info-result", "`stickslip log info --json`; of several logs a list.", _log_info),
+    Format("log-check-result", "`stickslip log check --json`.", result_of("bridge.log.check.log_check", "LogCheck")),
     Format("log-recover-result", "`stickslip log recover --json`.", _log_recover),
-    Format("log-export-result", "`stickslip log export --json`.", _result_of("bridge.tables.export", "Exported")),
+    Format("log-export-result", "`stickslip log export --json`.", result_of("bridge.tables.export", "Exported")),
     Format(
-        "log-import-result", "`stickslip log import --json`.", _result_of("diagnosis.evidence.import_table", "Imported")
+        "log-import-result", "`stickslip log import --json`.", result_of("diagnosis.evidence.import_table", "Imported")
     ),
-    Format("bench-control-result", "`stickslip bench control --json`.", _bench_control),
-    Format("bench-faults-result", "`stickslip bench faults --json`.", _bench_faults),
-    Format("blind-run-result", "`stickslip blind run --json`.", _result_of("cockpit.commands.blind", "SetDone")),
-    Format("scenarios-result", "`stickslip scenarios --json`.", _result_of("cockpit.commands.scenarios", "Known")),
+    Format("scenarios-result", "`stickslip scenarios --json`.", result_of("cockpit.commands.scenarios", "Shipped")),
     Format("explain-result", "`stickslip explain --json`.", _explain),
-    Format("schema-result", "`stickslip schema --json`.", _result_of("cockpit.commands.schema", "Named", many=True)),
+    Format(
+        "schema-result", "`stickslip schema --json`.", result_of("cockpit.commands.schema", "SchemaName", many=True)
+    ),
 )
-FORMATS = {one.name: one for one in (*TOML, *JSON)}
+FORMATS = {row.name: row for row in (*TOML, *JSON)}

@@ -1,4 +1,4 @@
-"""JSON Schemas of results, from the types that the results are made of."""
+"""JSON Schemas of results, derived from the Python types of the results."""
 
 import types
 from collections.abc import Mapping
@@ -6,18 +6,18 @@ from pathlib import Path
 from typing import Any, Literal, NotRequired, Union, get_args, get_origin, get_type_hints, is_typeddict
 
 from pydantic import ConfigDict, TypeAdapter
-from typing_extensions import TypedDict  # that of typing is refused by pydantic before Python 3.12
+from typing_extensions import TypedDict  # pydantic refuses typing.TypedDict before Python 3.12
 
 
 def schema_of(kind: Any) -> dict[str, Any]:
-    """JSON Schema of what `tell` writes of a value of type `kind`."""
+    """JSON Schema of the JSON that `tell` writes for a value of type `kind`."""
     return TypeAdapter[Any](_written(kind)).json_schema()
 
 
 def table(kind: Any, more: Mapping[str, Any], left_out: tuple[str, ...] = ()) -> Any:
-    """The type of an object with the fields of a named tuple, but for those left out, and with more of them.
+    """The type of an object with the fields of a named tuple, without those in `left_out` and with those in `more`.
 
-    A field given again replaces its first type; `NotRequired[...]` stands for one that need not be there.
+    A field in `more` replaces the field of the same name; `NotRequired[...]` marks an optional field.
     """
     fields = {name: hint for name, hint in get_type_hints(kind).items() if name not in left_out}
     return objects(kind.__name__, fields | dict(more))
@@ -32,7 +32,7 @@ def objects(name: str, fields: Mapping[str, Any]) -> Any:
 
 
 def _written(kind: Any) -> Any:
-    """The type of the JSON that is written of a type: objects for named tuples, lists for tuples, null for what is no number."""
+    """The type of the JSON for a type: an object for a named tuple, a list for a tuple, null for NaN and infinity."""
     if kind is float:
         return float | None
     if kind is Path:
@@ -44,7 +44,7 @@ def _written(kind: Any) -> Any:
         return kind
     if origin is tuple and inner[1:] == (Ellipsis,):
         return list[_written(inner[0])]
-    plain = tuple(_written(one) for one in inner)
+    plain = tuple(_written(part) for part in inner)
     if origin in (Union, types.UnionType):
         return Union[plain]  # noqa: UP007 (made of a list)
     generic: Any = origin

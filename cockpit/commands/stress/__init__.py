@@ -1,1 +1,1 @@
-"""Commands that try what is built: `bench` controller and guard, `fault` and `soak` a loop that runs."""
+"""Commands that test a running loop: `fault` and `soak`."""

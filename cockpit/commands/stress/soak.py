@@ -1,4 +1,4 @@
-"""`stickslip soak`: plant, controller and recorder for hours, judged and watched from outside."""
+"""`stickslip soak`: plant, controller and recorder for hours, with verdict, memory and latency."""
 
 from pathlib import Path
 from typing import Annotated
@@ -25,35 +25,35 @@ _PAGE = (".md",)
 
 def soak(
     scenario: ScenarioName = "belt-axis",
-    hours: Annotated[float, typer.Option(min=0.0, help="How long.")] = 0.0,
-    minutes: Annotated[float, typer.Option(min=0.0, help="The same in minutes; both count.")] = 0.0,
+    hours: Annotated[float, typer.Option(min=0.0, help="Duration in hours.")] = 0.0,
+    minutes: Annotated[float, typer.Option(min=0.0, help="Duration in minutes, added to --hours.")] = 0.0,
     settings: Settings = [],  # noqa: B006
     seed: Seed = None,
     endpoint: Endpoint = None,
     prefix: Prefix = None,
     certs: Certs = None,
     log: LogFile = None,
-    report: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a page, one .md file.")] = None,
+    report: Annotated[Path | None, typer.Option(metavar="FILE", help="Report to write, one .md file.")] = None,
     as_json: Json = None,
 ) -> None:
-    """Run a loop for hours: verdict, memory of each process, latency over time; exit status 1: not to its end, or not whole.
+    """Run a loop for hours: verdict, memory of each process, latency over time; exit status 1: ended early, or lost messages.
 
-    Ctrl-C ends it with a result. Its log is gone afterwards, unless --log keeps it.
+    Ctrl-C ends it with a result. Its log is deleted at the end unless --log is given.
     """
 
     def work() -> int:
         from bridge.files import write_whole
         from cockpit.run.child_process import warn_without_priority
-        from cockpit.run.scenario import load_scenario, refuse_what_takes_no_clock
+        from cockpit.run.scenario import load_scenario, refuse_short_blocks
         from cockpit.run.soak import soak as run
         from cockpit.run.writable import LOG, check_output, writing
 
         seconds = 3600.0 * hours + 60.0 * minutes
         if seconds <= 0.0:
-            raise Fault("CONFIG", "--hours, --minutes: missing: must be above 0 together; give one")
+            raise Fault("CONFIG", "--hours, --minutes: missing: their sum must be above 0; give one of them")
         changed = as_settings(settings, seed, endpoint, prefix, certs)
         made = load_scenario(scenario, [*changed, f"duration_s={seconds}"])
-        refuse_what_takes_no_clock(made)
+        refuse_short_blocks(made)
         for path, option, kind in ((report, "--report", _PAGE), (log, "--log", LOG)):
             if path is not None:
                 check_output(option, path, kind)

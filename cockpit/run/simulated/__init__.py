@@ -1,6 +1,7 @@
-"""A run in simulated time: the loops of plant and controller as they are, in one process, with a clock that waits for nobody.
+"""A run in simulated time: the unchanged loops of plant and controller, in one process, with a simulated clock.
 
-stage  threads that take turns, one at a time, and the clock between them
-bus    what they say to one another, and who is there
+stage  threads that take turns, one at a time, and their clock
+bus    messages between them, and the roles that are present
 run    a scenario on that stage, from its start to its end
+log    the log of such a run
 """

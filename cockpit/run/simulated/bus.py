@@ -1,4 +1,4 @@
-"""The bus of a simulated run: messages arrive at once and in order, unless their sender or receiver stands still for too long."""
+"""The bus of a simulated run: messages arrive at once and in order, unless the link of sender or receiver is down."""
 
 import threading
 from collections.abc import Callable, Iterable
@@ -12,21 +12,21 @@ Receive = Callable[[Received], None]
 
 
 class Hub:
-    """What all sessions share: who listens, who is there, and whose link is down."""
+    """State that all sessions share: listeners, present roles, and roles whose link is down."""
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
         self.there: set[str] = set()
-        self.came: dict[str, int] = {}
+        self.came: dict[str, int] = {}  # number of announcements by role
         self.down: set[str] = set()  # roles without a link
         self._listeners: dict[str, list[tuple[str, Receive]]] = {}
 
     def listen(self, role: str, topic: Topic, receive: Receive) -> None:
-        """Hear a topic as a role."""
+        """Subscribe to a topic as a role."""
         self._listeners.setdefault(topic.name, []).append((role, receive))
 
     def put(self, role: str, topic: Topic, payload: bytes) -> None:
-        """Say something as a role; without a link nobody hears it."""
+        """Publish a payload as a role; it is lost if the role's link is down."""
         if role in self.down:
             return
         received = Received(topic, payload, self.stage.now_ns)
@@ -36,7 +36,7 @@ class Hub:
                 self.stage.heard(listener)
 
     def announce(self, role: str) -> None:
-        """A role is there."""
+        """A role joins the bus."""
         self.down.discard(role)
         self.there.add(role)
         self.came[role] = self.came.get(role, 0) + 1
@@ -47,14 +47,14 @@ class Hub:
         self.there.discard(role)
 
     def forget(self, role: str) -> None:
-        """A process is gone with all its subscriptions."""
+        """A process ends, and its subscriptions with it."""
         self.lose(role)
         for name, listeners in self._listeners.items():
-            self._listeners[name] = [one for one in listeners if one[0] != role]
+            self._listeners[name] = [listener for listener in listeners if listener[0] != role]
 
 
 class Session:
-    """The session of one role: what `bridge.wire.zenoh_link.Bus` is to the loops of the processes."""
+    """The session of one role; replaces `bridge.wire.zenoh_link.Bus` in the loops of the processes."""
 
     def __init__(self, hub: Hub, role: str) -> None:
         self._hub, self._role = hub, role
@@ -72,21 +72,21 @@ class Session:
         self._hub.listen(self._role, topic, receive)
 
     def headers(self, _roles: Iterable[str], _timeout_s: float, _stop: threading.Event) -> dict[str, wire.Header]:
-        """Nothing: rig and controller of a simulated run come of one scenario, and need not tell each other what they are."""
+        """Empty: rig and controller of a simulated run come from one scenario, and their headers need no comparison."""
         return {}
 
     def alive(self, role: str) -> bool:
-        """Whether a role is on the bus, as this one sees it: nobody is, without a link of its own."""
+        """Whether this role sees another role on the bus; always False while its link is down."""
         return self._role not in self._hub.down and role in self._hub.there
 
     def came(self, role: str) -> int:
-        """How many times a role has announced itself."""
+        """Number of announcements of a role."""
         return self._hub.came.get(role, 0)
 
     def linked(self) -> bool:
-        """Whether the link to the rig stands."""
+        """Whether the link to the rig is up."""
         return not self._hub.down & {self._role, "plant"}
 
     def withdraw(self) -> None:
-        """Take the announcement back; what this role says is still heard."""
+        """Withdraw the announcement; messages of this role still arrive."""
         self._hub.there.discard(self._role)

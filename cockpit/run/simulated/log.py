@@ -1,4 +1,4 @@
-"""The log of a run in simulated time: every message in the order in which it was said."""
+"""The log of a run in simulated time: every message in the order of publication."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -25,9 +25,9 @@ def run_with_faults(
     Args:
         scenario: the scenario.
         path: of the log.
-        about: what the log says of its run.
-        progress: called now and then with the simulated time [s].
-        stopped: asked at every block; the run then ends as it does at its full duration.
+        about: metadata of the run for the log.
+        progress: called every 0.1 s of simulated time with that time [s].
+        stopped: called at every turn; True ends the run as at its full duration.
 
     """
     run = SimulatedRun(scenario)
@@ -35,10 +35,10 @@ def run_with_faults(
     complaints = Complaints(log.add_event)
     block_s = scenario.rig.solver.block_s
     every = max(round(0.1 / block_s), 1)
-    heard = 0
+    blocks = 0
 
     def write(received: Received) -> None:
-        nonlocal heard
+        nonlocal blocks
         if received.topic.logged:
             try:
                 log.write(received.topic, received.payload)
@@ -47,8 +47,8 @@ def run_with_faults(
                     raise
                 complaints.note(BAD_MESSAGE, received.topic.name, f"{fault.line.partition(': ')[2]}: dropped")
         if received.topic is SENSORS:
-            heard += 1
-            if progress is not None and heard % every == 0:
+            blocks += 1
+            if progress is not None and blocks % every == 0:
                 progress(received.arrival_ns * 1e-9)
 
     run.listen(write)

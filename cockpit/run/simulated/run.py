@@ -1,4 +1,4 @@
-"""A scenario in simulated time, with its faults: the loops of plant and controller as they are, and truth from the rig."""
+"""A scenario in simulated time, with its faults: the unchanged loops of plant and controller, and the truth of the rig."""
 
 import threading
 from collections.abc import Callable, Sequence
@@ -23,34 +23,34 @@ from plant.faults.table import FaultTable
 from plant.node import PlantNode
 from plant.records import TRUTH
 
-_LINKED_S = 0.05  # in which a process that goes on has its link again
-_LONGEST_AFTER_S = 2.0  # for the fade and the goodbyes after the last block
+_LINKED_S = 0.05  # from the resumption of a frozen process to its new link
+_LONGEST_AFTER_S = 2.0  # for the fade-out and the end of the processes after the last block
 _POSITION, _VELOCITY = TRUTH.index("true_drive_position_m"), TRUTH.index("true_velocity_mps")
 _GRANTED = "simulated time"
 
 
-class Word(NamedTuple):
-    """A person's word at a time of the run."""
+class ScriptedAction(NamedTuple):
+    """An operator command at a time of the run."""
 
     at_s: float
     action: int  # of `wire.Operator.Action`
 
 
 class Truth(NamedTuple):
-    """What truly happened, [blocks] each."""
+    """True motion of the rig, [blocks] each."""
 
-    t_s: npt.NDArray[np.float64]  # the stage's, at the end of each block
+    t_s: npt.NDArray[np.float64]  # simulated time at the end of each block
     vibration_mps: npt.NDArray[np.float64]  # v_a of the base
     drive_mps: npt.NDArray[np.float64]  # v_d, mean of the block
-    slide_mps: npt.NDArray[np.float64]  # the fastest of the block, backwards below 0
+    slide_mps: npt.NDArray[np.float64]  # of largest magnitude in the block, negative backwards
 
 
-class _ToldNode(PlantNode):
-    """A rig that tells the truth of each of its blocks."""
+class _TruthNode(PlantNode):
+    """A rig that appends the truth of each block to a list."""
 
-    def __init__(self, told: list[tuple[float, float, float, float]], now_ns: Callable[[], int], **rest: Any) -> None:
+    def __init__(self, truths: list[tuple[float, float, float, float]], now_ns: Callable[[], int], **rest: Any) -> None:
         PlantNode.__init__(self, **rest)
-        self._told, self._now_ns = told, now_ns
+        self._truths, self._now_ns = truths, now_ns
         self._drive_m = 0.0
 
     def advance(
@@ -62,46 +62,46 @@ class _ToldNode(PlantNode):
         drive_mps = (drive_m - self._drive_m) / (self.block_ns * 1e-9)
         self._drive_m = drive_m
         fastest_mps = float(speeds[np.abs(speeds).argmax()])
-        self._told.append((self._now_ns() * 1e-9, self.vibration_mps, drive_mps, fastest_mps))
+        self._truths.append((self._now_ns() * 1e-9, self.vibration_mps, drive_mps, fastest_mps))
         return sent
 
 
 class SimulatedRun:
-    """One run. Nothing is shared between two runs but the clock, so a process makes one at a time.
+    """One run. Runs share the simulated clock, so a process can make only one at a time.
 
     Args:
-        scenario: with its faults, those of processes included.
-        words: of a person.
-        arm: whether the rig starts ARMED; the scenario's if not given.
+        scenario: with its faults, faults of processes included.
+        words: operator commands.
+        arm: whether the rig starts ARMED; the scenario's value if not given.
 
     """
 
-    def __init__(self, scenario: Scenario, words: Sequence[Word] = (), arm: bool | None = None) -> None:
+    def __init__(self, scenario: Scenario, words: Sequence[ScriptedAction] = (), arm: bool | None = None) -> None:
         self._scenario = scenario
         self._arm = scenario.arm if arm is None else arm
         self._stage = Stage()
         self._hub = Hub(self._stage)
         self._stop = threading.Event()
-        self._told: list[tuple[float, float, float, float]] = []
+        self._truths: list[tuple[float, float, float, float]] = []
         self._players: dict[str, Player] = {}
         self._runs = 0
-        self.ended: dict[str, Fault] = {}  # processes that ended in a fault of their own, by role
+        self.ended: dict[str, Fault] = {}  # faults that ended processes, by role
         faults = [table for table in scenario.fault if table.group == PROCESS]
         for table in faults:
             self._stage.cue(round(table.from_s * 1e9), lambda table=table: self._disturb(table))
         for word in words:
-            self._stage.cue(round(word.at_s * 1e9), lambda word=word: self._say(word))
+            self._stage.cue(round(word.at_s * 1e9), lambda word=word: self._send(word))
 
     def listen(self, receive: Receive) -> None:
-        """Hear every message of the run, as a recorder does."""
+        """Receive every message of the run, as a recorder does."""
         for topic in TOPICS:
             self._hub.listen("recorder", topic, receive)
 
     def play(self, stopped: Callable[[], bool] = lambda: False) -> Truth:
-        """Run to the end of the scenario. Raises Fault, as the processes do.
+        """Run to the end of the scenario. Raises the Fault of a process.
 
         Args:
-            stopped: asked at every turn; the run ends then as by Ctrl-C.
+            stopped: called at every turn; True ends the run like Ctrl-C.
 
         """
         self._begin_controller()
@@ -114,16 +114,16 @@ class SimulatedRun:
             return self._stage.now_ns > until_ns if self._scenario.duration_s else False
 
         self._stage.play(over, self._silence, self._failed)
-        rows = np.array(self._told).reshape(-1, 4)
+        rows = np.array(self._truths).reshape(-1, 4)
         return Truth(*rows.T)
 
     def _silence(self) -> None:
-        """What is said on the way out of a run that is over is not heard."""
+        """Drop the messages that processes send while they are removed after the run."""
         for role in self._players:
             self._hub.forget(role)
 
     def _failed(self, player: Player) -> None:
-        """A process ended in a fault: the others go on, as they do on the bus."""
+        """A process ended with a fault: the others continue, as they do on the bus."""
         if not isinstance(player.failed, Fault) or player.name == "plant":
             raise player.failed or RuntimeError(player.name)
         self.ended[player.name] = player.failed
@@ -134,8 +134,8 @@ class SimulatedRun:
         self._runs += 1
         block_s = scenario.rig.solver.block_s
         left = round((scenario.duration_s - stage.now_ns * 1e-9) / block_s) if scenario.duration_s > 0 else 1 << 62
-        node = _ToldNode(
-            self._told,
+        node = _TruthNode(
+            self._truths,
             lambda: stage.now_ns,
             config=scenario.rig,
             seed=scenario.seed,
@@ -165,14 +165,14 @@ class SimulatedRun:
         self._hub.announce("controller")
         self._players["controller"] = stage.enter(Player("controller", lambda: process.loop(self._stop, _GRANTED)))
 
-    def _say(self, word: Word) -> None:
-        said = wire.Operator(action=cast(Any, word.action), who="a person")
-        self._hub.put("cockpit", OPERATOR, said.SerializeToString())
+    def _send(self, word: ScriptedAction) -> None:
+        command = wire.Operator(action=cast(Any, word.action), who="a person")
+        self._hub.put("cockpit", OPERATOR, command.SerializeToString())
 
     def _disturb(self, table: FaultTable) -> None:
         """Freeze, kill or restart a process now."""
         role, stage, hub = table.target, self._stage, self._hub
-        if role not in self._players:  # the recorder of a simulated run is who asks for its messages
+        if role not in self._players:  # a simulated run has no process for its recorder
             return
         player, for_ns = self._players[role], round(table.for_s * 1e9)
         if table.kind == "frozen":

@@ -1,6 +1,6 @@
-"""Threads that take turns on a simulated clock: one runs at a time, and time passes only where all of them wait.
+"""Threads that take turns on a simulated clock: one runs at a time, and time passes only while all of them wait.
 
-So the loops of the processes, which sleep and wait for messages, run as they are, always in the same order.
+So the loops of the processes, which sleep and wait for messages, run unchanged and always in the same order.
 """
 
 import threading
@@ -11,15 +11,15 @@ from bridge.wire.inbox import Inbox, Received
 
 
 class _Left(BaseException):
-    """Ends a player that was killed, from inside, wherever it waits."""
+    """Raised inside a killed player where it waits, to end its thread."""
 
 
 class Player:
     """One thread of the play: the loop of one process.
 
     Args:
-        name: of the process.
-        work: its loop.
+        name: role of the process.
+        work: loop of the process.
 
     """
 
@@ -27,8 +27,8 @@ class Player:
         self.name = name
         self.over = False
         self.failed: BaseException | None = None
-        self.wakes_ns = 0  # when it goes on
-        self.hears = False  # whether a message wakes it before
+        self.wakes_ns = 0  # time at which it continues
+        self.hears = False  # whether a message wakes it earlier
         self.frozen_until_ns = 0
         self._killed = False
         self._work = work
@@ -43,32 +43,32 @@ class Player:
                 self._work()
         except _Left:
             pass
-        except BaseException as error:  # raised again by who looks at `failed`
+        except BaseException as error:  # the stage passes it to `on_failure`
             self.failed = error
         self.over = True
         self._done.release()
 
     def turn(self) -> None:
-        """Let it go on until it waits again, or is over; called by the stage."""
+        """Let it run until it waits again or ends; called by the stage."""
         self._go.release()
         self._done.acquire()
 
     def pause(self) -> None:
         """Give the turn back; called by the player itself."""
-        if not self._killed:  # else it is on its way out, and waits for nothing
+        if not self._killed:  # a killed player ends without another turn
             self._done.release()
             self._go.acquire()
         if self._killed:
             raise _Left
 
     def leave(self) -> None:
-        """Let it end where it waits."""
+        """End it at its wait."""
         self._killed = True
         self.turn()
 
     @property
     def next_ns(self) -> int:
-        """When it goes on, unless a message wakes it."""
+        """Time at which it continues, unless a message wakes it."""
         return max(self.wakes_ns, self.frozen_until_ns)
 
 
@@ -80,7 +80,7 @@ class WaitingInbox(Inbox):
         self._stage = stage
 
     def get(self, timeout_s: float) -> Received | None:
-        """The oldest message, or None when none came within `timeout_s`."""
+        """The oldest message, or None if no message arrived within `timeout_s`."""
         received = self.get_nowait()
         if received is None:
             self._stage.wait(timeout_s, hears=True)
@@ -89,7 +89,7 @@ class WaitingInbox(Inbox):
 
 
 class Stage:
-    """The clock and the players. `play` runs them in this thread's time."""
+    """The clock and the players. `play` runs them from the calling thread."""
 
     def __init__(self) -> None:
         self.now_ns = 0
@@ -104,7 +104,7 @@ class Stage:
         return player
 
     def cue(self, t_ns: int, act: Callable[[], None]) -> None:
-        """Do something at a time, before anybody's turn."""
+        """Call `act` at a simulated time, before the turn of any player."""
         self._cues.append((t_ns, act))
         self._cues.sort(key=lambda cue: cue[0])
 
@@ -112,21 +112,21 @@ class Stage:
         """Let simulated time pass; called by the player whose turn it is.
 
         Args:
-            for_s: how long.
-            hears: a message for the player ends it before.
+            for_s: duration.
+            hears: a message for the player ends the wait early.
 
         """
         player = self._on_stage
-        if player is None:  # nobody plays: a test or a warm-up
+        if player is None:  # no player has the turn: a test or a warm-up
             self.now_ns += round(for_s * 1e9)
             return
-        # a time that is not over takes a nanosecond at least, or who waits for its end would wait for ever
+        # at least 1 ns for a positive time: a loop that waits for a deadline would otherwise never reach it
         passes_ns = max(round(for_s * 1e9), 1 if for_s > 0.0 else 0)
         player.wakes_ns, player.hears = self.now_ns + passes_ns, hears
         player.pause()
 
     def heard(self, name: str) -> None:
-        """A message came for a player."""
+        """A message has arrived for a player."""
         for player in self.players:
             if player.name == name and player.hears:
                 player.wakes_ns = min(player.wakes_ns, self.now_ns)
@@ -139,18 +139,18 @@ class Stage:
             self._on_stage = before
 
     def play(self, until: Callable[[], bool], at_end: Callable[[], None], on_failure: Callable[[Player], None]) -> None:
-        """Let everybody take turns until `until` says so, or all are over.
+        """Let the players take turns until `until` returns True or all have ended.
 
         Args:
-            until: asked before each turn.
-            at_end: called before those are removed that are not over.
-            on_failure: called with a player that ended in an error.
+            until: called before each turn.
+            at_end: called before the remaining players are removed.
+            on_failure: called with a player that ended with an error.
 
         """
         with time.simulated(lambda: self.now_ns, self.wait):
             try:
-                while not until() and (there := [player for player in self.players if not player.over]):
-                    following = min(there, key=lambda player: player.next_ns)
+                while not until() and (active := [player for player in self.players if not player.over]):
+                    following = min(active, key=lambda player: player.next_ns)
                     if self._cues and self._cues[0][0] <= following.next_ns:
                         t_ns, act = self._cues.pop(0)
                         self.now_ns = max(self.now_ns, t_ns)

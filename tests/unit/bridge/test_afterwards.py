@@ -9,7 +9,7 @@ from mcap.reader import make_reader
 from bridge.log.check.log_check import check_log
 from bridge.log.live import locked
 from bridge.log.logfile import read_run
-from bridge.log.storage.afterwards import note_afterwards
+from bridge.log.storage.afterwards import add_table
 from bridge.log.storage.parts import chain_of_log, parts_of
 from cockpit.run.run import run_scenario
 from tests.logs import short_log
@@ -20,7 +20,7 @@ def test_the_table_is_read_by_anybody_and_the_chain_goes_on(tmp_path: Path) -> N
     path = tmp_path / "run.mcap"
     path.write_bytes(short_log())
     before = chain_of_log(path)
-    told = note_afterwards(path, "verdict", {"good": True, "headline": "so it is"}, before)
+    told = add_table(path, "verdict", {"good": True, "headline": "so it is"}, before)
     assert told == chain_of_log(path)
     assert (told.links, told.ended, told.changes) == (before.links + 1, True, 0)
     assert read_run(path).headers["verdict"] == {"good": "true", "headline": '"so it is"'}
@@ -29,7 +29,7 @@ def test_the_table_is_read_by_anybody_and_the_chain_goes_on(tmp_path: Path) -> N
         reader = make_reader(file, validate_crcs=True)
         assert {table.name for table in reader.iter_metadata()} >= {"verdict", "plant", "controller"}
         assert sum(1 for _ in reader.iter_messages()) == reader.get_summary().statistics.message_count
-    again = note_afterwards(path, "second", {}, told)
+    again = add_table(path, "second", {}, told)
     assert again == chain_of_log(path)
     data = path.read_bytes()
     path.write_bytes(data.replace(b"so it is", b"so it As"))
@@ -39,7 +39,7 @@ def test_the_table_is_read_by_anybody_and_the_chain_goes_on(tmp_path: Path) -> N
 def test_of_several_files_the_last_one_has_it(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     rotated(path)
-    told = note_afterwards(path, "verdict", {"good": False}, chain_of_log(path))
+    told = add_table(path, "verdict", {"good": False}, chain_of_log(path))
     assert told == chain_of_log(path)
     assert b"verdict" in parts_of(path)[-1].read_bytes()
     assert read_run(path).headers["verdict"] == {"good": "false"}
@@ -49,7 +49,7 @@ def test_of_several_files_the_last_one_has_it(tmp_path: Path) -> None:
 def test_a_log_that_is_cut_stays_as_it_is(tmp_path: Path, cut: int) -> None:
     path = tmp_path / "cut.mcap"
     path.write_bytes(short_log()[:-cut])
-    note_afterwards(path, "verdict", {}, chain_of_log(path))
+    add_table(path, "verdict", {}, chain_of_log(path))
     assert path.read_bytes() == short_log()[:-cut]
 
 
@@ -58,7 +58,7 @@ def test_a_log_that_another_process_holds_stays_as_it_is(tmp_path: Path) -> None
     path.write_bytes(short_log())
     with path.open("r+b") as file:
         assert locked(file)
-        note_afterwards(path, "verdict", {}, chain_of_log(path))
+        add_table(path, "verdict", {}, chain_of_log(path))
     assert path.read_bytes() == short_log()
 
 

@@ -22,8 +22,8 @@ def test_a_flood_is_told_once_a_second_with_its_count() -> None:
     for _ in range(3000):
         made.note("BAD_MESSAGE", "command", "12 bytes: dropped")
         clock.now_s += 0.001
-        made.tell_when_due()
-    made.tell_when_due(all_of_it=True)
+        made.report_when_due()
+    made.report_when_due(all_of_it=True)
     assert len(told) in {4, 5}
     assert told[0] == ("BAD_MESSAGE", "command: 12 bytes: dropped")
     assert told[-1][1].endswith("3000 in all)")
@@ -45,10 +45,10 @@ def test_what_was_kept_back_is_told_without_another_of_its_kind() -> None:
     made, told, clock = complaints()
     made.note("FLOOD", "operator", "dropped")
     made.note("FLOOD", "operator", "dropped", 5)
-    made.tell_when_due()
+    made.report_when_due()
     assert len(told) == 1
     clock.now_s += 1.1
-    made.tell_when_due()
-    made.tell_when_due()
-    made.tell_when_due(all_of_it=True)
+    made.report_when_due()
+    made.report_when_due()
+    made.report_when_due(all_of_it=True)
     assert told[1:] == [("FLOOD", "operator: dropped (5 times, 6 in all)")]

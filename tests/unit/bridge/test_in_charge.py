@@ -9,7 +9,7 @@ from bridge.log.check.log_check import check_log
 from bridge.log.in_charge import NO_COMMAND
 from bridge.log.logfile import read_run
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.event_codes import EVENTS, LETTERS, harms, is_told
+from bridge.wire.event_codes import EVENTS, LETTERS, harms, is_listed
 from cockpit.judge.judged import judge
 from cockpit.judge.verdict_words import headline, in_words
 from cockpit.run.in_process import run_onboard
@@ -102,7 +102,9 @@ def test_a_weak_exciter_is_told(long_run: Path, tmp_path: Path) -> None:
     assert "piezo-weak" in {finding.kind for finding in check_log(path).findings}
 
 
-@pytest.mark.parametrize(("stands", "told"), [(True, "stands at "), (False, "jumps at 1 block, first 200 by -3000 ms")])
+@pytest.mark.parametrize(
+    ("stands", "told"), [(True, "is constant at "), (False, "jumps at 1 block, first 200 by -3000 ms")]
+)
 def test_a_clock_that_jumps_or_stands_is_told(tmp_path: Path, stands: bool, told: str) -> None:
     def change(tables: Tables) -> None:
         t_ns = tables["sensors"]["t_ns"]
@@ -117,7 +119,7 @@ def test_a_clock_that_jumps_or_stands_is_told(tmp_path: Path, stands: bool, told
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        (b"stickslip.Command", b"stickslip.Applied", "its schema is that of "),
+        (b"stickslip.Command", b"stickslip.Applied", "its schema is "),
         (b"\n\x0fstickslip.proto", b"\n\xffstickslip.proto", "its schema "),
         (b"frequency_Hz", b"amplitude_mm", "its schema gives field 4 as 'amplitude_mm': must be 'frequency_Hz'"),
     ],
@@ -136,6 +138,6 @@ def test_every_code_has_its_letter_and_place() -> None:
     assert {one.letter for one in EVENTS.values()} <= LETTERS.keys()
     protocol = (Path(__file__).parents[3] / "bridge/wire/PROTOCOL.md").read_text(encoding="utf-8")
     assert not [code for code in EVENTS if f"`{code}`" not in protocol]
-    assert (harms("GAP"), harms("STALE"), is_told("STALE"), is_told("START")) == (True, False, True, False)
-    assert is_told("OF_ANOTHER_VERSION")
+    assert (harms("GAP"), harms("STALE"), is_listed("STALE"), is_listed("START")) == (True, False, True, False)
+    assert is_listed("OF_ANOTHER_VERSION")
     assert not harms("OF_ANOTHER_VERSION")

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from bench.blind.pooling import _read as opened_set
+from bench.blind.sealing import read_key
 from bridge.config import Strict, read_toml, validate
 from bridge.faults import FAULTS, Fault
 from bridge.log.check.log_check import check_log
@@ -19,8 +21,6 @@ from bridge.plain import plain
 from bridge.wire.messages import COMMAND
 from cockpit.cli import app
 from cockpit.run.scenario_file import load_bus
-from diagnosis.blind.pooling import _read as opened_set
-from diagnosis.blind.sealing import read_key
 
 
 def bomb(path: Path, chunks: int, messages: int) -> None:
@@ -91,7 +91,7 @@ def test_of_many_problems_the_first_are_told() -> None:
     with pytest.raises(Fault) as caught:
         validate(Model, {"numbers": ["x"] * 1000}, "rig.toml")
     lines = caught.value.line.splitlines()
-    assert (len(lines), lines[-1]) == (21, "rig.toml: and 980 more of such")
+    assert (len(lines), lines[-1]) == (21, "rig.toml: and 980 more problems")
 
 
 INPUTS = (
@@ -164,12 +164,12 @@ def test_a_folder_that_others_may_write_to_keeps_no_kernels(
     own = kernel_cache.usable_folder()
     assert own.parent == shared
     assert stat.S_IMODE(own.stat().st_mode) == 0o700
-    assert "others may write there: compiled kernels are code, so they are kept in" in capsys.readouterr().err
+    assert "others may write there: compiled kernels are code, so they are stored in" in capsys.readouterr().err
     assert kernel_cache.usable_folder() == own
     assert capsys.readouterr().err == ""  # told once
     own.chmod(0o777)
     other = kernel_cache.usable_folder()
     assert shared not in other.parents
-    assert "others may write there" in capsys.readouterr().err
+    assert "others may write to it" in capsys.readouterr().err
     monkeypatch.setenv(kernel_cache.FOLDER, str(tmp_path / "new"))
     assert stat.S_IMODE(kernel_cache.usable_folder().stat().st_mode) == 0o700

@@ -11,7 +11,7 @@ from mcap.writer import Writer
 from typer.testing import CliRunner
 
 from bridge.faults import Fault
-from bridge.log.check.channel import Channel, channel_findings
+from bridge.log.check.channel import ChannelLimits, channel_findings
 from bridge.log.check.log_check import check_log
 from bridge.log.check.signal_range import look
 from bridge.log.logfile import read_run
@@ -95,10 +95,10 @@ def begins_late(tables: Tables) -> None:
 @pytest.mark.parametrize(
     ("change", "kind", "text"),
     [
-        (gap, "gap", "/sensors: 3 messages missing in 1 gap, first 100 to 102"),
+        (gap, "gap", "/sensors: 3 messages lost: 100 to 102"),
         (begins_late, "gap", "begins with block 7"),
-        (twice, "duplicate", "/command: numbers come a second time at 1 place, first 50"),
-        (late_one, "order", "/sensors: 2 messages came after a later one"),
+        (twice, "duplicate", "/command: repeated numbers at 1 place, first 50"),
+        (late_one, "order", "/sensors: 2 messages arrived after a later message"),
         (two_runs, "two-runs", "numbers start again at 0 after"),
         (clipped, "clipped", "/sensors drive_force_N: "),
         (at_range, "clipped", "/sensors mass_accel_mps2: reaches the end of its range, 490.33"),
@@ -122,11 +122,11 @@ def test_noise_alone_and_a_coarse_position_at_rest_are_no_finding() -> None:
     """Both repeat values: noise of a few steps its largest value, and a position that rests within a step."""
     noise = np.clip(np.random.default_rng(1).standard_normal(100_000), -3.5, 3.5)
     accel_mps2 = (0.001 * np.round(1.5 * noise)).astype(np.float32)
-    accel = Channel(noise=0.0015, step=0.001, low=-490.0, high=490.0)
+    accel = ChannelLimits(noise=0.0015, step=0.001, low=-490.0, high=490.0)
     assert look(accel_mps2, dwells=False).at_highest > 20
     assert channel_findings("base_accel_mps2", look(accel_mps2, dwells=False), 5e-5, accel) == []
     position_m = 1e-6 * np.arange(3.0).repeat(40_000)
-    position = Channel(noise=1e-8, step=1e-6, low=-1.0, high=1.0)
+    position = ChannelLimits(noise=1e-8, step=1e-6, low=-1.0, high=1.0)
     assert channel_findings("mass_position_m", look(position_m, dwells=True), 5e-5, position) == []
 
 
@@ -148,7 +148,7 @@ def test_a_late_message_closes_its_gap(tmp_path: Path) -> None:
         tables["sensors"] = tables["sensors"][[*range(2), 3, 2, 4, *range(6, 400)]]
 
     found = kinds(doctored(tmp_path, change))
-    assert "/sensors: 1 message missing in 1 gap, first 5 to 5" in found["gap"]
+    assert "/sensors: 1 message lost: 5" in found["gap"]
     assert "order" in found
 
 
@@ -241,7 +241,9 @@ def test_the_verdict_counts_the_blocks_of_a_damaged_chunk(tmp_path: Path, chunk:
     path.write_bytes(data)
     told = judge(path)
     assert (told.lost_blocks, told.all_losses_known) == (lost, known)
-    expected = f"{lost} of 400 blocks missing in the log" if known else "400 blocks; how many are missing is not known"
+    expected = (
+        f"{lost} of 400 blocks missing in the log" if known else "400 blocks; the number of missing blocks is unknown"
+    )
     assert f"data     {expected}" in "\n".join(in_words(told, verbose=False))
 
 

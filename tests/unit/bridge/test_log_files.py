@@ -77,7 +77,7 @@ def test_a_file_of_a_log_that_was_taken_away_changed_or_exchanged_is_found(tmp_p
     kept = second.read_bytes()
     second.unlink()
     assert len(changes(path)) == 1
-    assert "does not go on from the file before it" in changes(path)[0]
+    assert "does not continue the file before it" in changes(path)[0]
     second.write_bytes(kept[:3000] + bytes([kept[3000] ^ 1]) + kept[3001:])
     assert len(changes(path)) == 1
     other = tmp_path / "other" / "run.mcap"
@@ -100,7 +100,7 @@ def test_a_log_that_is_kept_aside_keeps_its_files(tmp_path: Path, capsys: pytest
     path = tmp_path / "run.mcap"
     rotated(path)
     keep_aside(path)
-    aside = re.match(r"kept     (\S+),", capsys.readouterr().err)
+    aside = re.match(r"kept     (\S+) ", capsys.readouterr().err)
     assert aside is not None
     assert len(read_run(Path(aside[1])).sensors) == 400
     assert not list(tmp_path.glob("run-000*.mcap"))
@@ -140,10 +140,10 @@ def replaced(path: Path) -> None:
 @pytest.mark.parametrize(
     ("act", "code", "told"),
     [
-        (deleted, "LOG_LOST", "was deleted: what was recorded until now is lost"),
-        (renamed, "LOG_LOST", "was renamed: it is whole, and under another name"),
+        (deleted, "LOG_LOST", "was deleted: the recording so far is lost"),
+        (renamed, "LOG_LOST", "was renamed: it is whole, under another name"),
         (cut, "LOG_LOST", "was cut: "),
-        (replaced, "LOG_REPLACED", "was replaced by another file: what was recorded until now is lost"),
+        (replaced, "LOG_REPLACED", "was replaced by another file: the recording so far is lost"),
     ],
     ids=lambda value: getattr(value, "__name__", None),
 )
@@ -178,7 +178,7 @@ def test_a_log_whose_first_file_is_gone_names_the_next(tmp_path: Path) -> None:
     rotated(path)
     path.unlink()
     with pytest.raises(
-        Fault, match=r"no such file; run-0001.mcap beside it seems to be a later part of that log; give"
+        Fault, match=r"no such file; run-0001.mcap in the same folder seems to be a later part of that log; give"
     ):
         read_run(path)
 
@@ -205,7 +205,7 @@ def test_a_full_disk_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     ):
         log.close()
     assert [event.code for event in events] == ["LOG_WRITE", "LOG_WRITE"]
-    assert events[1].text == "there is room again: 301 messages since 0.30 s were not recorded"
+    assert events[1].text == "space is free again: 301 messages since 0.30 s were not recorded"
     run = read_run(log.path)
     assert len(run.sensors) == 500 - 301
     assert [event.code for event in run.events] == [

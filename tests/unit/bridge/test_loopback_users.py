@@ -79,7 +79,7 @@ def test_nowhere_to_keep_it_is_a_fault(place: Path, tmp_path: Path) -> None:
 def test_which_endpoints_are_this_machines_alone(place: Path, endpoint: str, alone: bool) -> None:
     assert is_loopback(endpoint) == alone
     if not alone:
-        with pytest.raises(Fault, match=r"NOT_SECURE: .*others can reach it"):
+        with pytest.raises(Fault, match=r"NOT_SECURE: .*other computers can reach it"):
             rig_security(BusConfig(endpoint=endpoint))
         assert rig_security(BusConfig(endpoint=endpoint, insecure=True)) == {}
 

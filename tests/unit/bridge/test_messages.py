@@ -34,7 +34,7 @@ def test_a_client_may_leave_zeros_out(sequence: int, t_ns: int, frequency_Hz: fl
 
 
 def test_bad_bytes_and_wrong_lengths_are_named() -> None:
-    with pytest.raises(Fault, match=r"command.*no Command"):
+    with pytest.raises(Fault, match=r"command.*as Command"):
         COMMAND.read(b"\xff\xff\xff", "command")
     block = wire.SensorBlock(sequence=1, **{name: [0.0] * 10 for name in CHANNELS})
     with pytest.raises(Fault, match=r"drive_force_N has 10 samples: must have 20"):

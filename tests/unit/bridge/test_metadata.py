@@ -27,8 +27,8 @@ def _log(folder: Path, controller: str | None) -> Path:
 @pytest.mark.parametrize(
     ("configuration", "why"),
     [
-        ("[" * 100_000, "is damaged, no JSON"),
-        ('{"block_s": ' + "9" * 5000 + "}", "is damaged, no JSON"),
+        ("[" * 100_000, "is damaged, not JSON"),
+        ('{"block_s": ' + "9" * 5000 + "}", "is damaged, not JSON"),
         ("null", "must be a JSON object"),
         ("[1, 2]", "must be a JSON object"),
         (None, "holds no configuration of the controller"),

@@ -66,10 +66,10 @@ def test_what_one_core_tells_alone_is_told_of_that_core() -> None:
 
 def test_a_thread_that_waited_for_another_saw_no_pause() -> None:
     due_ns, woke_ns = 100 * MS, 150 * MS
-    assert core_timer.stood_still_until_ns(due_ns, woke_ns, waited_ns=0) == woke_ns
-    assert core_timer.stood_still_until_ns(due_ns, woke_ns, waited_ns=30 * MS) == 120 * MS
-    assert core_timer.stood_still_until_ns(due_ns, woke_ns, waited_ns=woke_ns - due_ns) == 0
-    assert core_timer.stood_still_until_ns(due_ns, due_ns + core_timer.LEAST_NS, waited_ns=0) == 0
+    assert core_timer.stall_end_ns(due_ns, woke_ns, waited_ns=0) == woke_ns
+    assert core_timer.stall_end_ns(due_ns, woke_ns, waited_ns=30 * MS) == 120 * MS
+    assert core_timer.stall_end_ns(due_ns, woke_ns, waited_ns=woke_ns - due_ns) == 0
+    assert core_timer.stall_end_ns(due_ns, due_ns + core_timer.LEAST_NS, waited_ns=0) == 0
 
 
 def test_the_clock_of_a_run_goes_by_the_message_that_was_delayed_least() -> None:
@@ -121,7 +121,7 @@ def test_a_log_tells_of_pauses_in_the_time_of_its_run(tmp_path: Path) -> None:
 def test_a_watch_that_is_refused_or_ends_is_told_and_no_pause_is_claimed(tmp_path: Path) -> None:
     log, watch = RunLog(tmp_path / "run.mcap", lockstep=False), FakeWatch([], still((7 * MS, 9 * MS)))
     writer = PauseWriter(log, watch)  # pyright: ignore[reportArgumentType]
-    writer.tell_when_due()
+    writer.report_when_due()
     watch.refused = "a timer ended"
     writer.finish()
     log.close()

@@ -17,9 +17,9 @@ def test_a_process_is_known_by_what_it_said() -> None:
     ("changed", "line"),
     [
         ({"host": "elsewhere"}, "must be on this computer"),
-        ({"started": 1}, "is gone"),
-        ({"started": None}, "is gone"),
-        ({"pid": 2**22 + 1}, "is gone"),
+        ({"started": 1}, "has ended"),
+        ({"started": None}, "has ended"),
+        ({"pid": 2**22 + 1}, "has ended"),
     ],
 )
 def test_another_process_is_not_taken_for_it(changed: dict[str, object], line: str) -> None:
@@ -29,7 +29,7 @@ def test_another_process_is_not_taken_for_it(changed: dict[str, object], line: s
 
 @pytest.mark.parametrize("told", ["", "[]", "{}", '{"pid": "x"}'])
 def test_what_tells_nothing_is_no_process(told: str) -> None:
-    with pytest.raises(Fault, match="does not tell its process"):
+    with pytest.raises(Fault, match="sends no process identity"):
         pid_here("plant", told)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridge.log.check.channel import Channel, channels_of
+from bridge.log.check.channel import ChannelLimits, channels_of
 from bridge.log.logfile import RunData, read_run
 from bridge.log.watches.arrays import Longest
 from bridge.wire.messages import CHANNELS
@@ -37,7 +37,7 @@ def scenario_of(name: str) -> Scenario:
     return load_scenario(name, []) if axis is None else axis.scenario().model_copy(update={"arm": True})
 
 
-def rival_doubts(run: RunData, verdict: RunVerdict, channels: dict[str, Channel]) -> bool:
+def rival_doubts(run: RunData, verdict: RunVerdict, channels: dict[str, ChannelLimits]) -> bool:
     """No number, constant for 0.1 s, at an end of the range that is not 0, or another count of slips by force and by position."""
     sensors = verdict.sensors
     assert sensors is not None
@@ -55,7 +55,7 @@ def rival_doubts(run: RunData, verdict: RunVerdict, channels: dict[str, Channel]
     return sensors.by_position is not None and sensors.by_force != sensors.by_position
 
 
-def rival_is_ok(run: RunData, verdict: RunVerdict, channels: dict[str, Channel]) -> bool:
+def rival_is_ok(run: RunData, verdict: RunVerdict, channels: dict[str, ChannelLimits]) -> bool:
     """Whether the verdict were ok if only the rival doubted the sensors."""
     assert verdict.sensors is not None
     without = verdict._replace(sensors=verdict.sensors._replace(findings=[]))

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -14,9 +15,11 @@ from bridge.faults import FAULTS, Fault
 from bridge.log.logfile import read_run
 from bridge.log.runlog import RunLog
 from bridge.wire import stickslip_pb2 as wire
-from cockpit.cli import app
+from cockpit.cli import _PANELS, app
+from cockpit.commands.as_json.schemas import FORMATS
 from cockpit.run.progress import progress_line
 from cockpit.run.run import keep_aside
+from cockpit.run.scenario import load_scenario
 from tests.logs import doctored, short_log, verdict_of
 from tests.patience import PATIENCE_S
 
@@ -68,14 +71,9 @@ def test_a_picture_of_another_kind_is_refused(log: Path, command: str, name: str
         (["diagnose", ".", "--apply", "r.json"], "--apply r.json: must end in .toml; "),
         (
             ["diagnose", ".", "..", "--report", "r.html"],
-            "--report r.html: must be a folder, and .html ends the name of a",
+            "--report r.html: must be a folder, but .html is a suffix of files",
         ),
         (["reproduce", "--out", "r.pdf"], "--out r.pdf: must end in .html, .htm; "),
-        (
-            ["blind", "score", "set", "--key", "key.json", "--report", "r.pdf"],
-            "--report r.pdf: must end in .html, .htm; ",
-        ),
-        (["blind", "pool", "a.json", "--report", "r.pdf"], "--report r.pdf: must end in .html, .htm; "),
         (["run", "--log", "r.csv"], "--log r.csv: must end in .mcap; "),
         (["record", "--log", "r.csv"], "--log r.csv: must end in .mcap; "),
         (["replay", "a.mcap", "--closed-loop", "--log", "r.csv"], "--log r.csv: must end in .mcap; "),
@@ -83,10 +81,10 @@ def test_a_picture_of_another_kind_is_refused(log: Path, command: str, name: str
         (["log", "export", "a.mcap", "--to", "r.txt"], "--to r.txt: must end in .parquet, .csv, .mat; "),
         (
             ["log", "import", "a.csv", "--map", "m.toml", "--out", "r.csv"],
-            "--out r.csv: must be a folder, and .csv ends",
+            "--out r.csv: must be a folder, but .csv is a suffix",
         ),
-        (["schema", "--out", "r.json"], "--out r.json: must be a folder, and .json ends the name of a file; "),
-        (["example", "r.toml"], "FOLDER r.toml: must be a folder, and .toml ends the name of a file; "),
+        (["schema", "--out", "r.json"], "--out r.json: must be a folder, but .json is a suffix of files; "),
+        (["example", "r.toml"], "FOLDER r.toml: must be a folder, but .toml is a suffix of files; "),
     ],
 )
 def test_what_would_be_of_another_kind_than_its_name_is_refused_before_the_work(
@@ -124,7 +122,7 @@ def test_what_is_no_time_is_refused(log: Path, time: str) -> None:
     for option in (f"--from={time}", f"--set=limits.v_ratio=1.1@{time}"):
         result = call("replay", str(log), option)
         assert result.exit_code == 2, result.output
-        assert f"{time!r} is no time; must be from 0 to 1e+09 s" in result.stderr
+        assert f"{time!r} is not a time; must be from 0 to 1e+09 s" in result.stderr
 
 
 @pytest.mark.parametrize("command", ["plot", "map", "reproduce"])
@@ -207,14 +205,14 @@ def test_a_log_that_needs_too_much_memory_is_one_line(log: Path, monkeypatch: py
     monkeypatch.setattr(sys, "argv", ["stickslip", "log", "info", str(log)])
     said = call("log", "info", str(log))
     assert said.exit_code == FAULTS["NO_MEMORY"].exit_status
-    assert said.stderr.startswith(f"stickslip: NO_MEMORY: {log}: needs more memory than there is; ")
+    assert said.stderr.startswith(f"stickslip: NO_MEMORY: {log}: needs more memory than is free; ")
 
 
 def test_export_takes_times_as_replay_does(log: Path, tmp_path: Path) -> None:
     cut = ["log", "export", str(log), "--to", str(tmp_path / "a.csv"), "--topic", "trace", "--json"]
     result = call(*cut, "--from", "0.1s", "--until", "0.2")
     assert json.loads(result.stdout)["rows"] == {"trace": 100}
-    assert "--from soon: 'soon' is no time" in call(*cut, "--from", "soon").stdout
+    assert "--from soon: 'soon' is not a time" in call(*cut, "--from", "soon").stdout
 
 
 def test_a_log_that_is_being_recorded_is_not_renamed(tmp_path: Path) -> None:
@@ -300,6 +298,46 @@ def test_the_progress_line_has_a_bar_only_where_an_end_is_known() -> None:
     assert progress_line(state, 0.0).startswith("   4.0 s ")
 
 
+def test_without_a_command_four_lines_name_where_to_begin() -> None:
+    result = call()
+    assert result.exit_code == 2
+    lines = result.stdout.splitlines()
+    assert len(lines) == 4
+    assert all(line.startswith("stickslip ") for line in lines)
+
+
+def test_the_help_has_five_panels_and_types_in_words() -> None:
+    text = call("--help").stdout
+    assert [panel for panel in ("Try it", "My axis", "Rig", "Logs", "Proof") if f"─ {panel} ─" in text] == [*_PANELS]
+    assert "<str>" not in call("plot", "--help").stdout
+
+
+def test_a_shipped_scenario_is_copied_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert call("scenarios", "--copy", "stop-and-go").exit_code == 0
+    copied = load_scenario("stop-and-go.toml", [])
+    assert copied == load_scenario("stop-and-go", [])
+    Path("stop-and-go.toml").write_text("mine")
+    assert call("scenarios", "--copy", "stop-and-go").exit_code == 2
+    assert Path("stop-and-go.toml").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        ("run --scenario bel", "belt-axis"),
+        ("fault force-tenth", "force-tenth"),
+        ("explain PIEZO_W", "PIEZO_WEAK"),
+    ],
+)
+def test_a_shell_completes_names(words: str, offered: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in (("_STICKSLIP_COMPLETE", "complete_bash"), ("COMP_WORDS", f"stickslip {words}")):
+        monkeypatch.setenv(name, value)
+    monkeypatch.setenv("COMP_CWORD", str(len(words.split())))
+    result = CliRunner().invoke(app, prog_name="stickslip")
+    assert result.stdout.split() == [offered]
+
+
 def test_a_thread_that_is_left_behind_does_not_change_the_end_of_a_command() -> None:
     """As Python dismantles itself, a thread with the lock of stderr blocks it, and one of Arrow that frees bytes aborts it."""
     code = """if True:
@@ -326,3 +364,18 @@ def test_a_thread_that_is_left_behind_does_not_change_the_end_of_a_command() -> 
     )
     assert (result.returncode, result.stderr) == (0, "")
     assert result.stdout.startswith("stickslip ")
+
+
+def test_several_logs_have_a_line_each_and_the_worst_exit_status(log: Path) -> None:
+    weak = "tests/golden/weak-piezo.mcap"
+    result = call("log", "info", weak, str(log))
+    first, second = result.stdout.splitlines()
+    assert first == f"not ok     {weak}: PIEZO_WEAK"
+    assert second.startswith("not judged ")
+    assert result.exit_code == 1
+    no_log = log.with_name("no.mcap")
+    result = call("log", "info", str(log), str(no_log), weak, "--json")
+    assert result.exit_code == FAULTS["BAD_LOG"].exit_status
+    rows = json.loads(result.stdout)
+    assert [row.get("control", row.get("fault")) for row in rows] == ["not judged", "BAD_LOG", "not ok"]
+    jsonschema.validate(rows, FORMATS["log-info-result"].schema(), jsonschema.Draft202012Validator)

@@ -160,7 +160,7 @@ def test_an_option_that_would_be_the_name_of_a_file_is_refused_before_the_work(t
     monkeypatch.chdir(folders(tmp_path, "rig"))
     result = diagnose("rig", "--report", "--jobs", "1")
     assert result.exit_code == FAULTS["CONFIG"].exit_status
-    assert "--report --jobs: takes a file, and --jobs is an option" in result.stderr
+    assert "--report --jobs: takes a file, but --jobs is an option" in result.stderr
     assert diagnose("rig", "--report", tmp_path / "--jobs.html").exit_code == 0
     assert "--jobs.html" in files(tmp_path)
 
@@ -291,7 +291,7 @@ def test_an_interrupted_fleet_says_where_it_goes_on(tmp_path, monkeypatch):
     out = tmp_path / "out"
     result = diagnose(folders(tmp_path / "all", "a", "b"), "--report", out)
     assert result.exit_code == 130
-    assert f"1 of 2 are in {out}; the same command goes on from there" in result.stderr
+    assert f"1 of 2 are in {out}; run the same command again to continue" in result.stderr
     assert json.loads((out / "index.json").read_text())["left"] == ["b"]
 
 

@@ -66,7 +66,7 @@ def test_nothing_is_overwritten(there: str, tmp_path: Path) -> None:
     {"folder": made.mkdir, "file": made.touch, "link": lambda: made.symlink_to("nowhere")}[there]()
     result = example("made")
     assert result.exit_code == 2
-    assert "made: is there already; nothing was written" in result.stderr
+    assert "made: exists already; nothing was written" in result.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["made"]
 
 

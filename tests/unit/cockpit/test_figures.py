@@ -93,7 +93,7 @@ def test_a_legend_names_what_is_in_the_picture_alone(tmp_path: Path, to: str, na
     scenario = load_scenario("paper-c45-c45", ["duration_s=0.4", "controller.policy.enabled_from_s=0.2"])
     run_onboard(scenario, path, {"scenario": scenario.name})
     assert call("plot", path, "--out", out, "--to", to).exit_code == 0
-    for words in ("in charge from here", "vibrating"):
+    for words in ("controller takes over", "vibrating"):
         assert (f"<!-- {words} -->" in out.read_text()) == named, words
 
 
@@ -115,7 +115,7 @@ def test_the_numbers_of_the_curves_are_those_of_the_log(log: Path) -> None:
         (["--from", "3s", "--to", "2s"], "--from 3 --to 2: from must be before to; exchange them"),
         (["--from", "3s"], "CONFIG: --from 3: the log is from 0.001 to 0.4 s; choose times inside"),
         (["--to", "0s"], "CONFIG: --to 0: the log is from 0.001 to 0.4 s; choose times inside"),
-        (["--signals", "force"], "--signals force: no signal of a log; known: drive_force_N, "),
+        (["--signals", "force"], "--signals force: unknown signal; known: drive_force_N, "),
         (["--style", "poster"], "--style poster: must be screen or paper"),
         (["--width", "2"], "--width 2: must be from 40 to 500 mm"),
         (["--dpi", "5000"], "--dpi 5000: must be from 50 to 1200"),
@@ -135,9 +135,7 @@ def test_a_log_without_a_block_is_not_drawn(tmp_path: Path) -> None:
     empty = empty_log(tmp_path)
     result = call("plot", empty)
     assert result.exit_code == FAULTS["BAD_LOG"].exit_status
-    assert (
-        f"BAD_LOG: {empty}: holds no block of sensors that can be read, so there is nothing to draw; " in result.stderr
-    )
+    assert f"BAD_LOG: {empty}: has no readable sensor block, so nothing can be drawn; " in result.stderr
     assert not empty.with_suffix(".png").exists()
 
 

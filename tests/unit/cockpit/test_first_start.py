@@ -22,12 +22,12 @@ class Child:
         self.role, self.still, self.left = role, still, left
 
 
-def beginning(log: Path, wait_s: float | None, *children: Any) -> processes.Beginning:
-    return processes.Beginning(list(children), log, wait_s)
+def beginning(log: Path, wait_s: float | None, *children: Any) -> processes.StartWatch:
+    return processes.StartWatch(list(children), log, wait_s)
 
 
 def test_who_still_starts_is_told_now_and_then(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(processes, "_TOLD_S", 0.0)
+    monkeypatch.setattr(processes, "_REPORT_S", 0.0)
     start = beginning(tmp_path / "run.mcap", None, Child("plant"), Child("controller", processes.STARTS))
     time.sleep(0.01)
     start.look()
@@ -35,7 +35,7 @@ def test_who_still_starts_is_told_now_and_then(tmp_path, monkeypatch, capsys):
 
 
 def test_the_kernels_that_are_left_are_those_of_all_processes(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(processes, "_TOLD_S", 0.0)
+    monkeypatch.setattr(processes, "_REPORT_S", 0.0)
     plant, controller = (Child(role, processes.COMPILES, (30, 40)) for role in ("plant", "controller"))
     start = beginning(tmp_path / "run.mcap", None, plant, controller)
     for plant.left, controller.left in (((30, 40), (30, 40)), ((0, 40), (20, 40)), ((0, 40), (0, 40))):
@@ -45,7 +45,7 @@ def test_the_kernels_that_are_left_are_those_of_all_processes(tmp_path, monkeypa
 
 
 def test_nothing_is_told_once_the_log_has_begun(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(processes, "_TOLD_S", 0.0)
+    monkeypatch.setattr(processes, "_REPORT_S", 0.0)
     log = tmp_path / "run.mcap"
     log.write_bytes(b"of the run before")
     start = beginning(log, 0.001, Child("plant"))
@@ -60,7 +60,7 @@ def test_nothing_is_told_once_the_log_has_begun(tmp_path, monkeypatch, capsys):
     [
         (processes.COMPILES, "the plant and the controller still compile after"),
         (processes.STARTS, "the plant and the controller still start after"),
-        (processes.READY, "have not found each other after"),
+        (processes.READY, "have not connected to each other after"),
     ],
 )
 def test_after_the_longest_wait_the_fault_says_who_is_not_ready(tmp_path, still, words):

@@ -50,7 +50,7 @@ def test_every_command_has_it(command: str) -> None:
     assert "--json" in options
 
 
-@pytest.mark.parametrize("command", [name for name in COMMANDS if name != "blind make"])
+@pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_has_both_words_for_help(command: str) -> None:
     for word in ("-h", "--help"):
         result = call(*command.split(), word)
@@ -71,8 +71,8 @@ def test_every_command_has_both_words_for_help(command: str) -> None:
         ("log info --json=x.json a.mcap", "log info --json=x.json a.mcap"),
         ("diagnose --json folder --jobs 2", "diagnose --json=- folder --jobs 2"),
         ("diagnose folder --json --jobs 2", "diagnose folder --json=- --jobs 2"),
-        ("blind pool a.json --json b.json", "blind pool a.json --json=b.json"),
-        ("blind pool --json -- a.json", "blind pool --json=- -- a.json"),
+        ("log recover a.mcap --json b.json", "log recover a.mcap --json=b.json"),
+        ("log recover --json -- a.json", "log recover --json=- -- a.json"),
         ("plot -- --json", "plot -- --json"),
     ],
 )
@@ -162,8 +162,7 @@ def test_a_wrong_command_line_is_json_too(arguments: list[str], line: str) -> No
         (["diagnose", "nowhere", "--json"], "BAD_EVIDENCE"),
         (["explain", "NO_SUCH_CODE", "--json"], "CONFIG"),
         (["plot", "run.mcap", "--out", "run.mcap/x.png", "--json"], "LOG_WRITE"),
-        (["blind", "make", "--cases", "3", "--json"], "CONFIG"),
-        (["blind", "score", "nowhere", "--key", "no.key", "--json"], "BAD_SET"),
+        (["blind", "score", "nowhere", "--json"], "CONFIG"),
     ],
 )
 def test_a_fault_is_json_where_the_result_would_be(arguments: list[str], fault: str) -> None:
@@ -183,14 +182,6 @@ def test_with_a_file_a_fault_is_a_line_and_no_file() -> None:
     assert result.stdout == ""
     assert result.stderr.startswith("stickslip: BAD_LOG: ")
     assert not Path("x.json").exists()
-
-
-def test_json_does_not_replace_the_key_of_a_blind_set(tmp_path: Path) -> None:
-    (tmp_path / "set.json").write_text("{}")
-    result = call("blind", "score", "set", "--key", "set.json", "--json", "set.json")
-    assert result.exit_code == 2
-    assert "--json set.json: is the key" in result.stderr
-    assert (tmp_path / "set.json").read_text() == "{}"
 
 
 @pytest.mark.parametrize(
@@ -267,7 +258,7 @@ def test_an_export_of_nothing_is_told_and_leaves_an_older_table(tmp_path: Path) 
     table.write_text("of yesterday\n")
     result = call("log", "export", "run.mcap", "--to", "run.csv", "--topic", "trace", "--from", "90s", "--overwrite")
     assert result.exit_code == 1
-    assert "nothing to write: no message of these topics in this time; a table that is there stays" in result.stdout
+    assert "nothing written: no message of these topics in this time; an existing table is unchanged" in result.stdout
     assert table.read_text() == "of yesterday\n"
 
 

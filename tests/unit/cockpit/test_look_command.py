@@ -114,7 +114,8 @@ def test_a_map_that_was_corrected_stays(tmp_path: Path, name: str) -> None:
     refused = CliRunner().invoke(app, [*words, "--speed", "0.5mm/s"])
     assert refused.exit_code == 2
     assert (
-        f"{kept.name} is there and says otherwise, it would be lost; give it to --map, or remove it" in refused.output
+        f"{kept.name} exists with another content, which would be lost; give it to --map, or remove it"
+        in refused.output
     )
     assert kept.read_text(encoding="utf-8") == corrected
     assert {path for path in tmp_path.rglob("*") if path.is_file()} == {source, kept}
@@ -150,7 +151,7 @@ def test_a_position_that_stands_still_in_the_sticks_is_the_slides(tmp_path: Path
     slide_mm = drive_mm - force_N / stiffness_N_per_mm + 5e-4 * np.random.default_rng(5).standard_normal(len(t_s))
     path = table_of(tmp_path / "a.csv", "Time (s),Force (N),Displacement (mm)", t_s, force_N, slide_mm)
     table = seen_in(path)
-    assert "'Displacement (mm)' stands still in the sticks: it is the slide's" in said(table)
+    assert "'Displacement (mm)' is constant during the sticks: it belongs to the slide" in said(table)
     assert not {"stiffness_N_per_m", "mass_kg"} & table["numbers"].keys()
     table = seen_in(path, "--speed", "0.5mm/s", "--out", str(tmp_path / "a.toml"))
     assert table["numbers"]["stiffness_N_per_m"]["value"] == pytest.approx(1e3 * stiffness_N_per_mm, rel=2e-3)
@@ -216,7 +217,7 @@ def test_one_unknown_unit_leaves_the_others_known(tmp_path: Path) -> None:
     table = seen_in(path)
     assert table["seconds"] == pytest.approx(8.0, rel=1e-3)
     assert table["numbers"]["static_force_N"]["value"] == pytest.approx(16.0, rel=2e-3)
-    assert "no known unit: 'furlong' of column Tx; taken as it is" in said(table)
+    assert "unknown unit: 'furlong' of column Tx; kept as written" in said(table)
 
 
 def test_a_group_that_begins_with_0_has_a_decimal_comma(tmp_path: Path) -> None:
@@ -275,7 +276,7 @@ def after_a_rest(folder: Path, zero: float, names: str, *more: Any) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("zero", "told"), [(1.5, "is taken for the sensor's zero"), (9.0, "too much for a sensor's zero")]
+    ("zero", "told"), [(1.5, "is taken as the sensor's zero"), (9.0, "too large for a sensor's zero")]
 )
 def test_a_rest_at_the_beginning_is_the_zero_of_the_sensor(tmp_path: Path, zero: float, told: str) -> None:
     seen = seen_in(after_a_rest(tmp_path, zero, "Time (s),Force (N)"), "--out", str(tmp_path / "map.toml"))
@@ -312,11 +313,11 @@ LVM = (
             "as no other column is one",
         ),
         ("klipper.csv", "#time,force_g\n", "{t:.4f},{g:.4f}\n", "is in g: times 0.00980665 to be in N"),
-        ("labels.lvm", LVM + "X_Value\tFriction\tComment\n", "\t{kN:.8f}\t\n", "line 4 is of units: kN"),
+        ("labels.lvm", LVM + "X_Value\tFriction\tComment\n", "\t{kN:.8f}\t\n", "line 4 holds units: kN"),
         ("asked.csv", "t [s],F_soll [N],F_ist [N]\n", "{t:.4f},{ms:.0f},{N:.6f}\n", "force = 'F_ist [N]' by its name"),
         ("datenum.csv", "time,F\n", "{day:.10f},{N:.6f}\n", "is a time of the calendar in steps of 86400 s"),
         ("french.csv", "Temps [ms];Effort [N]\n", "{ms:.0f};{N:.6f}\n", "rises in even steps of a unit of time"),
-        ("traction.tsv", "Test Time (s)\tTraction Coeff (-)\n", "{t:.4f}\t{N:.6f}\n", "is told as a coefficient"),
+        ("traction.tsv", "Test Time (s)\tTraction Coeff (-)\n", "{t:.4f}\t{N:.6f}\n", "is a coefficient"),
     ],
 )
 def test_what_a_machine_calls_its_columns_is_understood(
@@ -342,7 +343,7 @@ def test_beside_the_number_of_the_row_an_even_way_is_no_time(tmp_path: Path) -> 
     path.write_text("".join(f"{i} {f:.5f} {x:.6f} \n" for i, (f, x) in enumerate(zip(force_N, drive_mm, strict=True))))
     refused = CliRunner().invoke(app, ["look", str(path), "--force", "2", "--json"])
     assert (
-        'no time: which column is it, or how many rows a second are there? Add --time "NAME" or --rate 1kHz'
+        'no time: which column is the time, or how many rows per second are there? Add --time "NAME" or --rate 1kHz'
         in json.loads(refused.stdout)["line"]
     )
     assert seen_in(path, "--force", "2", "--rate", "500Hz")["numbers"]["static_force_N"]["value"] == pytest.approx(
@@ -356,4 +357,4 @@ def test_a_way_without_a_unit_is_no_time(tmp_path: Path, name: str) -> None:
     path = tmp_path / "halscope.txt"
     path.write_text(f"{name};force\n" + "".join(f"{x:.6f};{f:.5f}\n" for f, x in zip(force_N, drive_mm, strict=True)))
     refused = CliRunner().invoke(app, ["look", str(path), "--json"])
-    assert "no time: which column is it" in json.loads(refused.stdout)["line"]
+    assert "no time: which column is the time" in json.loads(refused.stdout)["line"]

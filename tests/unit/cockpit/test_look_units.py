@@ -20,7 +20,7 @@ def test_a_unit_in_a_name_that_is_not_known_is_told_with_a_map_too(tmp_path: Pat
     for more in ([], ["--map", str(given)]):
         told = said(seen_in(path, *more))
         for unit, column in (("shake", "Time [shake]"), ("ozf", "Fx [ozf]")):
-            assert f"units: column {column}: {unit!r} is no unit that is known here: taken as it is" in told
+            assert f"units: column {column}: {unit!r} is not a known unit: the values are used unscaled" in told
         assert "states no unit" not in told
 
 
@@ -46,7 +46,7 @@ def test_a_speed_without_a_unit_that_is_known_is_told(tmp_path: Path, name: str,
     t_s, force_N, _ = saw_teeth()
     seen = seen_in(table_of(tmp_path / "a.csv", f"t [s],F [N],{name}", t_s, force_N, np.full(len(t_s), 5e-4)))
     assert "stiffness_N_per_m" in seen["numbers"]
-    assert ("states no unit that is known here: taken as m/s; add --speed" in said(seen)) == told
+    assert ("states no known unit: taken as m/s; add --speed" in said(seen)) == told
 
 
 @pytest.mark.parametrize(

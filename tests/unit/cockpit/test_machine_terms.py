@@ -13,14 +13,14 @@ from bridge.wire import stickslip_pb2 as wire
 from cockpit.cli import app
 from cockpit.commands.as_json.schemas import FORMATS
 from cockpit.judge.judged import judge_log
-from cockpit.judge.machine_terms import Following, FollowingSum, Motion, reversals_of
+from cockpit.judge.machine_terms import BlockMotion, Following, FollowingSum, reversals_of
 from cockpit.judge.verdict_words import following_in_words, in_words
 from tests.logs import doctored, verdict_of
 
 T_S = (np.arange(4000) + 1) * 1e-3
 
 
-def following(motion: Motion, from_s: float) -> tuple[Following | None, float]:
+def following(motion: BlockMotion, from_s: float) -> tuple[Following | None, float]:
     """Of the blocks from a time on; and the dose."""
     found = FollowingSum()
     found.add(motion, lambda t_s: t_s > from_s)
@@ -71,7 +71,9 @@ def test_following_error_of_a_stretch() -> None:
     direction = np.where(T_S <= 2.0, 1, -1)
     swing_m = np.where(np.arange(4000) % 2 == 0, 1e-5, -1e-5)
     error_m = np.where(T_S <= 2.0, 5e-5, -4e-5 + swing_m)
-    motion = Motion(T_S, error_m, direction, np.full(4000, 4e-9), reversals_of(T_S, -error_m, 0.0 * T_S, direction))
+    motion = BlockMotion(
+        T_S, error_m, direction, np.full(4000, 4e-9), reversals_of(T_S, -error_m, 0.0 * T_S, direction)
+    )
     back, _ = following(motion, 2.0)
     assert back is not None
     assert back.moving_s == pytest.approx(2.0)
@@ -89,11 +91,12 @@ def test_pieces_of_a_stretch_are_the_stretch() -> None:
     """A ripple of 1 nm on an error of 10 mm, whose squares alone would lose it."""
     direction = np.where(np.arange(4000) % 1000 < 700, 1, -1)
     error_m = 0.01 * direction + 1e-9 * np.sin(np.arange(4000.0))
-    whole = Motion(T_S, error_m, direction, 0.0 * T_S, [])
+    whole = BlockMotion(T_S, error_m, direction, 0.0 * T_S, [])
     pieces = FollowingSum()
     for part in np.split(np.arange(4000), [3, 900, 901, 3100]):
         pieces.add(
-            Motion(T_S[part], error_m[part], direction[part], 0.0 * T_S[part], []), lambda t_s: np.ones(len(t_s), bool)
+            BlockMotion(T_S[part], error_m[part], direction[part], 0.0 * T_S[part], []),
+            lambda t_s: np.ones(len(t_s), bool),
         )
     found, expected = pieces.result(1e-3), following(whole, 0.0)[0]
     assert found is not None
@@ -105,13 +108,13 @@ def test_pieces_of_a_stretch_are_the_stretch() -> None:
 def test_the_lines_of_a_stretch_beside_another() -> None:
     slide_m, drive_m = made_turn()
     direction = np.where(T_S < 2.0, 1, -1)
-    motion = Motion(T_S, drive_m - slide_m, direction, 0.0 * T_S, reversals_of(T_S, slide_m, drive_m, direction))
+    motion = BlockMotion(T_S, drive_m - slide_m, direction, 0.0 * T_S, reversals_of(T_S, slide_m, drive_m, direction))
     found, _ = following(motion, 0.0)
     assert found is not None
     error, reversal = following_in_words(found, found, "before")
     assert error.startswith("error    following error ")
     assert reversal.startswith(
-        "reversal quadrant error 239 um, the slide stands for 300 ms, the worst of 1 (before: 239 um"
+        "reversal quadrant error 239 um, the slide rests for 300 ms, the worst of 1 (before: 239 um"
     )
 
 

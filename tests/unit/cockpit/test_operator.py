@@ -15,7 +15,7 @@ from bridge.wire.inbox import Received
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import APPLIED, OPERATOR, PLANT_EVENT, Topic
 from bridge.wire.words import words
-from bridge.wire.zenoh_link import Bus, BusConfig, stands_still
+from bridge.wire.zenoh_link import Bus, BusConfig, is_frozen
 from cockpit.run import operator, status
 from cockpit.run.authority import make_certificates
 from tests.system.ports import free_endpoint
@@ -66,35 +66,35 @@ def taken(word: wire.Operator, name: str) -> wire.Event:
 
 
 @pytest.fixture
-def say(monkeypatch: pytest.MonkeyPatch) -> Callable[[Rig, str], operator.Obeyed]:
+def say(monkeypatch: pytest.MonkeyPatch) -> Callable[[Rig, str], operator.CommandOutcome]:
     for name, seconds in (("_ANSWER_S", 0.4), ("_AGAIN_S", 0.1), ("_SILENT_S", 0.2), ("_REFUSED_S", 0.05)):
         monkeypatch.setattr(operator, name, seconds)
 
-    def call(rig: Rig, word: str) -> operator.Obeyed:
+    def call(rig: Rig, word: str) -> operator.CommandOutcome:
         monkeypatch.setattr(operator, "Bus", lambda *_args, **_more: rig)
         return operator.tell(BusConfig(), word)
 
     return call
 
 
-def test_a_word_that_the_rig_took_and_did_is_done(say: Callable[[Rig, str], operator.Obeyed]) -> None:
+def test_a_word_that_the_rig_took_and_did_is_done(say: Callable[[Rig, str], operator.CommandOutcome]) -> None:
     rig = Rig([applied(DISARMED)], lambda word: [taken(word, "ARM"), applied(ARMED, wire.CHECK_PASSED)])
     obeyed = say(rig, "ARM")
     assert (obeyed.done, obeyed.taken, obeyed.state, len(rig.words)) == (True, True, "ARMED", 1)
 
 
 def test_a_rig_that_falls_silent_is_not_told_by_what_it_said_before(
-    say: Callable[[Rig, str], operator.Obeyed],
+    say: Callable[[Rig, str], operator.CommandOutcome],
 ) -> None:
     """A cut link leaves the last message from before, which shows the very state that the word asks for."""
     with pytest.raises(
-        Fault, match=r"said nothing for .* before that ARMED with no vibration: must answer ARM"
+        Fault, match=r"been silent for .* before that ARMED with no vibration: must answer ARM"
     ) as raised:
         say(Rig([applied(ARMED, wire.CHECK_PASSED)], lambda _word: []), "ARM")
     assert raised.value.kind is FAULTS["NO_PEER"]
 
 
-def test_an_answer_to_another_word_is_none_to_this_one(say: Callable[[Rig, str], operator.Obeyed]) -> None:
+def test_an_answer_to_another_word_is_none_to_this_one(say: Callable[[Rig, str], operator.CommandOutcome]) -> None:
     """Somebody else's word, and an earlier one of this process, end in the state that is asked for."""
     other = wire.Operator(who="somebody else")
     with pytest.raises(Fault, match=r"did not confirm RESET .* is DISARMED .*; send it again") as raised:
@@ -102,7 +102,9 @@ def test_an_answer_to_another_word_is_none_to_this_one(say: Callable[[Rig, str],
     assert raised.value.kind is FAULTS["NO_PEER"]
 
 
-def test_a_check_that_takes_longer_than_an_answer_is_waited_for(say: Callable[[Rig, str], operator.Obeyed]) -> None:
+def test_a_check_that_takes_longer_than_an_answer_is_waited_for(
+    say: Callable[[Rig, str], operator.CommandOutcome],
+) -> None:
     rig = Rig([], lambda word: [taken(word, "ARM")])
 
     def check() -> None:
@@ -119,16 +121,20 @@ def test_a_check_that_takes_longer_than_an_answer_is_waited_for(say: Callable[[R
     assert obeyed.seconds > 0.4
 
 
-def test_a_rig_without_a_guard_has_nothing_to_arm(say: Callable[[Rig, str], operator.Obeyed]) -> None:
+def test_a_rig_without_a_guard_has_nothing_to_arm(say: Callable[[Rig, str], operator.CommandOutcome]) -> None:
     armed = say(Rig([], lambda _word: [applied(wire.NO_GUARD, wire.NO_CAUSE, 37e-9)]), "ARM")
     assert armed.done
-    assert armed.in_words() == ["arm      this rig has no guard: nothing to arm; the controller vibrates already"]
+    assert armed.in_words() == [
+        "arm      this rig has no guard, so it needs no arming: its controller may vibrate it already"
+    ]
     disarmed = say(Rig([], lambda _word: [applied(wire.NO_GUARD, wire.NO_CAUSE, 37e-9)]), "DISARM")
     assert not disarmed.done
     assert "`stickslip stop`" in disarmed.in_words()[0]
 
 
-def test_what_the_rig_did_before_it_took_the_word_does_not_count(say: Callable[[Rig, str], operator.Obeyed]) -> None:
+def test_what_the_rig_did_before_it_took_the_word_does_not_count(
+    say: Callable[[Rig, str], operator.CommandOutcome],
+) -> None:
     """A rig that is armed is checked anew where its exciter was not; the message before the check shows it armed."""
     answers = [[applied(ARMED, wire.CHECK_PASSED)], []]
 
@@ -139,7 +145,7 @@ def test_what_the_rig_did_before_it_took_the_word_does_not_count(say: Callable[[
     assert (obeyed.done, obeyed.taken, obeyed.cause) == (False, True, "EXCITER_SILENT")
 
 
-def test_two_words_of_one_process_are_two(say: Callable[[Rig, str], operator.Obeyed]) -> None:
+def test_two_words_of_one_process_are_two(say: Callable[[Rig, str], operator.CommandOutcome]) -> None:
     rigs = [Rig([], lambda word: [taken(word, "RESET"), applied(DISARMED)]) for _ in range(2)]
     assert all(say(rig, "RESET").done for rig in rigs)
     assert rigs[0].words[0].who != rigs[1].words[0].who
@@ -153,14 +159,16 @@ def test_two_words_of_one_process_are_two(say: Callable[[Rig, str], operator.Obe
     ],
 )
 def test_a_stop_that_does_not_stop_is_a_fault(
-    say: Callable[[Rig, str], operator.Obeyed], answer: wire.Applied, line: str, monkeypatch: pytest.MonkeyPatch
+    say: Callable[[Rig, str], operator.CommandOutcome], answer: wire.Applied, line: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(operator, "_SILENT_S", 10.0)
     with pytest.raises(Fault, match=line):
         say(Rig([], lambda word: [taken(word, "STOP"), answer]), "STOP")
 
 
-def test_a_rig_that_rests_by_a_stop_is_stopped_whoever_said_it(say: Callable[[Rig, str], operator.Obeyed]) -> None:
+def test_a_rig_that_rests_by_a_stop_is_stopped_whoever_said_it(
+    say: Callable[[Rig, str], operator.CommandOutcome],
+) -> None:
     assert say(Rig([], lambda _word: [applied(FAULT, wire.STOP_BY_PERSON)]), "STOP").done
 
 
@@ -171,7 +179,7 @@ def test_where_no_rig_is_the_advice_is_that_of_the_word(
     monkeypatch: pytest.MonkeyPatch, word: str, advice: str
 ) -> None:
     monkeypatch.setattr(operator, "_DIAL_S", 0.2)
-    with pytest.raises(Fault, match="no rig answers there") as raised:
+    with pytest.raises(Fault, match="no rig answered at") as raised:
         operator.tell(BusConfig(endpoint=free_endpoint()), word)
     assert ("by hand" in str(raised.value), "start one, or give its --endpoint" in str(raised.value)) == (
         advice == "by hand",
@@ -186,7 +194,7 @@ def test_where_no_rig_answers_a_certificate_the_authority_is_asked_about(
     make_certificates(tmp_path, [])
     config = BusConfig(endpoint=free_endpoint().replace("tcp/", "tls/"), certificates=str(tmp_path))
     for ask in (lambda: operator.tell(config, "ARM"), lambda: status.look(config)):
-        with pytest.raises(Fault, match=r"no rig answers there .*the authority of --certs must be those"):
+        with pytest.raises(Fault, match=r"no rig answered .*the authority of --certs must be those"):
             ask()
 
 
@@ -194,7 +202,9 @@ def test_a_rig_that_cannot_listen_tells_why() -> None:
     config = BusConfig(endpoint=free_endpoint())
     with (
         socket.create_server(("127.0.0.1", config.port)),
-        pytest.raises(Fault, match=r"Address already in use \(os error 98\).*; end what holds it or choose") as raised,
+        pytest.raises(
+            Fault, match=r"Address already in use \(os error 98\).*; end the process that holds it, or choose"
+        ) as raised,
     ):
         Bus(config, "plant", lockstep=True)
     assert ("..." in str(raised.value), ".rs:" in str(raised.value)) == (False, False)
@@ -207,10 +217,12 @@ def test_the_help_of_a_mode_does_not_name_a_reason_that_is_not_there() -> None:
 
 def test_what_listens_and_does_not_read_stands_still(monkeypatch: pytest.MonkeyPatch) -> None:
     config = BusConfig(endpoint=free_endpoint())
-    assert not stands_still(config)
+    assert not is_frozen(config)
     with socket.create_server(("127.0.0.1", config.port)):
-        assert stands_still(config)
+        assert is_frozen(config)
         monkeypatch.setattr(operator, "_DIAL_S", 0.2)
-        with pytest.raises(Fault, match=r"stands still .* hears no STOP: must run; take it that it goes on") as raised:
+        with pytest.raises(
+            Fault, match=r"STOP NOT DELIVERED: .* does not answer .*: must run; assume that the exciter still vibrates"
+        ) as raised:
             operator.tell(config, "STOP")
     assert raised.value.kind is FAULTS["NO_PEER"]

@@ -129,13 +129,13 @@ def test_where_nothing_was_watched_no_figure_is_given(run: RunData) -> None:
     assert verdict.pauses is None
     assert verdict.not_watched == "no real-time priority"
     assert computer_in_words(verdict.computer, verdict.not_watched).endswith("not watched: no real-time priority")
-    assert verdict_of(run._replace(applied=applied)).not_watched == "the recorder of this log did not"
+    assert verdict_of(run._replace(applied=applied)).not_watched == "the recorder of this log did not watch them"
     assert verdict_of(run).not_watched == ""  # in lockstep nobody has to
 
 
 def test_the_progress_line_tells_of_pauses_once_there_are_some() -> None:
     assert "paused" not in progress_line(wire.State(), 10.0)
-    assert progress_line(wire.State(), 10.0, pauses=2, paused_ms=14.4).endswith("  machine paused 2 x, 14 ms")
+    assert progress_line(wire.State(), 10.0, pauses=2, paused_ms=14.4).endswith("  computer stalled 2 x, 14 ms")
 
 
 def test_what_the_verdict_says(run: RunData, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from bridge.wire.messages import APPLIED, TRACE
 from bridge.wire.stickslip_pb2 import EXCITE
 from cockpit.judge.ratio_watch import MOST_ABOVE_S, RatioVerdict, RatioWatch
 from cockpit.judge.setup import Setup
-from cockpit.judge.window import APPLIED_ROW, COMMAND_ROW, TRACE_ROW, Blocks, Window, rows_of
+from cockpit.judge.window import APPLIED_ROW, COMMAND_ROW, TRACE_ROW, JudgedBlocks, Window, rows_of
 from controller.codes import GAP, LATE, STALE
 from tests.logs import verdict_of
 
@@ -35,7 +35,7 @@ def made(ratio: Any) -> tuple[Any, Any]:
 def watched(applied: Any, trace: Any, per_window: int = 2500) -> RatioVerdict:
     """In windows of so many blocks, each with what came before and comes after."""
     watch, count = RatioWatch(SETUP), len(trace)
-    blocks = Blocks(*(np.asarray(trace["sequence"]), np.asarray(trace["t_ns"]), *[np.empty(0)] * 5))
+    blocks = JudgedBlocks(*(np.asarray(trace["sequence"]), np.asarray(trace["t_ns"]), *[np.empty(0)] * 5))
     rows = rows_of(trace, TRACE_ROW), rows_of(applied, APPLIED_ROW), np.empty(0, COMMAND_ROW)
     for first in range(0, count, per_window):
         end = min(first + per_window, count)

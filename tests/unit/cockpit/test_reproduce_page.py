@@ -39,5 +39,5 @@ def test_a_check_that_fails_is_marked_and_counted(runs: dict[Any, Any]) -> None:
     result = page.ReproduceResult([CLAIM, CLAIM._replace(passed=False)], 12.0)
     assert (result.passed, result.as_json()["passed"]) == (False, False)
     made = page._page(result, runs)
-    assert "1 of 2 claims of the paper hold; 1 of 2 checks in all; what fails is marked red below" in made
+    assert "1 of 2 claims of the paper hold; 1 of 2 checks in all; failures are marked red below" in made
     assert made.count(">FAILS<") == 1

@@ -131,7 +131,7 @@ def test_a_log_without_a_block_and_a_third_log(tmp_path: Path, log: Path) -> Non
     assert call("review", empty).exit_code == 0
     third = call("review", log, log, log)
     assert third.exit_code == 2
-    assert f"{log}: is a third log: a page has one or two; leave it out" in third.stderr
+    assert f"{log}: is the third log: a page shows one or two; leave it out" in third.stderr
 
 
 def test_a_verdict_is_no_parameter(log: Path) -> None:

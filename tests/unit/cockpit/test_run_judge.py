@@ -138,7 +138,7 @@ def test_a_log_that_ends_early_and_does_not_say_why_is_not_judged(run: RunData) 
     assert data_in_words(verdict) == "5.00 of 6.00 s; the rest is not in the log"
     assert headline(verdict) == "not judged: the log ends at 5.00 s, the run was to end at 6.00 s"
     assert (verdict.exit_status(strict=False), verdict.exit_status(strict=True)) == (14, 1)
-    assert verdict.losses() == ["how many messages are lost is not known"]
+    assert verdict.losses() == ["the number of lost messages is unknown"]
     short = headline(verdict_of(until(run, 2000, None)))
     ends = "the log ends at 2.00 s, the run was to end at 6.00 s"
     assert short == f"{ends}; ended before the controller was enabled (at 3.0 s)"
@@ -193,7 +193,7 @@ def test_a_channel_that_is_in_no_block_is_named(log: Path, tmp_path: Path) -> No
             )
             writer.add_message(number, message.log_time, block.SerializeToString(), message.publish_time)
         writer.finish()
-    rule = "no block can be read: /sensors: mass_position_m has 0 samples: must have 20; every block must hold all channels"
+    rule = "no block can be read: /sensors: mass_position_m has 0 samples: must have 20; every block must have all channels"
     assert headline(judge(path)) == rule
 
 
@@ -348,4 +348,4 @@ def test_a_run_with_faults_in_one_process_says_how_long_it_takes(
     """It ran 40 times slower than a run without faults, and no line said so."""
     fault = "fault=[{kind='scaled', target='drive_force_N', value=0.5}]"
     run_scenario("from-the-start", ["duration_s=0.1", fault], False, True, tmp_path / "run.mcap")
-    assert "with faults, message by message: 0.4 s for a second of the run" in capsys.readouterr().err
+    assert "with faults, message by message: 0.4 s per simulated second" in capsys.readouterr().err

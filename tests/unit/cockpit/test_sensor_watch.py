@@ -16,10 +16,10 @@ from bridge.log.logfile import RunData, read_run
 from cockpit.judge import judged
 from cockpit.judge.described import described
 from cockpit.judge.judged import judge_log
-from cockpit.judge.relations import Relations
+from cockpit.judge.relations import ChannelRelations
 from cockpit.judge.sensor_watch import SensorVerdict
 from cockpit.judge.verdict_words import in_words
-from cockpit.judge.window import APPLIED_ROW, COMMAND_ROW, TRACE_ROW, Blocks, Window
+from cockpit.judge.window import APPLIED_ROW, COMMAND_ROW, TRACE_ROW, JudgedBlocks, Window
 from plant.config import SensorsConfig
 from tests.channel_edits import edited, edits_of
 from tests.logs import verdict_of
@@ -227,7 +227,7 @@ def codes_of(step_m: float = 0.0, **columns: Any) -> list[str]:
     applied = np.zeros(count, APPLIED_ROW)
     applied["sequence"], applied["frequency_Hz"], applied["amplitude_m"] = number, 4000.0, 10.0 / omega**2
     place_m = np.linspace(0.0, 2e-4, count)[:, None]
-    blocks = Blocks(
+    blocks = JudgedBlocks(
         number, number * 1_000_000, np.full((count, 1), 13.0), place_m, place_m - 1e-3, *np.ones((2, count))
     )
     blocks = blocks._replace(**columns)
@@ -236,7 +236,7 @@ def codes_of(step_m: float = 0.0, **columns: Any) -> list[str]:
             **{name: step_m * np.round(getattr(blocks, name) / step_m) for name in ("drive_m", "slide_m")}
         )
     rig = {"sensors": SensorsConfig(position_resolution_m=step_m).model_dump(), "drive": {"stiffness_N_per_m": 1.2e4}}
-    relations = Relations(described({"rig": rig}, {}), 1e-3)
+    relations = ChannelRelations(described({"rig": rig}, {}), 1e-3)
     relations.add(
         Window(blocks, np.zeros(0, TRACE_ROW), applied, np.zeros(0, COMMAND_ROW), 0, count, 0, False, 0, is_last=True)
     )

@@ -4,8 +4,8 @@ import threading
 
 import pytest
 
-from cockpit.run import telling as module
-from cockpit.run.telling import telling
+from cockpit.run import lifecycle_lines as module
+from cockpit.run.lifecycle_lines import telling
 from tests.patience import PATIENCE_S
 
 
@@ -31,7 +31,7 @@ def test_a_terminal_that_stands_still_holds_up_nobody(monkeypatch: pytest.Monkey
         over.set()
 
     monkeypatch.setattr(module, "say", say)
-    monkeypatch.setattr(module, "_LAST_WORDS_S", 0.05)
+    monkeypatch.setattr(module, "_LAST_LINES_S", 0.05)
     with telling(quiet=False) as tell:
         for _ in range(100):
             tell("running", "x")

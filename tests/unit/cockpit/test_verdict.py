@@ -99,7 +99,7 @@ def test_slips_of_a_drive_that_seems_to_stand_are_said(tmp_path: Path) -> None:
     verdict = verdict_of(read_run(log))
     assert not verdict.good
     assert re.search(
-        r"DRIVE_UNSEEN: \d+ slips while the drive position stood, first at [4-6]\.", "\n".join(verdict.faults)
+        r"DRIVE_UNSEEN: \d+ slips at a constant drive position, first at [4-6]\.", "\n".join(verdict.faults)
     )
 
 

@@ -90,6 +90,12 @@ def process() -> tuple[Any, FakeBus]:
     return made, bus
 
 
+@pytest.fixture(autouse=True)
+def never_stalled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stall of the test's computer is no stall of the controller; a test of stalls replaces this."""
+    monkeypatch.setattr(realtime, "was_paused", lambda *_: False)
+
+
 MS = 1_000_000
 END = wire.Event(source="plant", code="END").SerializeToString()
 STOP = wire.Operator(action=wire.Operator.STOP, who="test").SerializeToString()
@@ -289,7 +295,7 @@ def test_a_controller_in_lockstep_refuses_a_rig_that_does_not_wait() -> None:
     controller = ControllerProcess(CONFIG, ControllerNode(CONFIG), bus, lockstep=True)
     controller.prepare()
     bus.say(PLANT_EVENT, wire.Event(source="plant", code="START", text="SCHED_FIFO 50").SerializeToString())
-    with pytest.raises(Fault, match=r"CONFIG: event/plant: START says 'SCHED_FIFO 50': must say 'lockstep'"):
+    with pytest.raises(Fault, match=r"CONFIG: event/plant: START 'SCHED_FIFO 50': must be 'lockstep'"):
         controller.loop(threading.Event(), "")
 
 
@@ -306,7 +312,10 @@ def test_what_cannot_be_read_is_dropped_and_told_once_a_second() -> None:
     assert len(bus.sent[COMMAND.name]) == 50
     told = [(event.code, event.text) for event in bus.events()]
     assert [code for code, _ in told] == ["START", *["BAD_MESSAGE"] * 5, "END"]
-    assert told[1][1] == "sensors: 12 bytes are no SensorBlock; see bridge/wire/PROTOCOL.md for its fields: dropped"
+    assert (
+        told[1][1]
+        == "sensors: 12 bytes cannot be decoded as SensorBlock; see bridge/wire/PROTOCOL.md for its fields: dropped"
+    )
     assert told[2][1] == "operator: action = 7: not known: dropped"
     assert told[3][1].startswith("announce: a message of more than 65536 bytes: a Announce must be shorter")
     assert told[4][1].endswith("(48 times, 49 in all)")
@@ -397,7 +406,7 @@ def test_a_clock_that_jumps_is_told() -> None:
     bus.leave()
     controller.loop(threading.Event(), "")
     assert bus.codes() == ["START", "CLOCK", "END"]
-    assert "sensors: block 10: t_ns is 3.6e+06 ms from what the number says" in bus.events()[1].text
+    assert "sensors: block 10: t_ns is 3.6e+06 ms off the block number" in bus.events()[1].text
 
 
 def test_a_flood_of_an_operators_words_is_obeyed_and_answered_sparsely() -> None:

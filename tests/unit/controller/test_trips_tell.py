@@ -12,7 +12,7 @@ from bridge.wire.messages import TRACE
 from cockpit.run.in_process import run_onboard
 from cockpit.run.scenario import load_scenario
 from controller.trips.age import HOLD_NS, MARGIN_NS, Age
-from controller.trips.tell import TripTeller, changes
+from controller.trips.trip_events import TripEvents, changes
 from tests.closed_loop.sensor_faults import suffer
 
 MS_NS = 1_000_000
@@ -22,7 +22,7 @@ def told(reasons: Sequence[int], limits: Sequence[int]) -> list[tuple[str, str]]
     trace = TRACE.blank(len(reasons))
     trace["t_ns"] = np.arange(len(reasons)) * MS_NS
     trace["reason"], trace["limit"] = reasons, limits
-    teller = TripTeller()
+    teller = TripEvents()
     return [one for row in changes(trace) for one in teller.news(trace[row])]
 
 

@@ -9,7 +9,7 @@ import pytest
 from bridge.config import validate
 from bridge.kernel import Record, kernel
 from controller.config import ControllerConfig
-from controller.estimate.windows import BINS, DRIVE, FORCE, MOST_FRESH, SLIDE, begin_anew, note_steps, push
+from controller.estimate.windows import BINS, DRIVE, FORCE, MOST_FRESH, SLIDE, clear_windows, note_steps, push
 from controller.records import build
 
 
@@ -92,7 +92,7 @@ def test_the_noise_outlives_a_new_beginning_and_what_was_not_measured_does_not_c
     p, s = _start()
     _push(p, s, np.random.default_rng(1).normal(0.0, 0.02, 10000))
     before = s.noise[FORCE, 2]
-    begin_anew(s)
+    clear_windows(s)
     assert (s.pushed == 0).all()
     _one_by_one(p, s, np.zeros((3, 2000)), False)
     assert s.noise[FORCE, 2] == before

@@ -52,12 +52,12 @@ def test_clear_ends_what_acts_and_what_is_to_come() -> None:
 @pytest.mark.parametrize(
     ("payload", "line"),
     [
-        (b"\xff" * 12, "bytes are no Inject"),
-        (order("[1"), "is no JSON object"),
-        (order("[" * 9000), "is no JSON object"),
-        (order([1]), "is no JSON object"),
+        (b"\xff" * 12, "bytes cannot be decoded as Inject"),
+        (order("[1"), "is not a JSON object"),
+        (order("[" * 9000), "is not a JSON object"),
+        (order([1]), "is not a JSON object"),
         (order(OFF | {"kind": "x"}), "kind = x: must fit target"),
-        (order({"kind": "killed", "target": "controller"}), "a rig ends no process"),
+        (order({"kind": "killed", "target": "controller"}), "a rig cannot end a process"),
         (order(OFF | {"for_s": 1e308}), "for_s = 1e.308: must be less than"),
         (order(OFF | {"from_s": 1e300}), "from_s = 1e.300: must be less than"),
         (order({"kind": "jump", "target": "clock", "value": -1e200}), "value = -1e.200: must be -1e.09 to 1e.09"),

@@ -247,8 +247,8 @@ def test_forged_messages_are_those_of_nobody() -> None:
             {"kind": "swapped", "target": "drive_force_N", "other": "x"},
             "other = x: must be another channel than target",
         ),
-        ({"kind": "held", "target": "blocks"}, "for_s = 0: messages that are held must come some time; give for_s"),
-        ({"kind": "frozen", "target": "controller"}, "for_s = 0: a process that is frozen must go on some time"),
+        ({"kind": "held", "target": "blocks"}, "for_s = 0: held messages must arrive some time; give for_s"),
+        ({"kind": "frozen", "target": "controller"}, "for_s = 0: a frozen process must continue some time"),
     ],
 )
 def test_a_table_that_is_none_says_why(given: dict[str, Any], line: str) -> None:

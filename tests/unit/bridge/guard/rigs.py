@@ -7,11 +7,11 @@ import numpy as np
 
 from bridge.guard.config import GuardConfig
 from bridge.guard.core import accept, allow, look
-from bridge.guard.records import Exciter, build
+from bridge.guard.records import ExciterLimits, build
 from bridge.wire.messages import COMMAND, sensor_block
 
 RUN = 77
-EXCITER = Exciter(1e-7, 500.0, 5000.0, 1e-6, 1e-3, 20, 0.05)
+EXCITER = ExciterLimits(1e-7, 500.0, 5000.0, 1e-6, 1e-3, 20, 0.05)
 SAMPLE_S = 5e-5
 NANO = 1e-9
 
@@ -19,7 +19,7 @@ NANO = 1e-9
 class Rig:
     """A rig whose drive moves evenly and whose base does what the guard allows, `gain` times."""
 
-    def __init__(self, config: GuardConfig | None = None, arm: bool = True, exciter: Exciter = EXCITER) -> None:
+    def __init__(self, config: GuardConfig | None = None, arm: bool = True, exciter: ExciterLimits = EXCITER) -> None:
         self.params, self.state = build(config or GuardConfig(), exciter, RUN, arm)
         self.p: Any = self.params[0]
         self.s: Any = self.state[0]

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from bridge.guard.check import tell_gain
+from bridge.guard.check import write_gain
 from bridge.guard.codes import (
     ACTIVE,
     ARMED,
@@ -125,11 +125,11 @@ def test_after_a_check_each_block_tells_one_of_its_gains() -> None:
     rig = Rig(GuardConfig(check_Hz=[1000.0, 2000.0, 4000.0]))
     rig.s.gain[:3] = 1.0, 2.0, 6.0
     block = sensor_block(20).blank()
-    tell_gain(rig.p, rig.s, block[0])
+    write_gain(rig.p, rig.s, block[0])
     assert (block[0]["check_Hz"], block[0]["check_gain"]) == (0.0, 0.0)
     rig.s.verified = 1
     told = []
     for rig.s.block in range(3):
-        tell_gain(rig.p, rig.s, block[0])
+        write_gain(rig.p, rig.s, block[0])
         told.append((float(block[0]["check_Hz"]), float(block[0]["check_gain"])))
     assert told == [(1000.0, 1.0), (2000.0, 2.0), (4000.0, 6.0)]

@@ -18,9 +18,9 @@ from bridge.guard.codes import (
     OVERTRAVEL,
 )
 from bridge.guard.config import GuardConfig, HeatConfig, Level
+from bridge.guard.estimates import expect_drive
 from bridge.guard.limits import exciter_gain, passes, watch
 from bridge.guard.records import FIRST
-from bridge.guard.senses import expect_drive
 from tests.unit.bridge.guard.rigs import EXCITER, NANO, Rig
 
 TWO_PI = 2.0 * math.pi

@@ -4,16 +4,16 @@ import math
 
 import pytest
 
-from bridge.guard.received import Commands
+from bridge.guard.received import CommandQueue
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.complaints import Complaints
 from bridge.wire.inbox import WAITING, Received
 from bridge.wire.topics import COMMAND
 
 
-def commands() -> tuple[Commands, list[str]]:
+def commands() -> tuple[CommandQueue, list[str]]:
     told: list[str] = []
-    return Commands(Complaints(lambda code, text: told.append(f"{code} {text}"))), told
+    return CommandQueue(Complaints(lambda code, text: told.append(f"{code} {text}"))), told
 
 
 def command(block: int, amplitude_m: float = 3e-8, frequency_Hz: float = 2600.0) -> Received:
@@ -68,7 +68,7 @@ def test_rubbish_is_dropped() -> None:
     made.push(Received(COMMAND, b"\xff" * 12, 0))
     made.push(Received(COMMAND, b"\xff" * 100_000, 0))
     assert made.take(10) == []
-    assert told[0].startswith("BAD_MESSAGE command: 12 bytes are no Command")
+    assert told[0].startswith("BAD_MESSAGE command: 12 bytes cannot be decoded as Command")
 
 
 def test_of_a_flood_the_newest_are_read_and_the_rest_is_told() -> None:
@@ -77,6 +77,6 @@ def test_of_a_flood_the_newest_are_read_and_the_rest_is_told() -> None:
         made.push(command(3))
     made.push(command(9))
     assert [answered for _, answered in made.take(10)][-1] == 9
-    assert told == ["FLOOD command: more than can be read in a block: the oldest were dropped (745 times)"]
+    assert told == ["FLOOD command: too many for one block: the oldest were dropped (745 times)"]
     assert made.take(11) == []
     assert len(told) == 1

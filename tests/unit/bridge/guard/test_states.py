@@ -40,7 +40,7 @@ from bridge.guard.codes import (
 from bridge.guard.config import GuardConfig
 from bridge.guard.core import NO_COMMAND
 from bridge.guard.records import build
-from bridge.guard.states import enter, obey, trip
+from bridge.guard.states import apply_order, enter, trip
 from bridge.wire.messages import sensor_block
 from tests.unit.bridge.guard.rigs import EXCITER, Rig
 
@@ -61,7 +61,7 @@ from tests.unit.bridge.guard.rigs import EXCITER, Rig
 def test_a_word_leads_from_state_to_state(state: int, word: int, after: int, cause: int) -> None:
     rig = Rig(arm=False)
     rig.s.state = state
-    assert obey(rig.s, word)
+    assert apply_order(rig.s, word)
     assert (rig.s.state, rig.s.cause) == (after, cause)
 
 
@@ -85,7 +85,7 @@ def test_a_word_leads_from_state_to_state(state: int, word: int, after: int, cau
 def test_other_words_change_nothing(state: int, word: int) -> None:
     rig = Rig(arm=False)
     rig.s.state, rig.s.verified = state, 1
-    assert not obey(rig.s, word)
+    assert not apply_order(rig.s, word)
     assert (rig.s.state, rig.s.cause) == (state, POWER_UP)
 
 
@@ -94,7 +94,7 @@ def test_a_stop_is_taken_in_fault_too_and_the_first_cause_of_a_fault_stays_other
     trip(rig.s, LOUD)
     trip(rig.s, SENSOR_FROZEN)
     assert (rig.s.state, rig.s.cause) == (FAULT, LOUD)
-    assert obey(rig.s, STOP)
+    assert apply_order(rig.s, STOP)
     assert rig.s.cause == STOP_BY_PERSON
 
 
@@ -116,7 +116,7 @@ def test_a_stop_that_was_kept_holds_at_power_up_even_where_the_scenario_arms() -
 def test_the_check_measures_the_gain_and_arms() -> None:
     rig = Rig(arm=False)
     rig.gain = 0.7
-    obey(rig.s, ARM)
+    apply_order(rig.s, ARM)
     for _ in range(500):
         rig.block(NO_COMMAND)
         assert (rig.s.state, rig.s.amplitude_m) == (CHECKING, 0.0)
@@ -136,7 +136,7 @@ def test_the_check_measures_the_gain_and_arms() -> None:
 def after_a_check(rig: Rig, gain: float, word: int = ARM) -> tuple[int, int]:
     """State and cause after a check at another gain."""
     rig.gain = gain
-    assert obey(rig.s, word)
+    assert apply_order(rig.s, word)
     for _ in range(500 + 5 * 200 + 20):
         rig.block(NO_COMMAND)
     return int(rig.s.state), int(rig.s.cause)
@@ -146,18 +146,18 @@ def test_a_check_that_finds_another_gain_asks_for_a_persons_word() -> None:
     rig = Rig(arm=False)
     assert after_a_check(rig, 1.0) == (ARMED, FIRST_CHECK)
     for gain in (1.1, 1.2, 0.85):  # small changes are compared with what was accepted, and do not add up
-        obey(rig.s, DISARM)
+        apply_order(rig.s, DISARM)
         assert after_a_check(rig, gain) == (ARMED, CHECK_PASSED)
     assert rig.s.accepted[:5] == pytest.approx([1.0] * 5, rel=0.03)
-    obey(rig.s, DISARM)
+    apply_order(rig.s, DISARM)
     assert after_a_check(rig, 0.5) == (READY, GAIN_CHANGED)
     assert gain_change(rig.p, rig.s) == pytest.approx(2.0, rel=0.05)
     assert after_a_check(rig, 0.5) == (READY, GAIN_CHANGED)  # the word ARM checks again
     rig.block(NO_COMMAND)
     assert rig.s.amplitude_m == 0.0
-    assert obey(rig.s, ACCEPT_GAIN)
+    assert apply_order(rig.s, ACCEPT_GAIN)
     assert (rig.s.state, rig.s.cause) == (ARMED, GAIN_ACCEPTED)
-    obey(rig.s, DISARM)
+    apply_order(rig.s, DISARM)
     assert after_a_check(rig, 1.0, ACCEPT_GAIN) == (READY, GAIN_CHANGED)  # which begins a check, too
     assert after_a_check(rig, 0.5) == (ARMED, CHECK_PASSED)
 
@@ -174,7 +174,7 @@ PLACES = ["mass_position_m", "drive_position_m"]
 def after_the_quiet_time(broken: str, channel: str) -> tuple[int, int]:
     rig = Rig(arm=False)
     getattr(rig, broken).add(channel)
-    obey(rig.s, ARM)
+    apply_order(rig.s, ARM)
     for _ in range(501):
         rig.block(NO_COMMAND)
     return int(rig.s.state), int(rig.s.cause)
@@ -199,7 +199,7 @@ def test_a_channel_that_is_no_number_fails_the_check(channel: str) -> None:
 def test_an_exciter_that_is_silent_or_wild_fails_the_check(gain: float, cause: int) -> None:
     rig = Rig(arm=False)
     rig.gain = gain
-    obey(rig.s, ARM)
+    apply_order(rig.s, ARM)
     for _ in range(800):
         rig.block(NO_COMMAND)
     assert (rig.s.state, rig.s.cause, rig.s.verified) == (FAULT, cause, 0)
@@ -210,7 +210,7 @@ def test_an_exciter_that_is_silent_or_wild_fails_the_check(gain: float, cause: i
 
 def test_an_exciter_that_is_wild_at_the_last_tone_alone_is_not_verified() -> None:
     rig = Rig(arm=False)
-    obey(rig.s, ARM)
+    apply_order(rig.s, ARM)
     for block in range(500 + 5 * 200 + 20):
         rig.gain = 1.0 if block < 500 + 4 * 200 else 25.0
         rig.block(NO_COMMAND)
@@ -221,7 +221,7 @@ def test_an_exciter_that_is_wild_at_the_last_tone_alone_is_not_verified() -> Non
 def test_a_channel_may_stand_for_part_of_the_quiet_time() -> None:
     """A converter of few bits shows the same number for a while."""
     rig = Rig(arm=False)
-    obey(rig.s, ARM)
+    apply_order(rig.s, ARM)
     for block in range(502):
         rig.frozen = {"drive_force_N"} if block < 400 else set()
         rig.block(NO_COMMAND)
@@ -243,7 +243,7 @@ def test_the_gain_is_that_of_the_second_half_of_a_tone() -> None:
 
 def test_a_rig_that_a_person_armed_without_a_controller_is_disarmed_again() -> None:
     rig = Rig(arm=False)
-    obey(rig.s, ARM)
+    apply_order(rig.s, ARM)
     for _ in range(500 + 5 * 200 + 10):
         rig.block(NO_COMMAND)
     assert rig.s.state == ARMED

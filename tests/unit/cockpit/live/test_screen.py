@@ -7,11 +7,11 @@ from rich.console import Console
 
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.live.screen import screen_of
-from cockpit.live.view import Said, View
+from cockpit.live.view import EventRow, View
 from tests.unit.cockpit.live.made import Rig
 
 
-def shown(view: View, events: collections.deque[Said]) -> str:
+def shown(view: View, events: collections.deque[EventRow]) -> str:
     console = Console(width=120, height=40, color_system=None)
     with console.capture() as caught:
         console.print(screen_of(view.now(), events, console.height))
@@ -38,7 +38,7 @@ def test_a_live_rig_is_told_in_words(rig: Rig) -> None:
         "1.20: v_a 600 µm/s, v_d 500 µm/s",
         "20 nm of 100 nm at 2600 Hz",
         "reason     HELD: vibrating, because it was needed",
-        "next slip  none is expected",
+        "next slip  none expected",
         "GUARD (C): ARMED -> ACTIVE",
     ):
         assert part in words, words
@@ -51,6 +51,6 @@ def test_of_a_rig_that_is_silent_there_are_no_figures(rig: Rig) -> None:
     rig.now_s += 2.0
     words = shown(view, collections.deque())
     assert words.startswith("no data for 2 s")
-    assert "no rig is heard" in words
+    assert "no rig connected" in words
     assert wire.Mode.Name(wire.EXCITE) not in words
     assert "500" not in words

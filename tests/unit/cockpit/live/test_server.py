@@ -13,12 +13,12 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from bridge.faults import Fault
 from bridge.wire.bus_config import BusConfig
-from cockpit.live import person, server, viewers
+from cockpit.live import operator_link, server, viewers
 from cockpit.live.gate import refusal
 from cockpit.live.page import Page
 from cockpit.live.server import Server, listening
 from cockpit.live.token import kept_token
-from cockpit.run.operator import Obeyed
+from cockpit.run.operator import CommandOutcome
 from tests.patience import PATIENCE_S
 from tests.system.ports import free_endpoint
 from tests.unit.cockpit.live.made import table_of_frame
@@ -149,11 +149,13 @@ def test_strangers_are_refused_by_the_running_server(port: int) -> None:
 def test_a_thirteenth_page_sees_nothing_and_may_stop(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
     words: list[str] = []
 
-    def obey(_bus: BusConfig, word: str) -> Obeyed:
+    def apply_order(_bus: BusConfig, word: str) -> CommandOutcome:
         words.append(word)
-        return Obeyed("here", word, True, "FAULT", "STOP_BY_PERSON", "a person stopped it", 0.0, 0.1, "", True, False)
+        return CommandOutcome(
+            "here", word, True, "FAULT", "STOP_BY_PERSON", "a person stopped it", 0.0, 0.1, "", True, False
+        )
 
-    monkeypatch.setattr(person, "tell", obey)
+    monkeypatch.setattr(operator_link, "tell", apply_order)
 
     async def look() -> None:
         pages = [await page_of(port) for _ in range(viewers.MOST_VIEWERS)]
@@ -200,33 +202,33 @@ def test_where_all_connections_are_pages_the_next_is_closed_at_once(port: int, m
 
 
 def test_arming_needs_the_token_and_stop_waits_for_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(person, "_WRONG_S", 0.2)
+    monkeypatch.setattr(operator_link, "_WRONG_S", 0.2)
     said: list[str] = []
     armed = threading.Event()
 
-    def obey(_bus: BusConfig, word: str) -> Obeyed:
+    def apply_order(_bus: BusConfig, word: str) -> CommandOutcome:
         said.append(word)
         if word == "ARM":
             armed.wait(PATIENCE_S)
         if word == "RESET":
             raise Fault("NO_PEER", "nobody there\x1b[2J")
-        return Obeyed("here", word, True, "ARMED", "CHECK_PASSED", "", 0.0, 0.1, "", True, False)
+        return CommandOutcome("here", word, True, "ARMED", "CHECK_PASSED", "", 0.0, 0.1, "", True, False)
 
-    monkeypatch.setattr(person, "tell", obey)
+    monkeypatch.setattr(operator_link, "tell", apply_order)
 
     async def look() -> None:
-        words = person.Words(BusConfig(), TOKEN)
+        words = operator_link.Words(BusConfig(), TOKEN)
         for token in ("guess", "", "\ud800"):  # the last is half of a pair, as JSON may hold it
-            wrong = await words.say(person.Wish("ARM", token))
-            assert "not the token" in wrong["lines"][0]
+            wrong = await words.say(operator_link.Wish("ARM", token))
+            assert "wrong token" in wrong["lines"][0]
         assert said == []
-        arming = asyncio.create_task(words.say(person.Wish("ARM", TOKEN)))
+        arming = asyncio.create_task(words.say(operator_link.Wish("ARM", TOKEN)))
         await asyncio.sleep(0.05)
-        assert "under way" in (await words.say(person.Wish("DISARM", TOKEN)))["lines"][0]
-        assert (await words.say(person.Wish("STOP", "")))["done"]  # while the other word is under way
+        assert "in progress" in (await words.say(operator_link.Wish("DISARM", TOKEN)))["lines"][0]
+        assert (await words.say(operator_link.Wish("STOP", "")))["done"]  # while the other word is under way
         armed.set()
         assert (await arming)["done"]
-        failed = await words.say(person.Wish("RESET", TOKEN))
+        failed = await words.say(operator_link.Wish("RESET", TOKEN))
         assert failed["lines"] == ["nobody there\\x1b[2J"]
 
     asyncio.run(look())
@@ -234,7 +236,7 @@ def test_arming_needs_the_token_and_stop_waits_for_nobody(monkeypatch: pytest.Mo
 
 
 def test_a_wish_is_a_word_that_is_known() -> None:
-    assert person.wish_of('{"word": "ARM", "token": "x"}') == person.Wish("ARM", "x")
+    assert operator_link.wish_of('{"word": "ARM", "token": "x"}') == operator_link.Wish("ARM", "x")
     for text in (
         "",
         "[]",
@@ -245,7 +247,7 @@ def test_a_wish_is_a_word_that_is_known() -> None:
         "[" * 900,
         b"\xff",
     ):
-        assert person.wish_of(text) is None, text
+        assert operator_link.wish_of(text) is None, text
 
 
 def test_a_slow_reader_is_dropped_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -68,7 +68,7 @@ def test_steps_join_without_a_seam(rig: Rig, view: View) -> None:
 
 
 def test_what_is_old_is_not_shown_as_what_is(rig: Rig, view: View) -> None:
-    assert view.now()["answer"]["text"] == "waiting: a rig is there, and sent no block yet"
+    assert view.now()["answer"]["text"] == "waiting: a rig is connected but has sent no block yet"
     rig.blocks(range(30))
     view.step()
     now = view.now()
@@ -138,7 +138,7 @@ def test_a_fault_is_told_first_and_with_what_to_do(rig: Rig, view: View) -> None
     view.step()
     answer = view.now()["answer"]
     assert answer["level"] == "bad"
-    assert answer["text"].startswith("FAULT: STOP_BY_PERSON: a person stopped the rig; stickslip reset")
+    assert answer["text"].startswith("FAULT: STOP_BY_PERSON: an operator stopped the rig; stickslip reset")
 
 
 def test_events_cannot_command_a_page_and_pauses_do_not_crowd_them_out(rig: Rig, view: View) -> None:

@@ -102,7 +102,7 @@ def slow_accelerometer(data: Columns) -> None:
             4000,
         ),
         (mass_in_mm, "units", "mass_position_m: travels 1: the drive moves by 0.001 m", "mass_position_m", 4000),
-        (twice_as_fast, "units", "moves at 0.001 m/s on average, drive_velocity_mps says 0.0005", "", 4000),
+        (twice_as_fast, "units", "moves at 0.001 m/s on average, but drive_velocity_mps = 0.0005", "", 4000),
         (force_the_other_way, "sign", "drive_force_N: pulls against the drive's motion", "drive_force_N", 4000),
         (no_value, "outlier", "2 outliers, first row 501 = -9999: no measurement; left out", "", 3998),
         (wild, "wild", "mass_accel_mps2: 2 samples are beyond 100000, first row 501: -200000; not used", "", 3998),
@@ -172,7 +172,7 @@ def test_a_drive_that_stands_still_is_told(tmp_path: Path, stated: bool) -> None
         del data["drive_position_m"]
     speed = "drive_velocity_mps = 0.0" if stated else ""
     found = kinds(load_evidence(folder(tmp_path, data, MANIFEST.replace("drive_velocity_mps = 0.0005", speed))))
-    assert "stands still in the whole run: friction and drive are not tested" in found["still"]
+    assert "the drive rests in the whole run: friction and drive are not tested" in found["still"]
 
 
 def test_a_clock_with_too_few_digits_is_told_as_one(tmp_path: Path) -> None:
@@ -305,7 +305,7 @@ def measured() -> Path:
     [
         ("channels.mass_accel_mps2.scale", -1.0, "sign", "mass_accel_mps2: points backwards: the mass accelerates as"),
         ("channels.mass_accel_mps2.scale", 0.10197, "units", "a spring of 1.1e+05 N/m makes it"),
-        ("rig.drive_stiffness_N_per_m", 11.7, "units", "rig.drive_stiffness_N_per_m says 11.7: check the units"),
+        ("rig.drive_stiffness_N_per_m", 11.7, "units", "but rig.drive_stiffness_N_per_m = 11.7: check the units"),
         ("rig.drive_stiffness_N_per_m", 6000.0, "", ""),
     ],
 )

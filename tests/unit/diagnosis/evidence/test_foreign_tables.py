@@ -78,13 +78,13 @@ def test_arrays_of_numpy_are_named_with_the_way_to_columns(tmp_path: Path, name:
         np.save(file, T) if name == "x.npy" else np.savez(file, t=T, force=T)
     with pytest.raises(Fault) as caught:
         kind_of(tmp_path / name)
-    assert f"{name}: holds arrays of NumPy, which do not say what is a time" in str(caught.value)
+    assert f"{name}: holds NumPy arrays, without names for time and force" in str(caught.value)
     assert 'write them as columns of a text: numpy.savetxt("NAME.csv"' in str(caught.value)
 
 
 def test_a_packed_file_is_named_as_one(tmp_path: Path) -> None:
     (tmp_path / "a.csv.gz").write_bytes(gzip.compress(b"t,F\n0,1\n"))
-    with pytest.raises(Fault, match=r"a.csv.gz: is packed by gzip; unpack it, and give the file that is in it"):
+    with pytest.raises(Fault, match=r"a.csv.gz: is packed by gzip; unpack it, and give the unpacked file"):
         import_file(tmp_path / "a.csv.gz", channel_map(tmp_path, t_s="t", drive_force_N="F"), tmp_path / "out")
 
 

@@ -44,7 +44,7 @@ def test_what_a_map_says_and_the_file_is_not_names_the_place(tmp_path: Path) -> 
     (tmp_path / "a.csv").write_text(CSV.replace("F", "F/µm", 1), encoding="latin-1")
     with pytest.raises(Fault, match=r"a.csv: line 1: is not utf-8: .*leave source.encoding out"):
         read_table(tmp_path / "a.csv", Dialect(";", ",", encoding="utf-8"))
-    with pytest.raises(Fault, match=r"source.encoding = 'utf-9': is none that Python knows"):
+    with pytest.raises(Fault, match=r"source.encoding = 'utf-9': unknown to Python"):
         read_table(tmp_path / "a.csv", Dialect(";", ",", encoding="utf-9"))
     (tmp_path / "words.csv").write_text("a;b\n" + "x;y\n" * 40)
     with pytest.raises(Fault, match=r"words.csv: no row of numbers .*state source.delimiter"):

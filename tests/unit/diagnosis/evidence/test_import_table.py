@@ -236,7 +236,7 @@ def test_an_imported_log_says_that_it_has_no_controller_and_what_reads_it(tmp_pa
     with pytest.raises(Fault) as caught:
         read_run(tmp_path / "made.mcap").configuration("controller")
     assert caught.value.line == (
-        f"{tmp_path / 'made.mcap'}: is measured data of another program, imported, without a controller: there is no run to "
+        f"{tmp_path / 'made.mcap'}: is imported data of another program, without a controller: it holds no run to "
         "judge; `log info`, `log check`, `log export`, `plot` and `look` read it, and `diagnose` in an evidence folder"
     )
 

@@ -18,7 +18,7 @@ from diagnosis.gap.problem import Point, Problem
 from diagnosis.hypotheses.axis_waves import axis_waves
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.model.rig import Effects, Roughness
-from diagnosis.model.sensor_chain import Chain, sensed
+from diagnosis.model.sensor_chain import SensorChain, sensed
 from diagnosis.model.true_force import relative, true_commands
 from diagnosis.synthetic.folder import Case
 from tests.made_evidence import made_evidence
@@ -84,7 +84,7 @@ def test_the_true_force_is_what_the_sensor_made_the_measured_one_of(
     plain: tuple[Problem, list[Prepared], Point], effects: Effects
 ) -> None:
     run = plain[1][0]
-    chain = relative(Chain(force_delay_s=5e-4, position_delay_s=2e-4))
+    chain = relative(SensorChain(force_delay_s=5e-4, position_delay_s=2e-4))
     smooth = 40.0 * np.sin(2.0 * np.pi * 2.0 * np.arange(len(run.commands.drive)) * 1e-3)
     commands = true_commands(run.commands._replace(drive=smooth), effects, chain)
     signals = dict.fromkeys(run.signals | {"drive_position_m": 0, "mass_accel_mps2": 0, "base_accel_mps2": 0}, smooth)

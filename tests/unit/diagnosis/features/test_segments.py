@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis.evidence.folder import Run
+from diagnosis.evidence.folder import MeasuredRun
 from diagnosis.features.segments import commands_of
 from diagnosis.report import assemble
 from tests.prepared import prepared
@@ -33,7 +33,7 @@ def read(rig, moved_mps: np.ndarray, stated_mps: float | None = None):
     noise_m = 0.3e-6 * np.random.default_rng(1).standard_normal(BLOCKS)
     position_m = np.cumsum(moved_mps) * 1e-3 + noise_m
     t_s = (np.arange(BLOCKS) + 0.5) * 1e-3
-    run = Run("run-01.csv", t_s, {"drive_position_m": position_m}, {}, stated_mps, False)
+    run = MeasuredRun("run-01.csv", t_s, {"drive_position_m": position_m}, {}, stated_mps, False)
     return commands_of(run, rig, {"drive_position_m": position_m})
 
 
@@ -74,7 +74,7 @@ def test_a_stop_has_no_velocity(rig, noise_m, zero_m):
     for speed_mps, segments in ((1e-3, [1e-3, 0.0]), (0.0, [0.0])):
         position_m = zero_m + speed_mps * np.minimum(np.arange(BLOCKS) * 1e-3, 3.0)
         position_m = position_m + noise_m * random.standard_normal(BLOCKS)
-        run = Run("run-01.csv", np.arange(BLOCKS) * 1e-3, {"drive_position_m": position_m}, {}, None, False)
+        run = MeasuredRun("run-01.csv", np.arange(BLOCKS) * 1e-3, {"drive_position_m": position_m}, {}, None, False)
         found = commands_of(run, rig, {"drive_position_m": position_m}).segments
         assert [one.drive_velocity_mps for one in found] == pytest.approx(segments, rel=2e-3, abs=0.0)
 
@@ -88,7 +88,7 @@ def test_what_changes_too_soon_is_counted(rig):
         "vibration_amplitude_m": np.full(BLOCKS, 1e-8),
     }
     position_m = 1e-3 * t_s
-    run = Run("run-01.csv", t_s, {"drive_position_m": position_m, **sweep}, {}, 1e-3, False)
+    run = MeasuredRun("run-01.csv", t_s, {"drive_position_m": position_m, **sweep}, {}, 1e-3, False)
     found = commands_of(run, rig, {"drive_position_m": position_m})
     assert found.changing_s == pytest.approx(4.0, abs=0.01)
     assert len(found.segments) == 1

@@ -8,7 +8,7 @@ import pytest
 
 from diagnosis.latent.answer import LatentSignal, latent_of, signal_of
 from diagnosis.latent.components import DIRECTION, FORCE_PLACE, PLACE, SCATTER
-from diagnosis.latent.rows import BREAKAWAY, MOST_ROWS, SLIDING, Rows
+from diagnosis.latent.rows import BREAKAWAY, MOST_ROWS, SLIDING, ExcessRows
 from diagnosis.latent.shares import LatentShare
 from diagnosis.report.latent_block import latent_line, latent_rows
 from diagnosis.verdict.by_latent import named_by, with_latent
@@ -18,27 +18,27 @@ from tests.unit.diagnosis.relations.kinematic import rig, runs
 ROWS = 90
 
 
-def one_pass(wave_N: float) -> Rows:
+def one_pass(wave_N: float) -> ExcessRows:
     """Breakaways along a track, the last third held out."""
     random = np.random.default_rng(3)
     place = 1e-4 * np.arange(ROWS)
     excess_N = wave_N * np.sin(2.0 * np.pi * place / 2.5e-3) + random.normal(0.0, 0.1, ROWS)
     held_out = np.arange(ROWS) >= 60
     ones = np.ones(ROWS)
-    return Rows(
+    return ExcessRows(
         BREAKAWAY, excess_N, ones, place, 0.1 * np.arange(ROWS), 1e-3 * ones, held_out.astype(int), held_out,
         None, None, None, 0.02,
     )  # fmt: skip
 
 
-def to_and_fro(push_N: float, along_N: float) -> Rows:
+def to_and_fro(push_N: float, along_N: float) -> ExcessRows:
     """Sliding of an axis with a constant push, and a force that goes with the place whatever the direction."""
     random = np.random.default_rng(4)
     phase = 2.0 * np.pi * 6.0 * np.arange(ROWS) / ROWS
     place, sign = 0.1 * np.sin(phase), np.where(np.cos(phase) >= 0.0, 1.0, -1.0)
     excess_N = sign * (push_N + along_N * np.sin(60.0 * place)) + random.normal(0.0, 0.1, ROWS)
     held_out = np.arange(ROWS) >= 60
-    return Rows(
+    return ExcessRows(
         SLIDING, excess_N, sign, place, 0.1 * np.arange(ROWS), 0.1 * np.abs(np.cos(phase)) + 1e-3, held_out.astype(int),
         held_out, None, None, None, 0.02,
     )  # fmt: skip

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagnosis.look.look import Known, Look, look
+from diagnosis.look.look import LookResult, RecordFacts, look
 from diagnosis.look.turns import long_turns, turns
 from diagnosis.look.words import cannot_tell
 from plant.config import RigConfig
@@ -35,7 +35,9 @@ def test_slips_that_last_longer_than_their_sticks_are_counted(
     noise: float, stiffness: float, fall_s: float, drop: float
 ):
     t_s, force_N, period_s = saw(stiffness, fall_s, drop)
-    seen = look(t_s, force_N + noise * drop * np.random.default_rng(2).standard_normal(len(t_s)), None, Known(1.1e-3))
+    seen = look(
+        t_s, force_N + noise * drop * np.random.default_rng(2).standard_normal(len(t_s)), None, RecordFacts(1.1e-3)
+    )
     assert seen is not None
     assert abs(seen.slips - 6.0 / period_s) <= 1.0
     numbers = seen.numbers
@@ -53,7 +55,7 @@ def test_times_of_slips_and_sticks_are_no_longer_in_noise():
                 random = np.random.default_rng(seed)
                 t_s, force_N, period_s = saw(1e4, fall_s, 10.0)
                 t_s += random.uniform(0.0, 1e-4)
-                seen = look(t_s, force_N + noise * 10.0 * random.standard_normal(len(t_s)), None, Known(1.1e-3))
+                seen = look(t_s, force_N + noise * 10.0 * random.standard_normal(len(t_s)), None, RecordFacts(1.1e-3))
                 assert seen is not None
                 slip, dwell = seen.numbers["slip_s"], seen.numbers["dwell_s"]
                 assert slip.value == pytest.approx(fall_s, rel=0.12 if noise < 0.02 else 0.6)
@@ -64,7 +66,7 @@ def test_times_of_slips_and_sticks_are_no_longer_in_noise():
 @pytest.mark.parametrize("fall_s", [2e-5, 1e-4, 3e-4, 6e-4])
 def test_a_slip_between_two_samples_may_be_as_short_as_nothing(fall_s: float):
     t_s, force_N, period_s = saw(1e4, fall_s, 10.0)
-    seen = look(t_s, force_N, None, Known(1.1e-3))
+    seen = look(t_s, force_N, None, RecordFacts(1.1e-3))
     assert seen is not None
     slip, dwell = seen.numbers["slip_s"], seen.numbers["dwell_s"]
     assert slip.low <= fall_s <= slip.high
@@ -79,7 +81,7 @@ def test_the_numbers_of_a_tribometer_are_within_a_percent(pair: str, every: int,
     t_s = made.t_s[::every]
     force_N = made.drive_force_N[::every] + noise_N * np.random.default_rng(4).standard_normal(len(t_s))
     speed_mps = rig.drive.profile[0][1]
-    seen = look(t_s, force_N, None, Known(speed_mps, load_N=94.5))
+    seen = look(t_s, force_N, None, RecordFacts(speed_mps, load_N=94.5))
     assert seen is not None
     truth = {
         "static_force_N": rig.contact.static_force_N,
@@ -130,18 +132,18 @@ def test_both_directions_and_a_gap_count_as_parts() -> None:
     t_s, force_N, period_s = saw(11700.0, 0.036, 5.8)
     there_and_back = np.concatenate([force_N, -force_N])
     times = np.concatenate([t_s, t_s + 6.0])
-    seen = look(times, there_and_back, None, Known(1.1e-3))
+    seen = look(times, there_and_back, None, RecordFacts(1.1e-3))
     assert seen is not None
     assert abs(seen.slips - 12.0 / period_s) <= 2.0
     assert {cycle.sign for cycle in seen.cycles} == {1.0, -1.0}
     gone = (t_s > 2.0) & (t_s < 4.0)
-    gap = look(t_s[~gone], force_N[~gone], None, Known(1.1e-3))
+    gap = look(t_s[~gone], force_N[~gone], None, RecordFacts(1.1e-3))
     assert gap is not None
     assert gap.seconds == pytest.approx(4.0, abs=0.01)
     assert gap.numbers["period_s"].value == pytest.approx(period_s, rel=1e-3)
 
 
-def ageing(speeds_mps: tuple[float, ...], halts_s: tuple[float, ...]) -> Look:
+def ageing(speeds_mps: tuple[float, ...], halts_s: tuple[float, ...]) -> LookResult:
     """Slips at each speed, after each halt, with a breakaway force that rises by 1 N a decade of stick time."""
     stiffness, pieces, way, place = 10000.0, [], [], 0.0
     for speed_mps in speeds_mps:
@@ -177,7 +179,7 @@ def test_one_stick_that_is_cut_short_shows_no_dependence_on_its_time() -> None:
     """Seven sticks to 16 N, and an eighth that a knock ends at 13 N."""
     tops = [*[16.0] * 7, 13.0, 12.0]
     force_N = np.concatenate([np.linspace(10.0, top, round(800 * (top - 10.0) / 6.0)) for top in tops])
-    seen = look(1e-3 * np.arange(len(force_N)), force_N, None, Known(1e-3))
+    seen = look(1e-3 * np.arange(len(force_N)), force_N, None, RecordFacts(1e-3))
     assert seen is not None
     assert len(seen.cycles) == 8
     assert "dwell_N_per_decade" not in seen.numbers
@@ -189,7 +191,9 @@ def test_a_drive_that_stands_has_no_speed() -> None:
     t_s = np.arange(0, 30, 1e-3)
     rng = np.random.default_rng(4)
     way_m = np.cumsum(np.where(t_s < 10.0, 1e-3, np.where(t_s < 20.0, 2e-4, 0.0))) * 1e-3
-    seen = look(t_s, 10.0 + 0.05 * rng.standard_normal(len(t_s)), way_m + 1e-6 * rng.standard_normal(len(t_s)), Known())
+    seen = look(
+        t_s, 10.0 + 0.05 * rng.standard_normal(len(t_s)), way_m + 1e-6 * rng.standard_normal(len(t_s)), RecordFacts()
+    )
     assert seen is not None
     assert [round(1e3 * one.speed_mps, 1) for one in seen.at_speeds] == [0.2, 1.0]
 
@@ -212,7 +216,7 @@ def test_a_drift_and_several_speeds_are_told_and_an_even_record_tells_neither() 
             rise = round((top - 12.0) / (11_700.0 * speed_mps) * 2e3)
             pieces += [np.linspace(12.0, top, rise), np.linspace(top, 12.0, 40)[1:-1]]
         force_N = np.concatenate(pieces) + 0.01 * np.random.default_rng(3).standard_normal(sum(map(len, pieces)))
-        seen = look(np.arange(len(force_N)) / 2e3, force_N, None, Known(1e-3))
+        seen = look(np.arange(len(force_N)) / 2e3, force_N, None, RecordFacts(1e-3))
         assert seen is not None
         return "; ".join(cannot_tell(seen))
 
@@ -232,7 +236,7 @@ def test_what_viscous_damping_takes_from_a_fall_is_not_taken_for_friction(decay:
     swing = np.exp(-decay * phase.clip(0.0)) * (np.cos(phase) + decay * np.sin(phase))
     share = np.where(phase < 0.0, end + (1.0 - end) * (t_s % 1.0) / 0.97, swing)
     force_N = 20.0 + 10.0 * share + 0.05 * np.random.default_rng(3).standard_normal(len(t_s))
-    seen = look(t_s, force_N, None, Known(1e-3))
+    seen = look(t_s, force_N, None, RecordFacts(1e-3))
     assert seen is not None
     found = seen.numbers["kinetic_force_N"]
     assert found.value == pytest.approx(20.0, rel=0.006)

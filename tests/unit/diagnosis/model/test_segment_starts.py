@@ -5,7 +5,7 @@ import pytest
 
 from diagnosis.features.feature import scales_of
 from diagnosis.features.grid import BLOCK_S
-from diagnosis.features.segments import Commands, Segment
+from diagnosis.features.segments import CommandedRun, Segment
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.hypotheses.trials import trials
@@ -78,7 +78,7 @@ def test_an_age_counts_from_the_last_slip_under_whichever_drive(ladder, sign):
         Segment(400, 1000, sign * 5e-3, 0.0, 0.0, slips=3),
         Segment(1100, 6000, sign * 5e-4, 0.0, 0.0, slips=1),
     )
-    commands = Commands(drive, np.zeros(6000), np.zeros(6000), segments)
+    commands = CommandedRun(drive, np.zeros(6000), np.zeros(6000), segments)
     first, second = entries_of({"drive_force_N": force_N}, commands, scales_of(evidence.rig))
     assert (first.age_s, second.age_s) == pytest.approx((0.02, 0.12))
     assert not first.from_before

@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 
 from diagnosis.evidence.manifest import RigTable
-from diagnosis.features.noise import Noise
-from diagnosis.features.segments import Commands, Segment
+from diagnosis.features.noise import RunNoise
+from diagnosis.features.segments import CommandedRun, Segment
 from diagnosis.gap.prepare import Prepared
 from diagnosis.model.rig import Start
 
@@ -68,8 +68,8 @@ def _run(number: int, holdout: bool, cause: Callable[[int, Signals], None] | Non
         Segment(100, int(np.argmax(on)), speed_mps, 0.0, 0.0),
         Segment(int(np.argmax(on)) + 100, blocks, speed_mps, float(frequency_Hz[-1]), 2e-8),
     )
-    commands = Commands(np.full(blocks, speed_mps), frequency_Hz, np.where(on, 2e-8, 0.0), segments)
-    noise = Noise({}, {"base_shake_mps2": NOISE_mps2}, 5e-3)
+    commands = CommandedRun(np.full(blocks, speed_mps), frequency_Hz, np.where(on, 2e-8, 0.0), segments)
+    noise = RunNoise({}, {"base_shake_mps2": NOISE_mps2}, 5e-3)
     return Prepared(
         f"run-{number + 1:02d}.csv", holdout, signals, commands, Start(10.0, 0.01), (), 8.0 * number, noise, {}
     )

@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from diagnosis.relations.products import Noise, noise_of, products_of
+from diagnosis.relations.products import BandNoise, noise_of, products_of
 from diagnosis.relations.relation import Relation, term
 from diagnosis.relations.search import evidences, ranked, reduced
 from diagnosis.relations.shares import model_columns
@@ -29,7 +29,7 @@ def made(noise: float = 1.0, seed: int = 3) -> Relation:
 def test_the_evidence_of_a_set_is_the_marginal_likelihood_of_all_samples():
     relation = made()
     products = products_of(relation)
-    noise = Noise(np.ones(products.values.shape[1]))
+    noise = BandNoise(np.ones(products.values.shape[1]))
     data = reduced(products, [0], noise, relation.effects)
 
     # the lines of the mains are left out: here they are projected out of the dense covariance too
@@ -60,7 +60,7 @@ def test_a_coefficient_of_a_forbidden_sign_has_no_evidence():
     forbidden = relation.effects[0]._replace(sign=-1)
     relation = relation._replace(effects=(forbidden, *relation.effects[1:]))
     products = products_of(relation)
-    data = reduced(products, [0], Noise(np.ones(products.values.shape[1])), relation.effects)
+    data = reduced(products, [0], BandNoise(np.ones(products.values.shape[1])), relation.effects)
     assert evidences(data, [(0,)])[0] == -math.inf
 
 

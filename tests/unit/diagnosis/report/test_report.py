@@ -40,7 +40,7 @@ def test_the_answer_comes_first_and_everything_is_there_in_order(tmp_path):
         "Which explanation?",
         "gap 81 µm (90 %: 76 to 86)",
         "Below 1.5 % each: force-sensor-lag",
-        "Cannot be told apart with these runs: force-sensor-delay, drive-damping",
+        "These runs cannot separate: force-sensor-delay, drive-damping",
         "How far is the model off?",
         "closes 98 % of the gap that the baseline leaves open (90 %: 95 % to 100 %)",
         "flexible residual",
@@ -62,7 +62,7 @@ def test_the_answer_comes_first_and_everything_is_there_in_order(tmp_path):
         "What to measure next",
         "Reverse the drive",
         "differ by 4.2 standard deviations",
-        "What is wrong or missing in the data",
+        "Faults and gaps in the data",
         "12 samples at 20 N were left out",
         "Words",
     ]
@@ -201,7 +201,7 @@ def test_what_scatters_at_random_says_what_else_would(form, said):
 def test_words_fit_what_the_held_out_runs_say():
     made = made_up.diagnosis()
     far = made._replace(verdict="no-gap", effects=(), gap=made.gap._replace(retuned=3.4))
-    assert "these runs cannot tell, the held-out runs are 3.4 noise floors off" in in_words.headline(far)
+    assert "the fitted runs show no gap, but the held-out runs are 3.4 noise floors off" in in_words.headline(far)
     worse = made._replace(gap=made.gap._replace(retuned=2.9, with_effect=3.6, shrinkage=-0.37))
     assert "the gap grows from 2.9 to 3.6 noise floors" in " ".join(summary(worse))
     two = ("coulomb-level", "drive-backlash")
@@ -242,7 +242,7 @@ def test_runs_of_two_folders_keep_their_names_apart():
 def test_runs_in_which_nothing_moves_are_in_the_summary():
     findings = tuple(Finding("still", f"run-0{i}.csv: drive_position_m", "0 m in all") for i in (1, 3))
     told = " ".join(summary(made_up.diagnosis()._replace(verdict="no-gap", effects=(), findings=findings)))
-    assert "In run-01.csv, run-03.csv the drive stands still: friction and drive are not tested there." in told
+    assert "In run-01.csv, run-03.csv the drive does not move: friction and drive are not tested there." in told
 
 
 def test_what_vibrates_as_no_model_does_is_in_the_summary_with_its_runs():
@@ -299,10 +299,11 @@ def test_a_name_that_the_held_out_runs_do_not_test_says_so(tmp_path):
     made = made_up.diagnosis()
     untested = made._replace(gap=made.gap._replace(retuned=1.0, with_effect=1.0, shrinkage=None, interval_90=None))
     assert any(
-        "held out, there is no gap to close: new data have not tested the name" in one for one in summary(untested)
+        "held out, the baseline leaves no gap to close: new data have not tested the name" in one
+        for one in summary(untested)
     )
     page = text_of(page_of(untested, tmp_path))
-    assert "There is no gap to close on these runs: they do not test what is named." in page
+    assert "There is no gap to close on these runs: they do not test the named effect." in page
     assert "Nothing is named" not in page
 
 
@@ -312,7 +313,7 @@ def test_no_more_than_the_whole_gap_is_said_to_be_closed_and_json_has_the_number
     gap = made.gap._replace(shrinkage=1.06, interval_90=(0.43, 1.76), compared=compared)
     made = made._replace(gap=gap)
     told = summary(made)
-    assert any("100 % of what could be closed (90 %: 43 % to 100 %)" in sentence for sentence in told)
+    assert any("100 % of the part that could be closed (90 %: 43 % to 100 %)" in sentence for sentence in told)
     page = report_page(made, "rig")
     for text in (page, "\n".join(told), "\n".join(diagnose_output.in_words(made._replace(summary=told)))):
         assert "106 %" not in text

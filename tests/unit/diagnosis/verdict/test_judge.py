@@ -5,13 +5,13 @@ import pytest
 
 from diagnosis.diagnose import with_vibration_findings
 from diagnosis.evidence.exciter_harmonics import Distortion
-from diagnosis.evidence.folder import Run
+from diagnosis.evidence.folder import MeasuredRun
 from diagnosis.evidence.force_pickup import PickUp
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.random_friction import Scattered, is_random
 from diagnosis.hypotheses.hypothesis import NOTHING, Coordinate, Hypothesis
 from diagnosis.report.assemble import compared_fits
-from diagnosis.verdict.judge import JITTER, although_outside, doubted, is_of_one_place, judge, of_another_place
+from diagnosis.verdict.judge import JITTER, doubted, is_of_one_place, judge, of_another_place, with_outside
 
 FEATURES = 100
 NUISANCES = 2
@@ -42,25 +42,25 @@ def test_an_effect_that_takes_most_is_named():
 
 def test_what_shows_elsewhere_turns_no_gap_into_unexplained_and_nothing_else():
     nothing = judge(fit(50.0), [fit(48.0, "coulomb-level")], [], EXPECTED)
-    outside = although_outside(nothing)
+    outside = with_outside(nothing)
     assert (outside.kind, outside.outside) == ("unexplained", True)
     assert next(iter(outside.probabilities)) == "unexplained"
     assert sum(outside.probabilities.values()) == pytest.approx(1.0)
     effect = judge(fit(400.0), [fit(50.0, "coulomb-level")], [], EXPECTED)
-    assert although_outside(effect) == effect
+    assert with_outside(effect) == effect
 
 
 def test_what_shows_elsewhere_takes_the_name_of_an_effect_that_imitates_it():
     effect = judge(fit(400.0), [fit(50.0, "piezo-resonance")], [], EXPECTED)
-    assert although_outside(effect, frozenset({"piezo-sag"})) == effect
-    outside = although_outside(effect, frozenset({"piezo-sag", "piezo-resonance"}))
+    assert with_outside(effect, frozenset({"piezo-sag"})) == effect
+    outside = with_outside(effect, frozenset({"piezo-sag", "piezo-resonance"}))
     assert (outside.kind, outside.named, outside.runner_up) == ("unexplained", None, effect.named)
     assert outside.probabilities["unexplained"] == effect.probabilities["piezo-resonance"]
     assert sum(outside.probabilities.values()) == pytest.approx(1.0)
 
 
 def test_harmonics_take_a_piezo_s_name_and_a_pick_up_takes_none():
-    plain = Run("run-01.csv", np.zeros(2), {}, {}, None, False)
+    plain = MeasuredRun("run-01.csv", np.zeros(2), {}, {}, None, False)
     picked_up = plain._replace(pick_up=PickUp(2500.0, 0.3, 1e-5, 0.1))
     distorted = plain._replace(distortion=Distortion(2500.0, 2.0, 0.1))
     effect = judge(fit(400.0), [fit(50.0, "piezo-resonance")], [], EXPECTED)

@@ -1,0 +1,6 @@
+"""`python -m bench`."""
+
+from bench.app import app
+from cockpit.entry import main
+
+main(app)

@@ -1,0 +1,126 @@
+"""`python -m bench blind ...`: diagnose a set of rigs with sealed answers without them, open and score it."""
+
+import time
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+import typer
+
+from bridge.files import refuse_to_lose
+from cockpit.commands.as_json.option import Json, JsonGroup, carry_out, tell
+from cockpit.run.child_process import end_like_ctrl_c
+from cockpit.run.writable import PAGE, check_output, writing
+
+if TYPE_CHECKING:
+    from bench.blind.opening import OpenedSet
+
+blind_app = typer.Typer(
+    cls=JsonGroup,
+    help="How good is the diagnosis? Sealed cases, diagnosed without the answers, scored.",
+    no_args_is_help=True,
+)
+SetArgument = Annotated[Path, typer.Argument(metavar="DIR", help="A set that `python -m tests.blind make` made.")]
+Jobs = Annotated[int | None, typer.Option(min=1, help="Processes to use; all cores if not given.")]
+Key = Annotated[Path, typer.Option(help="The key file with the answers, outside DIR.")]
+Report = Annotated[Path | None, typer.Option(metavar="FILE", help="Write a report, one .html file.")]
+
+
+class SetDone(NamedTuple):
+    """A set of which every case has a result."""
+
+    folder: str
+    diagnosed: int  # cases that had none before
+
+
+@blind_app.command("run")
+def blind_run(folder: SetArgument, jobs: Jobs = None, as_json: Json = None) -> None:
+    """Diagnose every case that has no result yet, without the key. It can be stopped and taken up again."""
+
+    def work() -> None:
+        from joblib import cpu_count
+
+        from bench.blind.running import missing, run
+        from cockpit.commands.diagnose_output import in_a_line, watched
+
+        end_like_ctrl_c()
+        todo = len(missing(folder))
+        began = time.monotonic()
+        with writing(), watched() as progress, closing(run(folder, jobs or cpu_count())) as outcomes:
+            for done, outcome in enumerate(outcomes, 1):
+                left_min = (time.monotonic() - began) / done * (todo - done) / 60.0
+                progress(f"{done} of {todo}, {left_min:.0f} min left: {in_a_line(outcome)}", done / todo)
+        words = [f"all cases have results    {folder}", f"next    python -m bench blind score {folder} --key KEY"]
+        tell(as_json, SetDone(str(folder), todo), words)
+
+    carry_out(work, as_json)
+
+
+@blind_app.command("score")
+def blind_score(
+    folder: SetArgument,
+    key: Key,
+    as_json: Json = None,
+    report: Report = None,
+    baselines: Annotated[
+        bool, typer.Option("--baselines", help="Oracle and tree ensemble too: half a minute a case and core.")
+    ] = False,
+    partial: Annotated[bool, typer.Option("--partial", help="Score although results are missing.")] = False,
+    jobs: Jobs = None,
+) -> None:
+    """Check every hash, open the answers, score. A set that was opened once is development data from then on."""
+
+    def work() -> None:
+        from joblib import cpu_count
+
+        from bench.blind.opening import open_set, with_baselines
+        from cockpit.commands.diagnose_output import watched
+
+        end_like_ctrl_c()
+        for option, path in (("--json", as_json), ("--report", report)):
+            refuse_to_lose([key], "the key", option, path)
+        if report is not None:
+            check_output("--report", report, PAGE)
+        with writing(), watched() as progress:
+            opened_set = open_set(folder, key, partial)
+            if baselines:
+                opened_set = with_baselines(opened_set, folder, jobs or cpu_count(), progress)
+        _told(opened_set, folder.name, as_json, report, [])
+
+    carry_out(work, as_json)
+
+
+@blind_app.command("pool")
+def blind_pool(
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE...", help="Files that `blind score --json` wrote, one a set.")
+    ],
+    as_json: Json = None,
+    report: Report = None,
+) -> None:
+    """Score several opened sets of one version together, or one again, from the files of their scores."""
+
+    def work() -> None:
+        from bench.blind.pooling import pooled
+
+        for option, path in (("--json", as_json), ("--report", report)):
+            refuse_to_lose(files, "one of the files to read", option, path)
+        if report is not None:
+            check_output("--report", report, PAGE)
+        _told(pooled(files), ", ".join(path.stem for path in files), as_json, report, files)
+
+    carry_out(work, as_json)
+
+
+def _told(opened_set: "OpenedSet", name: str, as_json: Path | None, report: Path | None, files: list[Path]) -> None:
+    from bench.blind.opening import scored
+    from bench.blind.pooling import kept_scores
+    from bench.blind.report import write_report
+    from bench.blind.table import table
+
+    methods = scored(opened_set)
+    with writing():  # before printing, as a closed pipe ends the program there
+        if report is not None:
+            write_report(methods, opened_set.sealed, name, report, files)
+    words = [table(methods, opened_set.sealed), *(["", f"report     {report}"] if report is not None else [])]
+    tell(as_json, kept_scores(opened_set, methods), words)

@@ -1,0 +1,112 @@
+"""One opened case: the true answer, and the result of a method."""
+
+from typing import Any, NamedTuple
+
+OTHER_NAMES = ("none", "unexplained")
+_MOST = 0.5  # share of the held-out gap from which "partly" counts as a name, not as "unexplained"
+# the result of a case that ended in a fault: no answer, so every score counts the case as wrong
+_NOTHING_SAID: dict[str, Any] = {
+    "verdict": "fault",
+    "effects": [],
+    "candidates": [],
+    "not_distinguishable": [],
+    "where": [],
+    "gap": {},
+    "next_experiment": {},
+}
+
+
+class Opened(NamedTuple):
+    """Answer and result of one case; `said` has some or all keys of the format `diagnosis/2`."""
+
+    name: str
+    answer: dict[str, Any]
+    said: dict[str, Any]
+
+    @property
+    def stratum(self) -> str:
+        """The kind of the case, such as `one-effect`."""
+        return self.answer["stratum"]
+
+    @property
+    def truth(self) -> frozenset[str]:
+        """Names of the effects that the rig of the case has."""
+        return frozenset(effect["name"] for effect in self.answer["effects"])
+
+    @property
+    def detectability(self) -> float:
+        """Size of the weakest effect, in detection limits; 0 without effects."""
+        return min((effect["detectability"] or 0.0 for effect in self.answer["effects"]), default=0.0)
+
+    @property
+    def right_candidate(self) -> str | None:
+        """The candidate that should have the whole probability; None where several are right or the right one is unknown."""
+        if self.stratum in {"indistinguishable", "real-log"}:
+            return None
+        if self.answer["verdict"] == "effect":
+            return next(iter(self.truth)) if len(self.truth) == 1 else None
+        return "none" if self.answer["verdict"] == "no-gap" else "unexplained"
+
+    @property
+    def verdict(self) -> str:
+        """The verdict of the result: effect, partly, no-gap, unexplained, or fault."""
+        return self.said["verdict"]
+
+    @property
+    def told_outside(self) -> bool:
+        """Whether the result reports that no known effect accounts for most of the gap."""
+        if self.verdict != "partly":
+            return self.verdict == "unexplained"
+        share = self.said["gap"].get("shrinkage")
+        return share is None or share < _MOST
+
+    @property
+    def named(self) -> frozenset[str]:
+        """Effects that the result names."""
+        return frozenset(self.said["effects"])
+
+    @property
+    def group(self) -> frozenset[str]:
+        """The named effects, and all effects that the result cannot separate from one of them."""
+        names = set(self.named)
+        for alike in self.said["not_distinguishable"]:
+            if self.named & set(alike):
+                names |= set(alike)
+        return frozenset(names)
+
+    @property
+    def ranked(self) -> list[tuple[str, float]]:
+        """Candidates and their probabilities, the largest probability first."""
+        candidates = [(row["effect"], float(row["probability"] or 0.0)) for row in self.said["candidates"]]
+        return sorted(candidates, key=lambda pair: -pair[1])
+
+    def probability(self, name: str) -> float:
+        """Probability of one candidate; 0 where the result does not list it."""
+        return dict(self.ranked).get(name, 0.0)
+
+    @property
+    def set_f1(self) -> float:
+        """The F1 score of the named effects against the true effects; 1 where both are empty."""
+        together = len(self.named) + len(self.truth)
+        return 2.0 * len(self.named & self.truth) / together if together else 1.0
+
+    def row(self) -> dict[str, Any]:
+        """The case as a row of `--json`: the true effects, and the result."""
+        keys = ("name", "formula", "detectability")
+        return {
+            "case": self.name,
+            "kind": self.stratum,
+            "effects": [{key: effect.get(key) for key in keys} for effect in self.answer["effects"]],
+            "channels_left_out": self.answer["leave_out"],
+            "verdict": self.verdict,
+            "named": sorted(self.named),
+            "group": sorted(self.group),
+            "first": [{"effect": name, "probability": probability} for name, probability in self.ranked[:3]],
+            "shrinkage": self.said["gap"].get("shrinkage"),
+            "gap_left": self.said["gap"].get("with_effect"),
+        }
+
+
+def opened(name: str, answer: dict[str, Any], result: dict[str, Any]) -> Opened:
+    """A case from its answer and the content of its result file."""
+    return Opened(name, answer, _NOTHING_SAID | result if "fault" not in result else dict(_NOTHING_SAID))

@@ -1,0 +1,59 @@
+"""CPU time of a controller step over the CPU time of a simulated block of the paper's rig."""
+
+import time
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.kernel import kernel
+from bridge.wire.messages import COMMAND, TRACE
+from cockpit.run.closed_loop import ClosedLoop
+from cockpit.run.scenario import load_scenario
+from controller.codes import BLOCK
+from controller.core import step
+from controller.records import build as controller_records
+from plant.records import build as plant_records
+from plant.simulate import run_blocks
+
+_BLOCKS = 4000  # of the paper's rig, vibrated for most of them
+_TURNS = 25
+
+
+@kernel
+def _steps(
+    params: npt.NDArray[Any],
+    state: npt.NDArray[Any],
+    sensors: npt.NDArray[Any],
+    command: npt.NDArray[Any],
+    trace: npt.NDArray[Any],
+) -> None:
+    for i in range(sensors.shape[0]):
+        step(params, state, sensors[i : i + 1], BLOCK, 0, sensors[i].t_ns, command, trace)
+
+
+def step_cost_ratio() -> float:
+    """Time of a step over time of a block of a vibrated rig, the least of several runs of each in turns."""
+    scenario = load_scenario("from-the-start", [])
+    loop = ClosedLoop(scenario.rig, scenario.seed, scenario.controller, scenario.arm)
+    sensors = loop.advance(_BLOCKS).sensors
+    samples = scenario.rig.solver.samples_per_block
+    drive_mps, frequency_Hz, amplitude_m = np.full(_BLOCKS, 5e-4), np.full(_BLOCKS, 2600.0), np.full(_BLOCKS, 3.7e-8)
+    analogue, truth = np.empty((5, _BLOCKS * samples)), np.empty((6, _BLOCKS * samples))
+
+    def of_steps() -> float:
+        params, state = controller_records(scenario.controller)
+        begun_s = time.perf_counter()
+        _steps(params, state, sensors, COMMAND.blank(), TRACE.blank())
+        return time.perf_counter() - begun_s
+
+    def of_blocks() -> float:
+        params, state = plant_records(scenario.rig)
+        begun_s = time.perf_counter()
+        run_blocks(params, state, drive_mps, frequency_Hz, amplitude_m, analogue, truth)
+        return time.perf_counter() - begun_s
+
+    of_steps()  # compiled here
+    of_blocks()
+    turns = [(of_steps(), of_blocks()) for _ in range(_TURNS)]
+    return min(steps_s for steps_s, _ in turns) / min(blocks_s for _, blocks_s in turns)

@@ -1,0 +1,104 @@
+"""The bank with every subject, in processes; the result does not depend on their number."""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple, TypeVar
+
+from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableType]
+
+from bench.control import rules
+from bench.control.figures import Figures, figures, refused
+from bench.control.least import Least, least
+from bench.control.oracle import ask
+from bench.control.run import Curves, Judged, Subject, judge, wrong_from
+from bench.control.scenario import BankScenario
+from bridge.faults import Fault
+from bridge.kernel_cache import compile_once
+
+R = TypeVar("R")
+_ASKED = {"helped", "cannot-help"}  # for these the oracle shows whether any controller could do better
+
+
+class Done(NamedTuple):
+    """One run of the bank."""
+
+    figures: Figures
+    judged: Judged | None  # with curves, of a run of the controller that fails or slips
+    oracle: Curves | None = None  # of the oracle when the run first slips; None where it never does
+    first_s: tuple[float, float] | None = None  # when that slip or surge begins, and how long it lasts
+
+
+def warm_up(scenario: BankScenario) -> None:
+    """Compile or load the kernels before the processes begin, each of which would."""
+    short = scenario._replace(table=scenario.table | {"duration_s": 2.0 * scenario.rig.solver.block_s})
+    compile_once("the bench of the controller", lambda: judge(short, Subject(rules.NONE)))
+
+
+def run_one(scenario: BankScenario, rule: int) -> Done:
+    """One scenario with one subject; a scenario that the controller refuses is a failure, not a fault."""
+    subject = Subject(rule)
+    by_controller = rule == rules.CONTROLLER
+    try:
+        judged = judge(scenario, subject)
+    except Fault as fault:
+        if not by_controller:
+            raise
+        return Done(refused(scenario, subject.name, fault.line), None)
+    result = figures(scenario, subject.name, judged, by_controller)
+    if by_controller and result.expect in _ASKED and result.slips_from_enabling:
+        return _beside_oracle(scenario, result, judged)
+    return Done(result, judged if result.failures else None)
+
+
+def _beside_oracle(scenario: BankScenario, result: Figures, judged: Judged) -> Done:
+    """A run with slips or surges, and whether any controller could be without: those that count, else all from enabling on."""
+    fails = result.expect == "helped" and result.slips + result.surges > 0
+    from_s = result.counted_from_s if fails else scenario.enabled_from_s
+    wrong = judged.events[wrong_from(judged.events, from_s)]
+    first_s = float(wrong[0, 1]), float(wrong[0, 2] - wrong[0, 1])
+    oracle, curves = ask(scenario, len(wrong), from_s, first_s[0])
+    verdicts = [oracle.in_words(len(wrong))] if fails else []
+    failures = [*result.failures[:1], *verdicts, *result.failures[1:]]  # the first counts the slips
+    return Done(result._replace(failures=failures, oracle=oracle), judged, curves, first_s)
+
+
+def run_bank(
+    bank: Sequence[BankScenario], subjects: Sequence[int], jobs: int, progress: Callable[[float, str], None]
+) -> list[Done]:
+    """All runs, scenario by scenario with every subject of it.
+
+    Args:
+        subjects: rules of `bench.control.rules`.
+        progress: called with the share done and a line on the last run.
+
+    """
+    plan = [
+        (scenario, rule) for scenario in bank for rule in subjects if rule == rules.CONTROLLER or scenario.ever_enabled
+    ]
+    length_s = sum(scenario.duration_s for scenario, _ in plan)
+    done: list[Done] = []
+    spent_s = 0.0
+    for run, (scenario, _) in zip(_each(run_one, plan, jobs), plan, strict=True):
+        done.append(run)
+        spent_s += scenario.duration_s
+        line = f"{run.figures.scenario}, {run.figures.subject}"
+        progress(spent_s / length_s, line + (": " + "; ".join(run.figures.failures) if run.figures.failures else ""))
+    return done
+
+
+def find_least(bank: Sequence[BankScenario], jobs: int, progress: Callable[[float, str], None]) -> dict[str, Least]:
+    """The least constant ratios of scenarios, by name."""
+    ratios: dict[str, Least] = {}
+    for run, ratio in zip(bank, _each(least, [(run,) for run in bank], jobs), strict=True):
+        ratios[run.name] = ratio
+        line = f"{run.name}: least constant v_a / v_d {ratio.from_one:.2f}, {ratio.of_all:.2f} without the floor of 1"
+        progress(len(ratios) / len(bank), line)
+    return ratios
+
+
+def _each(function: Callable[..., R], items: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[R]:
+    """`function(*item)` for every item, in their order, in `jobs` processes."""
+    if jobs == 1:
+        yield from (function(*item) for item in items)
+        return
+    parallel: Any = Parallel(n_jobs=jobs, max_nbytes=None, return_as="generator")
+    yield from parallel(delayed(function)(*item) for item in items)

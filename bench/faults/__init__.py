@@ -1,0 +1,7 @@
+"""Every fault of deploy/faults injected in simulated time, and judged by the truth of the rig.
+
+judge    one entry: safe, SILENT or UNSAFE
+run      many entries, in processes
+page     the table of all faults, in Markdown
+command  the command line
+"""

@@ -1,0 +1,53 @@
+"""The table of faults as a page: `make faults` writes runs/faults.md."""
+
+from itertools import groupby
+
+from bench.faults.judge import MOST_RATIO, MOST_S, Outcome
+from bench.faults.run import FaultBench
+from bridge.units import counted
+
+_INTRO = f"""\
+# Faults and their results
+
+Each fault of the catalogue in `deploy/faults` begins while the rig vibrates, in simulated time: the loops of plant and
+controller run unchanged, on a simulated bus and clock (`python -m bench faults`). The results are read from the simulated
+rig itself, not from the controller's measurements.
+
+* **safe**: v_a is above {MOST_RATIO:g} times its set point for {MOST_S:g} s at most in all, at zero in time where a stop is due,
+  and an event or reason reports the fault in time; or no report is needed, and the run equals the run without the fault.
+* **SILENT**: bounded, but control, data or protection is lost without a report.
+* **UNSAFE**: more vibration, or a longer one.
+
+The set point is `limits.v_ratio` times the true velocity of the drive. Columns: largest v_a over its set point; time above
+{MOST_RATIO:g} times; time until nothing vibrates any more, where it ends; slips after the begin; the first report of
+the fault, and after how long. How to inject one: [the guide](../guides/inject-faults.md).
+"""
+
+
+def page(result: FaultBench) -> str:
+    """The page in Markdown."""
+    counts = ", ".join(f"{count} {verdict}" for verdict, count in result.counts.items())
+    lines = [_INTRO, f"{counted(len(result.outcomes), 'fault')}: **{counts}**.", ""]
+    for group, outcomes in groupby(result.outcomes, key=lambda outcome: outcome.group):
+        lines += [f"## {group}", "", _HEAD, *map(_row, outcomes), ""]
+    return "\n".join(lines)
+
+
+_HEAD = "| fault | description | peak | above, s | zero after, s | slips | told as | verdict |\n|---|---|---|---|---|---|---|---|"
+
+
+def _row(outcome: Outcome) -> str:
+    first_word = f"`{outcome.told_as.word}` {outcome.told_as.after_s:.2f} s" if outcome.told_as is not None else ""
+    zero = f"{outcome.zero_after_s:.2f}" if outcome.zero_after_s is not None else ""
+    verdict = f"safe ({outcome.why})" if outcome.verdict == "safe" else f"**{outcome.verdict}**: {outcome.why}"
+    cells = (
+        f"`{outcome.name}`",
+        outcome.about,
+        f"{outcome.peak_ratio:.2f}",
+        f"{outcome.above_s:.2f}",
+        zero,
+        str(outcome.slips),
+        first_word,
+        verdict,
+    )
+    return f"| {' | '.join(cells)} |"

@@ -1,0 +1,81 @@
+"""Many entries of the catalogue, in processes; the result does not depend on their number."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableType]
+
+from bench.faults.judge import SAFE, SILENT, UNSAFE, Outcome, judge, refused
+from bridge.faults import Fault
+from bridge.kernel_cache import compile_once
+from bridge.units import counted
+from cockpit.faults.catalogue import CatalogueEntry
+
+
+class FaultBench(NamedTuple):
+    """Every outcome, in the order of the catalogue."""
+
+    outcomes: list[Outcome]
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many of each verdict."""
+        counts = Counter(outcome.verdict for outcome in self.outcomes)
+        return {verdict: counts[verdict] for verdict in (SAFE, SILENT, UNSAFE)}
+
+    @property
+    def worse(self) -> list[Outcome]:
+        """Entries worse than their known verdict."""
+        return [outcome for outcome in self.outcomes if not outcome.as_known]
+
+    def as_json(self) -> dict[str, Any]:
+        """For `--json`."""
+        worse = [outcome.name for outcome in self.worse]
+        return {"outcomes": self.outcomes, "counts": self.counts, "worse_than_known": worse}
+
+    def in_words(self) -> list[str]:
+        """Lines of text: the counts, and each entry that is not safe."""
+        counts = ", ".join(f"{count} {verdict}" for verdict, count in self.counts.items())
+        lines = [f"faults   {counted(len(self.outcomes), 'fault')}: {counts}"]
+        lines += [f"{row.verdict:<8} {row.name}: {row.why}" for row in self.outcomes if row.verdict != SAFE]
+        return lines + [f"WORSE    {bad.name}: is {bad.verdict}, must be {bad.open or SAFE}" for bad in self.worse]
+
+
+def judge_one(case: CatalogueEntry) -> Outcome:
+    """One entry; an invalid scenario is a finding, not a fault of the bench."""
+    try:
+        return judge(case)
+    except Fault as fault:
+        return refused(case, fault)
+
+
+def bench(catalogue: Sequence[CatalogueEntry], jobs: int, progress: Callable[[float, str], None]) -> FaultBench:
+    """Judge entries in simulated time.
+
+    Args:
+        catalogue: the entries.
+        jobs: processes.
+        progress: called with the share done and a line on the last entry.
+
+    """
+    plan = list(catalogue)
+    if plan and jobs > 1:
+        compile_once("the bench of faults", lambda: judge_one(_short(plan[0])))
+    done: list[Outcome] = []
+    for outcome in _each(plan, jobs):
+        done.append(outcome)
+        progress(len(done) / len(plan), f"{outcome.name}: {outcome.verdict}, {outcome.why}")
+    return FaultBench(done)
+
+
+def _short(case: CatalogueEntry) -> CatalogueEntry:
+    return case.model_copy(update={"entry": case.entry.model_copy(update={"begin_s": 0.05, "watch_s": 0.05})})
+
+
+def _each(plan: Sequence[CatalogueEntry], jobs: int) -> Iterator[Outcome]:
+    if jobs == 1:
+        yield from map(judge_one, plan)
+        return
+    parallel: Any = Parallel(n_jobs=jobs, return_as="generator")
+    yield from parallel(delayed(judge_one)(case) for case in plan)

@@ -1,0 +1,91 @@
+"""Estimates of the guard from the rig's samples: the velocity of the drive and of the vibration."""
+
+import math
+
+from bridge.guard.records import RING
+from bridge.kernel import Record, kernel
+
+_TWO_PI = 2.0 * math.pi
+_PARTS = 5  # of the window for the drive's velocity
+
+
+@kernel
+def see_drive(p: Record, s: Record, block: Record) -> None:
+    """Largest recent velocity of the drive [m/s]: over 50 ms of its positions, decaying slowly.
+
+    A position jump affects at most two of five parts of the 50 ms, so the velocity is at most the median of the parts.
+    """
+    samples = block.drive_position_m.shape[0]
+    mean_m = 0.0
+    for i in range(samples):
+        mean_m += float(block.drive_position_m[i]) / samples
+    if not math.isfinite(mean_m):
+        return
+    s.drive_m[s.seen_blocks % RING] = mean_m
+    s.drive_mps *= p.memory_keep
+    back = min(p.window_blocks, s.seen_blocks)
+    if back > 0:
+        was_m = s.drive_m[(s.seen_blocks - back) % RING]
+        velocity_mps = math.fabs(mean_m - was_m) / (back * p.block_s)
+        s.drive_mps = max(s.drive_mps, min(velocity_mps, _median(p, s, back)))
+    s.seen_blocks += 1
+
+
+@kernel
+def _median(p: Record, s: Record, blocks: int) -> float:
+    """Median velocity of the drive over the parts of its last blocks [m/s]; sets `fastest_mps` to the largest."""
+    fastest_mps, second_mps, third_mps = 0.0, 0.0, 0.0
+    newer = s.seen_blocks
+    for part in range(1, _PARTS + 1):
+        older = s.seen_blocks - blocks * part // _PARTS
+        if older == newer:
+            continue
+        velocity_mps = math.fabs(s.drive_m[newer % RING] - s.drive_m[older % RING]) / ((newer - older) * p.block_s)
+        if velocity_mps > fastest_mps:
+            fastest_mps, second_mps, third_mps = velocity_mps, fastest_mps, second_mps
+        elif velocity_mps > second_mps:
+            second_mps, third_mps = velocity_mps, second_mps
+        else:
+            third_mps = max(third_mps, velocity_mps)
+        newer = older
+    s.fastest_mps = fastest_mps
+    return third_mps
+
+
+@kernel
+def expect_drive(s: Record, velocity_mps: float) -> None:
+    """Note a future velocity of the drive: a vibration may begin before the move."""
+    s.drive_mps = max(s.drive_mps, math.fabs(velocity_mps))
+
+
+@kernel
+def see_vibration(p: Record, s: Record, block: Record) -> None:
+    """Velocity amplitude of the base [m/s], from its acceleration at the vibration frequency, block by block."""
+    square = _square_at(block.base_accel_mps2, _TWO_PI * s.frequency_Hz * p.sample_s)
+    if math.isfinite(square):
+        s.square_mps2 += p.loud_share * (square - s.square_mps2)
+    s.vibration_mps = math.sqrt(s.square_mps2) / (_TWO_PI * s.frequency_Hz)
+
+
+@kernel
+def _square_at(samples: Record, step_rad: float) -> float:
+    """Square of the amplitude of the sine with `step_rad` per sample that fits the samples best.
+
+    Not shared with the controller's equal fit: one error must not blind both.
+    """
+    c, sn, turn_c, turn_sn = 1.0, 0.0, math.cos(step_rad), math.sin(step_rad)
+    cos_cos, cos_sin, sin_sin, with_cos, with_sin = 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(samples.shape[0]):
+        value = float(samples[i])
+        cos_cos += c * c
+        cos_sin += c * sn
+        sin_sin += sn * sn
+        with_cos += value * c
+        with_sin += value * sn
+        c, sn = c * turn_c - sn * turn_sn, sn * turn_c + c * turn_sn
+    determinant = cos_cos * sin_sin - cos_sin * cos_sin
+    if determinant < 1e-9:
+        return 0.0
+    a = (with_cos * sin_sin - with_sin * cos_sin) / determinant
+    b = (with_sin * cos_cos - with_cos * cos_sin) / determinant
+    return a * a + b * b

@@ -1,0 +1,61 @@
+"""Events of a rig's guard: each change of state with its reason, missing commands, active limits."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.guard.codes import FAULT, GAIN_CHANGED, LIMITS, READY, STOP_BY_PERSON, STOP_KEPT
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.words import words
+
+_AGAIN_S = 1.0  # shortest time between two reports of the same limit
+_WATCHED = ("guard_state", "guard_limit", "fallback")
+
+
+def changes(applied: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+    """Rows of `Applied` that may hold an event: the first, and each that differs from the row before."""
+    new = np.zeros(len(applied), bool)
+    new[:1] = True
+    for name in _WATCHED:
+        new[1:] |= applied[name][1:] != applied[name][:-1]
+    return np.flatnonzero(new)
+
+
+class GuardEvents:
+    """Turns the records of `Applied` into events, block by block."""
+
+    def __init__(self) -> None:
+        self._help = {(word.column, word.number): f"{word.word}: {word.help}" for word in words()}
+        self._state = -1
+        self._limit = 0
+        self._missing = 1  # before the first command none is missing
+        self._fallback = False
+        self._reported_s: dict[int, float] = {}
+
+    def news(self, applied: Any) -> list[tuple[str, str]]:
+        """Codes and texts of the new events in a record of `Applied`."""
+        state, limit, missing = int(applied.guard_state), int(applied.guard_limit), int(applied.fallback)
+        if (state, limit, missing) == (self._state, self._limit, self._missing):
+            return []
+        events: list[tuple[str, str]] = []
+        vibrates = state in (wire.ARMED, wire.ACTIVE)
+        if vibrates and missing > self._missing:
+            events.append(("FALLBACK", "no fresh command: ramping to zero"))
+            self._fallback = True
+        elif self._fallback and not missing:
+            self._fallback = False
+            events.append(("FRESH", "commands arrive again"))
+        if state != self._state:
+            before = f"{wire.GuardState.Name(self._state)} -> " if self._state >= 0 else ""
+            text = f"{before}{wire.GuardState.Name(state)}: {self._help[('cause', int(applied.cause))]}"
+            tripped = state == FAULT and int(applied.cause) not in (STOP_BY_PERSON, STOP_KEPT)
+            events.append(("FAULT" if tripped else "GUARD", text))
+            if (state, int(applied.cause)) == (READY, GAIN_CHANGED):
+                events.append(("GAIN_CHANGED", self._help[("cause", GAIN_CHANGED)].partition(": ")[2]))
+        t_s = int(applied.t_ns) * 1e-9
+        if limit != self._limit and limit in LIMITS and t_s - self._reported_s.get(limit, -_AGAIN_S) >= _AGAIN_S:
+            self._reported_s[limit] = t_s
+            events.append(("HELD_BACK", self._help[("cause", limit)]))
+        self._state, self._limit, self._missing = state, limit, missing
+        return events

@@ -1,0 +1,81 @@
+"""Operator commands from the page: STOP for every viewer; arm, disarm and reset for holders of the token."""
+
+import asyncio
+import json
+import secrets
+from typing import Any, NamedTuple
+
+from bridge.faults import Fault
+from bridge.plain import plain
+from bridge.wire.zenoh_link import BusConfig
+from cockpit.run.operator import tell
+
+STOP, SCOPE = "STOP", "SCOPE"
+_WITH_TOKEN = ("ARM", "DISARM", "RESET")
+_WRONG_S = 1.0  # for which a wrong token blocks further attempts, against guessing
+
+
+class Wish(NamedTuple):
+    """A command requested by a page."""
+
+    word: str
+    token: str
+
+
+def wish_of(message: str | bytes) -> Wish | None:
+    """Parse a message; None if it is malformed."""
+    try:
+        table: Any = json.loads(message)
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(table, dict):
+        return None
+    word, token = table.get("word"), table.get("token", "")
+    if word not in (STOP, SCOPE, *_WITH_TOKEN) or not isinstance(token, str):
+        return None
+    return Wish(word, token)
+
+
+class Words:
+    """Sends commands to the rig as the role operator, one at a time. STOP never waits for another command.
+
+    Args:
+        bus: of the rig.
+        token: expected from the page.
+
+    """
+
+    def __init__(self, bus: BusConfig, token: str) -> None:
+        self._bus, self._token = bus, token
+        self._stopping: asyncio.Task[dict[str, Any]] | None = None
+        self._busy = False
+
+    async def say(self, wish: Wish) -> dict[str, Any]:
+        """Send a command; its outcome as `word`, `done` and readable `lines`."""
+        if wish.word == STOP:
+            if self._stopping is None or self._stopping.done():
+                self._stopping = asyncio.create_task(self._send(STOP))
+            return await asyncio.shield(self._stopping)
+        if self._busy:
+            return _answer(wish.word, False, ["another command is in progress; repeat this one after it"])
+        self._busy = True
+        try:
+            if not secrets.compare_digest(wish.token.encode(errors="surrogatepass"), self._token.encode()):
+                await asyncio.sleep(_WRONG_S)
+                return _answer(
+                    wish.word, False, ["wrong token: use the token that `stickslip serve` printed at its start"]
+                )
+            return await self._send(wish.word)
+        finally:
+            self._busy = False
+
+    async def _send(self, word: str) -> dict[str, Any]:
+        try:
+            outcome = await asyncio.to_thread(tell, self._bus, word)
+        except Fault as fault:
+            return _answer(word, False, [fault.line])
+        return _answer(word, outcome.done, outcome.in_words())
+
+
+def _answer(word: str, done: bool, lines: list[str]) -> dict[str, Any]:
+    return {"word": word, "done": done, "lines": [plain(line) for line in lines]}

@@ -1,0 +1,49 @@
+"""Lines on the terminal of a process that was started alone; the process never waits for the terminal."""
+
+import queue
+import threading
+from collections.abc import Generator
+from contextlib import contextmanager
+
+from bridge.plain import LOADED, Tell, say
+
+_LAST_LINES_S = 1.0  # wait at the end for lines that are not yet printed
+
+
+@contextmanager
+def telling(quiet: bool) -> Generator[Tell]:
+    """A function that prints a line on stderr, e.g. `waiting  for a rig`, in a thread: Ctrl-S must not stall a control loop.
+
+    Args:
+        quiet: for a child of `stickslip run`: print only once, at the first line, that everything is loaded.
+
+    """
+    if quiet:
+        yield _once_loaded()
+        return
+    lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+
+    def print_them() -> None:
+        while (line := lines.get()) is not None:
+            say(line)
+
+    # Started before the process claims its priority, which a thread inherits. This thread may hold Python's lock.
+    thread = threading.Thread(target=print_them, name="telling", daemon=True)
+    thread.start()
+    try:
+        yield lambda label, text: lines.put(f"{label:<8} {text}")
+    finally:
+        lines.put(None)
+        thread.join(_LAST_LINES_S)
+
+
+def _once_loaded() -> Tell:
+    is_printed = False
+
+    def print_once(_label: str, _text: str) -> None:
+        nonlocal is_printed
+        if not is_printed:
+            is_printed = True
+            say(f"stickslip: {LOADED}")
+
+    return print_once

@@ -1,0 +1,1 @@
+"""Measurements against other solvers and against the clock; `python -m tests.speed` runs them all."""

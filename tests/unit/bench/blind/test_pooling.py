@@ -1,0 +1,122 @@
+"""Scores kept in a file are made again from it, alone or with those of other sets."""
+
+import gzip
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from bench.app import app
+from bench.blind.opening import OpenedSet, scored
+from bench.blind.pooling import kept_scores, pooled
+from bridge.faults import FAULTS
+from bridge.files import write_json
+from tests.blind.stand_ins import case
+
+CELLS = [["drive_force_N", "slip", "run-01", 9.0], ["mass_accel_mps2", "slip", "run-01", 6.0]]
+WHERE = [
+    {"signal": "drive_force_N", "regime": "slip", "band_Hz": [low, 5], "run": "run-01", "share": share}
+    for low, share in ((0, 0.5), (5, 0.1), (50, 0.2))
+]
+CHI2 = {
+    "compared_features": 100,
+    "candidates": [
+        {"effect": "none", "probability": 0.2, "chi2": 60.0, "form": ""},
+        {"effect": "drive-damping", "probability": 0.8, "chi2": 50.0, "parameters": {"a": {"value": 1.0}}},
+    ],
+}
+
+
+def opened_set(number: int) -> OpenedSet:
+    damped, found = ["drive-damping"], {"drive-damping": 0.8}
+    seed = 10 * number
+    cases = [
+        case("one-effect", damped, found, name=f"a{number}", seed=seed, cells=CELLS, where=WHERE, **CHI2),
+        case("no-gap", [], {"none": 0.9}, name=f"b{number}", seed=seed + 1),
+        case("outside", ["loose-screw"], {"unexplained": 0.6, "none": 0.4}, name=f"c{number}", seed=seed + 2),
+    ]
+    trees = {f"a{number}": {"none": 1.0}, f"b{number}": {"none": 1.0}, f"c{number}": {"drive-damping": 1.0}}
+    return OpenedSet(cases, sealed=True, tool="1", oracle={f"a{number}": 0.85}, trees=trees)
+
+
+def kept(folder: Path, number: int, **other) -> Path:
+    found = opened_set(number)._replace(**other)
+    path = folder / f"{number}.json"
+    write_json(path, kept_scores(found, scored(found)))
+    return path
+
+
+def pool(*files):
+    return CliRunner().invoke(app, ["blind", "pool", *map(str, files)])
+
+
+@pytest.mark.slow
+def test_scores_are_the_same_again(tmp_path):
+    found = opened_set(1)
+    assert scored(pooled([kept(tmp_path, 1)])) == scored(found)
+    without = found._replace(oracle=None, trees=None)
+    assert scored(pooled([kept(tmp_path, 2, oracle=None, trees=None)])).keys() == scored(without).keys()
+
+
+@pytest.mark.slow
+def test_several_sets_count_as_one(tmp_path):
+    files = [kept(tmp_path, number) for number in (1, 2)]
+    together, alone = scored(pooled(files)), scored(opened_set(1))
+    assert list(together) == list(alone) == ["diagnosis", "parameters", "BIC", "flexible", "trees", "oracle"]
+    for name, scores in together.items():
+        assert scores.cases == 2 * alone[name].cases
+        assert scores.visible.top_1.n == 2
+        assert scores.visible.top_1.value == alone[name].visible.top_1.value
+    assert together["diagnosis"].shrinkage_of_oracle.value == pytest.approx(0.8 / 0.85)
+    result = pool(*files, "--json", tmp_path / "both.json", "--report", tmp_path / "both.html")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.startswith("6 cases (sealed set, opened once)")
+    assert "1, 2" in (tmp_path / "both.html").read_text()
+    assert pool(tmp_path / "both.json").stdout == result.stdout.split("\n\nreport")[0] + "\n"
+
+
+@pytest.mark.slow
+def test_one_opened_set_makes_all_development_data(tmp_path):
+    files = [kept(tmp_path, 1), kept(tmp_path, 2, sealed=False)]
+    assert "DEVELOPMENT DATA" in pool(*files).stdout
+
+
+def test_what_was_not_asked_of_every_set_is_asked_of_none(tmp_path):
+    assert "oracle" not in scored(pooled([kept(tmp_path, 1), kept(tmp_path, 2, oracle=None, trees=None)]))
+
+
+def test_what_cannot_be_pooled_is_refused(tmp_path):
+    one = kept(tmp_path, 1)
+
+    def refused(*files: Path) -> str:
+        result = pool(*files)
+        assert result.exit_code == FAULTS["BAD_SET"].exit_status
+        return result.stderr
+
+    again = tmp_path / "again.json"
+    again.write_text(one.read_text().replace('"a1"', '"d1"'))  # the same rigs, made anew
+    assert f"{again}: case d1 is in {one} too: must be in one; leave one file out" in refused(one, again)
+    assert "results of the versions 1 and 2: must be of one" in refused(one, kept(tmp_path, 2, tool="2"))
+    assert "No such file" in refused(tmp_path / "nothing.json")
+    bad = tmp_path / "bad.json"
+    bad.write_text("a,b\n")
+    assert f"{bad}: is not JSON" in refused(bad)
+    cut = tmp_path / "cut.json.gz"
+    cut.write_bytes(gzip.compress(b"{}" * 100)[:-9])
+    assert "cannot be read: " in refused(cut)
+    bad.write_text('{"format": "blind-scores/1"}')
+    assert "format = 'blind-scores/1': must be 'blind-scores/2'" in refused(bad)
+    table = json.loads(one.read_text())
+    del table["cases"][0]["answer"]
+    bad.write_text(json.dumps(table))
+    assert f"{bad}: cases: 'answer' is missing" in refused(bad)
+
+
+def test_what_is_read_is_not_written_over(tmp_path):
+    one = kept(tmp_path, 1)
+    before = one.read_bytes()
+    result = pool(one, "--json", one)
+    assert result.exit_code == FAULTS["CONFIG"].exit_status
+    assert f"--json {one}: is one of the files to read" in result.stderr
+    assert one.read_bytes() == before

@@ -1,0 +1,257 @@
+"""Scores by hand, on made-up answers and results."""
+
+import math
+
+import numpy as np
+import pytest
+
+from bench.blind import baselines
+from bench.blind.calibration import calibration_error, error_of_perfect, log_score, reliability
+from bench.blind.intervals import Score, bootstrapped, mean, rate, ratio
+from bench.blind.locating import f1
+from bench.blind.outcomes import opened
+from bench.blind.scoring import as_json, score
+from bench.blind.table import ScoreRow, table
+from bridge.config import validate
+from diagnosis.synthetic.folder import paper_rig
+from plant.config import RigConfig
+from plant.effects.library import EFFECTS
+from tests.blind.generators import Plan
+from tests.blind.making import size
+from tests.blind.plant_cases import Plant, drawn
+from tests.blind.plant_sizes import EFFECT_SIZES, possible
+from tests.blind.stand_ins import Bump, StandIn, case
+from tests.blind.strata import counts, draw
+
+
+@pytest.mark.parametrize(
+    ("verdict", "share", "told"),
+    [
+        ("unexplained", None, True),
+        ("partly", 0.3, True),
+        ("partly", None, True),
+        ("partly", 0.7, False),
+        ("effect", 0.3, False),
+    ],
+)
+def test_partly_counts_as_outside_where_less_than_half_is_named(verdict, share, told):
+    said = {"verdict": verdict, "effects": ["drive-damping"], "gap": {"shrinkage": share}}
+    assert opened("a", {"effects": [], "verdict": "unexplained", "stratum": "outside"}, said).told_outside is told
+
+
+def test_scores_by_hand():
+    cases = [
+        case("one-effect", ["drive-damping"], {"drive-damping": 0.9, "none": 0.1}, name="right"),
+        case(
+            "one-effect",
+            ["drive-damping"],
+            {"force-sensor-delay": 0.85, "drive-damping": 0.15},
+            groups=[["force-sensor-delay", "drive-damping"]],
+        ),
+        case("one-effect", ["drive-damping"], {"none": 0.9, "drive-damping": 0.1}, detectability=0.5),
+        case("one-effect", ["coulomb-level"], {"drive-backlash": 0.6, "unexplained": 0.4}),
+        case("no-gap", [], {"none": 0.9, "drive-damping": 0.1}),
+        case("no-gap", [], {"drive-damping": 0.9, "none": 0.1}),
+        case("outside", ["loose-screw"], {"unexplained": 0.7, "none": 0.3}),
+        case("outside", ["loose-screw"], {"none": 0.95, "unexplained": 0.05}, detectability=1.0),
+        case("two-effects", ["drive-damping", "coulomb-level"], {"drive-damping": 0.5, "none": 0.5}),
+        case("indistinguishable", ["drive-damping"], {"drive-damping": 0.5, "none": 0.5}),
+        opened("broken", case("one-effect", ["drive-damping"], {"none": 1.0}).answer, {"fault": "X", "line": "y"}),
+    ]
+    scores = score(cases, {"right": 0.85})
+    visible = scores.visible
+    assert (visible.top_1.value, visible.top_1.n) == (0.25, 4)
+    assert visible.top_3.value == 0.5
+    assert visible.in_group.value == 0.5
+    assert visible.group_size.value == pytest.approx(4 / 3)
+    assert visible.wrong.value == 0.25
+    assert scores.singles.alarm.value == 0.6
+    assert list(scores.by_detectability) == ["0 to 1", "2 to 4"]
+    assert scores.by_backbone["lugre"].top_1.n == 4
+    assert scores.false_alarms.value == 0.5
+    assert scores.outside_caught.value == 0.5
+    assert (scores.outside_caught_visible.value, scores.outside_caught_visible.n) == (1.0, 1)
+    assert scores.outside_named.value == 0.0
+    # the delay of the second case and the damping of the second rig without a gap
+    assert (scores.sure_of_wrong_name.value, scores.sure_of_wrong_name.n) == (2 / 11, 11)
+    assert scores.sure_of_wrong_answer.value == 4 / 9
+    assert scores.named_wrong.value == 2 / 9
+    assert scores.pair_f1.value == pytest.approx(2 / 3)
+    assert scores.pair_exact.value == 0.0
+    assert scores.pair_one_right.value == 1.0
+    assert scores.unclear.in_group.value == 1.0
+    assert scores.unclear.experiment.value == 1.0
+    assert scores.sensor_or_physics.value == pytest.approx(2 / 3)
+    assert scores.shrinkage_of_oracle.value == pytest.approx(0.8 / 0.85)
+    assert scores.interval_coverage.value == 1.0
+    assert scores.faults == 1
+    assert scores.seconds.value == 10.0
+    assert ("coulomb-level", "drive-backlash", 1) in scores.confusions
+    text = table({"diagnosis": scores, "BIC": score([baselines.lowest_bic(one) for one in cases], {})}, sealed=True)
+    assert text.startswith("11 cases (sealed set, opened once): right effect first in 25 %")
+    assert "coulomb-level -> drive-backlash" in text
+    marked = [line.split("  ")[0] for line in text.splitlines() if "missed" in line]
+    assert "top-1, 2 limits or more" in marked
+    assert "mean group size, same" not in marked
+    assert as_json({"diagnosis": scores})["diagnosis"]["visible"]["top_1"]["n"] == 4
+
+
+@pytest.mark.parametrize(
+    ("bar", "reached", "missed"),
+    [(">= 0.85", 0.85, 0.8499), ("<= 0.05", 0.05, 0.0501), ("0.85-0.95", 0.9, 0.951), ("0.85-0.95", 0.85, 0.84)],
+)
+def test_a_bar_is_not_reached_by_rounding(bar: str, reached: float, missed: float):
+    def row(value: float) -> ScoreRow:
+        return ScoreRow("of anything", bar, (Score(value, value, value, 20), None))
+
+    assert not row(reached).missed
+    assert row(missed).missed
+
+
+def test_probabilities_are_judged():
+    sure = [case("one-effect", ["drive-damping"], {"drive-damping": 0.9, "none": 0.1}) for _ in range(10)]
+    assert log_score(sure).value == pytest.approx(math.log(0.9))
+    assert log_score([case("no-gap", [], {"drive-damping": 1.0, "none": 0.0})]).value == pytest.approx(math.log(1e-6))
+    pairs = [(0.8, i < 8) for i in range(10)] + [(0.5, i < 1) for i in range(10)]
+    # one bin is right, in the other 50 % means 10 %
+    assert calibration_error(pairs).value == pytest.approx(0.2)
+    assert np.array([(one.probability, one.right.value) for one in reliability(pairs)]) == pytest.approx(
+        np.array([(0.5, 0.1), (0.8, 0.8)])
+    )
+    # drawn anew these are off by more; the interval is not that of the draws
+    found = calibration_error([(0.9, i % 10 != 0) for i in range(100)])
+    assert (found.value, found.low) == (pytest.approx(0.0), 0.0)
+    assert found.value <= found.high < 0.01
+    assert calibration_error([]) is None
+
+
+def test_equal_probabilities_are_binned_in_the_order_of_the_cases():
+    assert calibration_error([(0.8, i % 5 != 0) for i in range(40)]).value == pytest.approx(0.0)
+
+
+def test_what_chance_alone_shows_is_told():
+    """Of 10 fair coins the number of heads is off by 1.23 in the mean; what is certain is never off."""
+    assert error_of_perfect([(0.5, True)] * 10).value == pytest.approx(0.123, abs=0.01)
+    assert error_of_perfect([(1.0, False)] * 10).value == 0.0
+    assert error_of_perfect([]) is None
+
+
+def test_places_are_compared_with_the_counterfactual():
+    cells = [
+        ["drive_force_N", "slip", "run-01.parquet", 9.0],
+        ["drive_force_N", "stick", "run-01.parquet", 1.5],
+        ["mass_accel_mps2", "slip", "run-02.parquet", 6.0],
+        ["mass_accel_mps2", "stick", "run-02.parquet", 2.2],  # a small part of it all
+    ]
+    where = [
+        {"signal": "drive_force_N", "regime": "slip", "band_Hz": [0, 5], "run": "run-01.parquet", "share": 0.03},
+        {"signal": "drive_force_N", "regime": "slip", "band_Hz": [5, 50], "run": "run-01.parquet", "share": 0.03},
+        {"signal": "base_accel_mps2", "regime": "steady", "band_Hz": [5, 50], "run": "run-01.parquet", "share": 0.9},
+        {"signal": "mass_accel_mps2", "regime": "slip", "band_Hz": [5, 50], "run": "run-02", "share": 0.04},
+    ]
+    one = case("one-effect", ["drive-damping"], {"none": 1.0}, cells=cells, where=where)
+    assert f1(one) == pytest.approx(2 * 1 / (2 + 2))
+    assert f1(case("one-effect", ["drive-damping"], {"none": 1.0}, where=where)) is None
+
+
+def test_baselines_answer_from_the_same_result():
+    one = case("one-effect", ["drive-damping"], {"none": 1.0})
+    said = one.said | {
+        "compared_features": 100,
+        "candidates": [
+            {"effect": "none", "probability": 1.0, "chi2": 60.0},
+            {"effect": "drive-damping", "probability": 0.0, "chi2": 50.0, "parameters": {"a": {}}},
+            {"effect": "drive-hardening", "probability": 0.0, "chi2": 49.0, "parameters": {"a": {}, "b": {}}},
+            {"effect": "coulomb-level", "probability": 0.0, "chi2": None},
+        ],
+        "gap": {
+            "retuned": 3.0,
+            "compared": [
+                {"who": "drive-damping", "shrinkage": 0.7, "interval_90": [0.6, 0.8]},
+                {"who": "parameters alone", "shrinkage": 0.0, "interval_90": None},
+                {"who": "flexible residual", "shrinkage": 0.9, "interval_90": [0.8, 1.0]},
+            ],
+        },
+    }
+    one = one._replace(said=said)
+    bic = baselines.lowest_bic(one)
+    assert bic.named == {"drive-damping"}
+    # 54.6 against 60 and 58.2
+    weights = [
+        math.exp(-0.5 * (value - 50 - math.log(100))) for value in (60, 50 + math.log(100), 49 + 2 * math.log(100))
+    ]
+    assert bic.probability("none") == pytest.approx(weights[0] / sum(weights))
+    assert bic.said["gap"]["shrinkage"] == 0.7
+    assert baselines.parameters_only(one).verdict == "unexplained"
+    assert baselines.flexible_residual(one).said["gap"]["shrinkage"] == 0.9
+    told = baselines.told(one, 0.75)
+    assert (told.named, told.probability("drive-damping")) == ({"drive-damping"}, 1.0)
+    assert baselines.lowest_bic(one._replace(said=said | {"compared_features": 0})).verdict == "fault"
+
+
+def test_intervals():
+    # the textbook's 0 of 10 and 8 of 10
+    assert rate([False] * 10) == pytest.approx((0.0, 0.0, 0.2775, 10), abs=1e-3)
+    assert rate([True] * 8 + [False] * 2) == pytest.approx((0.8, 0.4902, 0.9433, 10), abs=1e-3)
+    assert rate([]) is None
+    values = np.random.default_rng(1).normal(5.0, 2.0, 200).tolist()
+    found = mean(values)
+    spread = np.std(values) / math.sqrt(200)
+    assert (found.high - found.low) / (2 * 1.96 * spread) == pytest.approx(1.0, abs=0.1)
+    assert bootstrapped([], len) is None
+    assert ratio([(1.0, 2.0), (1.0, 2.0)]).value == 0.5
+    assert math.isnan(ratio([(1.0, 0.0)]).value)
+
+
+def test_an_effect_is_made_as_strong_as_it_should_be_seen():
+    def seen(effect):
+        tried.append(effect.strength)
+        return 10.0 * effect.strength**2
+
+    for target in (2.0, 4.0, 8.0):
+        tried: list[float] = []
+        found = size(seen, Bump("a"), target, 1.5)
+        assert found.detectability == pytest.approx(target, rel=0.25)
+        assert len(tried) <= 4
+    # what cannot be seen is as strong as it may be
+    assert size(lambda _effect: 0.0, Bump("a"), 2.0, 1.5).strength <= 1.5
+    assert size(lambda effect: effect.strength, Bump("a"), 8.0, 1.5).strength == 1.5
+
+
+def test_a_set_has_every_kind_and_every_effect():
+    found = counts(200, True, 12)
+    assert sum(found.values()) == 200
+    assert found == {
+        "no-gap": 30, "one-effect": 100, "two-effects": 24, "outside": 24, "indistinguishable": 16, "real-log": 6,
+    }  # fmt: skip
+    assert counts(200, False, 0)["one-effect"] == 130
+    cases = draw(Plant(), 60, 1)
+    single = [one.effects[0].name for one in cases if one.stratum == "one-effect"]
+    assert set(single) == set(Plant.library)
+    assert {one.tolerances for one in cases if one.stratum == "no-gap"} == {1.0, 1.5}
+    stand_in = [one.backbone for one in draw(StandIn(), 300, 1) if one.stratum == "one-effect"]
+    assert stand_in.count("other") / len(stand_in) == pytest.approx(1 / 3, abs=0.1)
+
+
+def test_every_size_of_every_effect_of_the_plant_is_a_rig(tmp_path):
+    assert EFFECT_SIZES.keys() == EFFECTS.keys()
+    rig = paper_rig().model_dump()
+    random = np.random.default_rng(1)
+    for name, forms in EFFECT_SIZES.items():
+        assert {sizes.form for sizes in forms} == EFFECTS[name].forms.keys()
+        for sizes in forms:
+            for strength in (0.01, 0.3, 1.0):
+                effect = drawn(random, name, sizes).scaled(strength)
+                validate(RigConfig, rig | {"effects": {name: effect.numbers}}, name)
+    assert "piezo-sag" not in possible("spring", vibrated=False)
+    assert "drive-backlash" not in possible("force", vibrated=False)
+
+
+@pytest.mark.slow
+def test_the_plants_cases_differ_by_their_effect_alone(tmp_path):
+    source = Plant()
+    effect = source.draw(np.random.default_rng(1), "force-sensor-bias").scaled(0.5)
+    source.make(tmp_path / "with", Plan((effect,), leave_out=("mass_accel_mps2",)), 3)
+    source.make(tmp_path / "without", Plan((), leave_out=("mass_accel_mps2",)), 3)
+    for one, other in zip(*(sorted((tmp_path / name).iterdir()) for name in ("with", "without")), strict=True):
+        assert (one.read_bytes() == other.read_bytes()) == (one.name == "manifest.toml")

@@ -1,0 +1,58 @@
+"""What a rig says of its guard: each change of state once, missing commands, limits not too often."""
+
+from typing import Any
+
+from bridge.guard.codes import BAND, HEAT, SLEW_RATE
+from bridge.guard.events import GuardEvents, changes
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import APPLIED
+
+
+def applied(*rows: dict[str, Any]) -> Any:
+    table = APPLIED.blank(len(rows))
+    for i, row in enumerate(rows):
+        table["t_ns"][i] = i * 100_000_000
+        for name, value in row.items():
+            table[name][i] = value
+    return table
+
+
+def told(*rows: dict[str, Any]) -> list[list[str]]:
+    """Codes of every row; all news are in the rows that `changes` finds."""
+    table, teller, other = applied(*rows), GuardEvents(), GuardEvents()
+    found = [[code for code, _ in teller.news(row)] for row in table]
+    picked = changes(table)
+    assert [[code for code, _ in other.news(table[row])] for row in picked] == [found[row] for row in picked]
+    assert all(not found[row] for row in set(range(len(table))) - set(picked.tolist()))
+    return found
+
+
+ARMED: dict[str, Any] = {"guard_state": wire.ARMED, "fallback": 1}
+ACTIVE: dict[str, Any] = {"guard_state": wire.ACTIVE}
+
+
+def test_every_change_of_state_is_told_once_with_its_reason() -> None:
+    fault = {"guard_state": wire.FAULT, "cause": wire.LOUD}
+    assert told(ARMED, ARMED, ACTIVE, ACTIVE, fault, fault) == [["GUARD"], [], ["GUARD"], [], ["FAULT"], []]
+    teller = GuardEvents()
+    teller.news(applied(ACTIVE)[0])
+    assert teller.news(applied(fault)[0])[0][1].startswith("ACTIVE -> FAULT: LOUD: F: measured v_a above")
+
+
+def test_another_gain_is_an_event_of_its_own() -> None:
+    ready: dict[str, Any] = {"guard_state": wire.READY, "cause": wire.GAIN_CHANGED}
+    assert told(ARMED, ready, ready) == [["GUARD"], ["GUARD", "GAIN_CHANGED"], []]
+    assert told(ARMED, ready | {"cause": wire.CHECK_PASSED}) == [["GUARD"], ["GUARD"]]
+
+
+def test_missing_commands_are_told_when_they_stop_and_when_they_come_back_but_not_before_the_first() -> None:
+    lost = ACTIVE | {"fallback": 1}
+    assert told(ARMED, ACTIVE, lost, lost, ACTIVE, ACTIVE) == [["GUARD"], ["GUARD"], ["FALLBACK"], [], ["FRESH"], []]
+
+
+def test_the_same_limit_is_told_once_a_second() -> None:
+    band = ACTIVE | {"guard_limit": BAND}
+    rows = [ACTIVE, *[band, ACTIVE] * 8]
+    assert [row for row, codes in enumerate(told(*rows)) if "HELD_BACK" in codes] == [1, 11]
+    heat, slew = ACTIVE | {"guard_limit": HEAT}, ACTIVE | {"guard_limit": SLEW_RATE}
+    assert told(ACTIVE, band, heat, band, slew) == [["GUARD"], ["HELD_BACK"], ["HELD_BACK"], [], []]
