@@ -81,11 +81,11 @@ def end_like_ctrl_c() -> None:
 @contextlib.contextmanager
 def stopped_once() -> Generator[None]:
     """The first Ctrl-C, SIGTERM or SIGHUP raises KeyboardInterrupt in the body; later ones do not disturb its cleanup."""
-    stopped = threading.Event()
+    stopped: list[int] = []  # no Event: a second signal within its `set` would wait for the lock of the first for ever
 
     def on_signal(number: int, _frame: Any) -> None:
-        if not stopped.is_set():
-            stopped.set()
+        if not stopped:
+            stopped.append(number)
             raise KeyboardInterrupt("" if number == signal.SIGINT else signal.Signals(number).name)
 
     before = handle_endings(on_signal)
@@ -94,7 +94,7 @@ def stopped_once() -> Generator[None]:
     finally:
         for number, handler in before.items():
             # after a signal the command is about to end; a second signal would end it without its exit status
-            signal.signal(number, signal.SIG_IGN if stopped.is_set() else handler)
+            signal.signal(number, signal.SIG_IGN if stopped else handler)
 
 
 @contextlib.contextmanager

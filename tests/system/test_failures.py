@@ -152,7 +152,7 @@ def test_a_second_run_leaves_the_first_alone(tmp_path: Path, runs: list[Run]) ->
     first.wait_until_recording()
     result = call("run", "--set", "duration_s=1.0", "--endpoint", endpoint, "--log", str(first.log))
     assert result.returncode == FAULTS["ENDPOINT_BUSY"].exit_status
-    assert f"{endpoint}: cannot listen on it" in result.stderr
+    assert f"{endpoint}: cannot listen there" in result.stderr
     assert len(told(result.stderr)) == 1
     assert not gone(first.process.pid)
     first.process.send_signal(signal.SIGINT)

@@ -151,7 +151,7 @@ def test_operator_stop_and_reset(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("state", "told"),
     [
-        (wire.ACTIVE, "the rig did not confirm STOP within 5 s, and is ACTIVE with a vibration of 37 nm"),
+        (wire.ACTIVE, "the rig did not confirm STOP within 5 s and is ACTIVE with a vibration of 37 nm"),
         (None, "no rig publishes"),
     ],
 )
