@@ -41,9 +41,12 @@ def stop_event(parent: int = 0) -> threading.Event:
 
     """
     stop = threading.Event()
+    seen: list[int] = []  # a second signal within `set` would wait for the lock of the first for ever
 
-    def on_signal(_number: int, _frame: Any) -> None:
-        stop.set()
+    def on_signal(number: int, _frame: Any) -> None:
+        if not seen:
+            seen.append(number)
+            stop.set()
 
     handle_endings(on_signal)
     if parent:
