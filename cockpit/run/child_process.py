@@ -6,6 +6,7 @@ import functools
 import io
 import json
 import os
+import queue
 import signal
 import sys
 import threading
@@ -41,22 +42,19 @@ def stop_event(parent: int = 0) -> threading.Event:
 
     """
     stop = threading.Event()
-    seen: list[int] = []  # a second signal within `set` would wait for the lock of the first for ever
+    # `stop.set` in the handler would wait for ever if the signal came within `stop.wait` or within an earlier handler, which hold
+    # its lock. `SimpleQueue.put` may be called at any point, and a thread passes the signal on.
+    signals: queue.SimpleQueue[int] = queue.SimpleQueue()
+    handle_endings(lambda number, _frame: signals.put(number))
 
-    def on_signal(number: int, _frame: Any) -> None:
-        if not seen:
-            seen.append(number)
-            stop.set()
+    def watch() -> None:
+        while not parent or os.getppid() == parent:
+            with contextlib.suppress(queue.Empty):
+                signals.get(timeout=_PARENT_CHECK_S if parent else None)
+                break
+        stop.set()
 
-    handle_endings(on_signal)
-    if parent:
-
-        def watch() -> None:
-            while os.getppid() == parent and not stop.wait(_PARENT_CHECK_S):
-                pass
-            stop.set()
-
-        threading.Thread(target=watch, daemon=True, name="parent").start()
+    threading.Thread(target=watch, daemon=True, name="endings").start()
     return stop
 
 

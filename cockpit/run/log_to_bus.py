@@ -28,6 +28,15 @@ _GOODBYE_S = 1.0
 _KEY_LOOK_S = 0.05
 
 
+class _Pause:
+    """Switched by a key or a signal. No Event: a signal within its `set` would wait for its lock for ever."""
+
+    on = False
+
+    def toggle(self, *_: Any) -> None:
+        self.on = not self.on
+
+
 def publish_log(
     path: Path,
     bus_config: BusConfig,
@@ -55,14 +64,10 @@ def publish_log(
     if everything:
         tables += [(COMMAND, run.command), (TRACE, run.trace), (STATE, run.state)]
     schedule = _schedule(tables, round(from_s * 1e9))
-    pause = threading.Event()
-
-    def toggle(*_: Any) -> None:
-        pause.clear() if pause.is_set() else pause.set()
-
-    signal.signal(signal.SIGUSR1, toggle)
+    pause = _Pause()
+    signal.signal(signal.SIGUSR1, pause.toggle)
     # lockstep, so that no message is dropped: unlike a rig, a record can wait
-    with Bus(bus_config, "plant", lockstep=True) as bus, _keys(toggle, stop):
+    with Bus(bus_config, "plant", lockstep=True) as bus, _keys(pause.toggle, stop):
         for role in ("plant", "controller") if everything else ("plant",):
             if role in run.headers:
                 bus.serve_header(_header(run, role))
@@ -94,7 +99,7 @@ def _play(
     tables: list[tuple[Topic, Any]],
     send: dict[str, Any],
     speed: float,
-    pause: threading.Event,
+    pause: _Pause,
     stop: threading.Event,
 ) -> int:
     """Send each message when it is due, until the end or `stop`; return the number of blocks sent."""
@@ -108,9 +113,9 @@ def _play(
     live = Live(Text(""), console=console, transient=True) if console.is_terminal else None
     with live or contextlib.nullcontext():
         for t_ns, place, row in schedule:
-            if pause.is_set():
+            if pause.on:
                 paused_s = time.perf_counter()
-                while pause.is_set() and not stop.is_set():
+                while pause.on and not stop.is_set():
                     time.sleep(_KEY_LOOK_S)
                 began_s += time.perf_counter() - paused_s
             if stop.is_set():

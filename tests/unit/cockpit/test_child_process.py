@@ -1,0 +1,19 @@
+"""Signals that a process receives at an inconvenient point."""
+
+import subprocess
+import sys
+
+_SIGNALS_UNDER_THE_LOCK = """
+import signal
+from cockpit.run.child_process import stop_event
+
+stop = stop_event()
+with stop._cond:  # as within `stop.wait`, where the main thread of plant, controller and recorder spends its time
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGTERM):
+        signal.raise_signal(number)
+assert stop.wait(60)
+"""
+
+
+def test_a_signal_within_the_wait_for_it_does_not_block_the_process():
+    subprocess.run([sys.executable, "-c", _SIGNALS_UNDER_THE_LOCK], check=True, timeout=60)
