@@ -9,7 +9,7 @@ SEED ?= 1
 GENERATOR ?= independent
 BLIND := $(or $(OUT),runs/blind-$(GENERATOR)-$(SEED)-$(CASES))
 
-.PHONY: demo quick test realtime smoke nightly types mutants coverage-guard control faults soak warm check docs reference readme bench bench-quick blind real bless lock proto schemas clean
+.PHONY: demo quick test realtime smoke nightly types mutants coverage-guard control faults soak warm check docs reference readme bench bench-quick blind real bless lock proto layouts schemas clean
 
 demo: $(SMALL)
 	@$(BIN)/stickslip run --scenario paper-c45-c45 --log runs/demo.mcap
@@ -132,6 +132,9 @@ lock: ## needs uv
 proto: $(READY) ## after a change of bridge/wire/stickslip.proto
 	$(BIN)/python -m grpc_tools.protoc -I bridge/wire --python_out=bridge/wire --pyi_out=bridge/wire \
 		--include_source_info --descriptor_set_out=bridge/wire/stickslip.desc bridge/wire/stickslip.proto
+
+layouts: $(READY) ## after a change of a record that kernels read: its fields for the type checkers
+	@$(BIN)/python -m docs.layouts
 
 schemas: $(READY) ## after a change of a format
 	$(BIN)/stickslip schema --out deploy/schemas

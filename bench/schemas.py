@@ -1,9 +1,9 @@
 """The JSON Schemas of the bench: `python -m bench.schemas` writes them to bench/json_schemas."""
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-from bridge.files import write_json
+from bridge.results import write_json
 from cockpit.commands.as_json.schemas import Format, result_of, scenario
 
 FOLDER = Path(__file__).parent / "json_schemas"
@@ -33,33 +33,6 @@ def _bank() -> dict[str, Any]:
     }
 
 
-def _blind_scores() -> dict[str, Any]:
-    from bench.blind.pooling import FORMAT
-    from bench.blind.scoring import Scores
-    from cockpit.commands.as_json.types import objects, schema_of
-
-    fields = {"format": Literal[FORMAT], "sealed": bool, "tool": str, "methods": dict[str, Scores]}
-    return schema_of(objects("BlindScores", fields | {"cases": list[dict[str, Any]]}))
-
-
-def _bench_control() -> dict[str, Any]:
-    from bench.control.bars import Bar
-    from bench.control.figures import Figures
-    from bench.control.least import Least
-    from cockpit.commands.as_json.types import objects, schema_of
-
-    fields = {"passed": bool, "bars": list[Bar], "runs": list[Figures], "least": dict[str, Least]}
-    fields |= {"step_cost_ratio": float, "elapsed_s": float}
-    return schema_of(objects("BenchControl", fields))
-
-
-def _bench_faults() -> dict[str, Any]:
-    from bench.faults.run import FaultBench
-    from cockpit.commands.as_json.types import schema_of, table
-
-    return schema_of(table(FaultBench, {"counts": dict[str, int], "worse_than_known": list[str]}))
-
-
 FORMATS = {
     form.name: form
     for form in (
@@ -67,11 +40,13 @@ FORMATS = {
         Format(
             "blind-scores-2",
             "`python -m bench blind score --json` and `blind pool --json`, blind-scores/2.",
-            _blind_scores,
+            result_of("bench.blind.pooling:BlindScores"),
         ),
-        Format("bench-control-result", "`python -m bench control --json`.", _bench_control),
-        Format("bench-faults-result", "`python -m bench faults --json`.", _bench_faults),
-        Format("blind-run-result", "`python -m bench blind run --json`.", result_of("bench.blind.command", "SetDone")),
+        Format(
+            "bench-control-result", "`python -m bench control --json`.", result_of("bench.control.result:BankResult")
+        ),
+        Format("bench-faults-result", "`python -m bench faults --json`.", result_of("bench.faults.run:FaultBench")),
+        Format("blind-run-result", "`python -m bench blind run --json`.", result_of("bench.blind.command:SetDone")),
     )
 }
 

@@ -6,8 +6,10 @@ guard/    limits on the exciter of a rig that hold for every command of a contro
 tables/   CSV, Parquet, MATLAB and TDMS, in and out
 config    strict TOML                              faults   codes, exit statuses and help
 files     checks before reading, atomic writing    units    units in names, numbers in words
+results   the JSON of results: a named tuple is an object
+pages     one style sheet and one frame for all HTML files
 provenance  origin of a page or a picture: version, command, date, hashes
-kernel, kernel_cache  compiled code; its place on disk and its renewal
+kernel, kernel_cache  compiled code; its place on disk and its renewal   layouts   fields of its records
 kernel_linking  how kernels that call each other are compiled once
 compiling  the progress of compilation, and signals during it
 plain, processes  text that is safe on a terminal; the identity of a process

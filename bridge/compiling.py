@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable, Generator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 
-from bridge.plain import say
+from bridge.plain import print_line
 
 PROGRESS = "compiling kernels, once for this version: "  # followed by `12 of 163 left`
 _LINES = 8  # lines for all kernels, if stderr is not a terminal
@@ -31,7 +31,7 @@ class Progress:
             bar = "#" * (_BAR * (total - left) // max(total, 1))
             print(f"\r{words:<70}[{bar:<{_BAR}}]", end="" if left else "\n", file=sys.stderr, flush=True)
         else:
-            say(f"stickslip: {words}")
+            print_line(f"stickslip: {words}")
 
 
 def left_in(line: str) -> tuple[int, int] | None:

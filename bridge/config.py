@@ -3,7 +3,7 @@
 import re
 import reprlib
 import tomllib
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeVar, get_args
@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from bridge.faults import Fault
 from bridge.files import check_file
-from bridge.plain import say
+from bridge.plain import print_line
 
 _LARGEST_BYTES = 2 << 20  # of a TOML file; hand-written files of hundreds of runs have about 100 kB
 _DEEPEST = 32  # parts of a key, or nested brackets; files of this project need 5
@@ -38,7 +38,7 @@ class Strict(BaseModel):
             line = f"stickslip: {key}: is not used any more; {cls.gone[key]}"
             if line not in _REPORTED:
                 _REPORTED.add(line)
-                say(line)
+                print_line(line)
         return {key: value for key, value in table.items() if key not in cls.gone}
 
 
@@ -130,15 +130,22 @@ def with_overrides(table: dict[str, Any], settings: Iterable[str]) -> dict[str, 
     return result
 
 
-def blamed(fault: Fault, source: str, settings: Sequence[str]) -> Fault:
-    """The fault of a table that is valid without `settings`: each line names the settings concerned instead of `source`."""
-    lines: list[str] = []
-    for line in fault.line.splitlines():
-        names = {setting: setting.partition("=")[0].strip().rpartition(".")[2] for setting in settings}
-        about = [setting for setting, name in names.items() if re.search(rf"\b{re.escape(name)}\b", line)]
-        place = ", ".join(f"--set {setting}" for setting in about or settings)
-        lines.append(line.replace(f"{source}: ", f"{place}: ", 1) if line.startswith(f"{source}: ") else line)
-    return Fault(fault.kind.code, "\n".join(lines))
+def made_with(make: Callable[[Sequence[str]], T], source: str, settings: Sequence[str], kept: Sequence[str] = ()) -> T:
+    """The result of `make(settings)`, where the settings `kept` belong to the files.
+
+    Raises the Fault of `make(kept)`, or else that of `make(settings)`: its lines name the settings concerned instead of `source`.
+    """
+    try:
+        return make(settings)
+    except Fault as fault:
+        make(kept)
+        names = {name: name.partition("=")[0].strip().rpartition(".")[2] for name in settings if name not in kept}
+        lines: list[str] = []
+        for line in fault.line.splitlines():
+            about = [setting for setting, name in names.items() if re.search(rf"\b{re.escape(name)}\b", line)]
+            place = ", ".join(f"--set {setting}" for setting in about or names)
+            lines.append(line.replace(f"{source}: ", f"{place}: ", 1) if line.startswith(f"{source}: ") else line)
+        raise Fault(fault.kind.code, "\n".join(lines)) from None
 
 
 def validate(model: type[T], table: dict[str, Any], source: str) -> T:

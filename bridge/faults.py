@@ -97,8 +97,8 @@ FAULTS = {
         FaultKind(
             "BAD_TABLE",
             2,
-            "A file of measured data cannot be read as a table, lacks a column that the channel map names, or is too large for "
-            "the requested format. The line names the file, the column, the row and the remedy. Nothing was written.",
+            "A file of measured data cannot be read as a table, or lacks a column that the channel map names. The line names the "
+            "file, the column, the row and the remedy. Nothing was written.",
         ),
         FaultKind(
             "DIAGNOSIS_BROKE",

@@ -3,12 +3,11 @@
 import contextlib
 import errno
 import json
-import math
 import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Generator, Iterable
+from collections.abc import Callable, Generator, Iterable
 from pathlib import Path
 from typing import IO, Any
 
@@ -60,43 +59,36 @@ def refuse_to_replace(path: Path, kind: str, place: str) -> None:
     `kind` is LOG, JSON, PICTURE or PAGE, recognised by the first bytes. `place` is the subject of the message: the option that
     gave the path, or the path.
     """
-    try:
+    with contextlib.suppress(OSError):  # the write that follows reports it
         if kind == LOG and (path.is_fifo() or path.is_socket()):  # would wait for a reader, and cannot be read again
             raise Fault("CONFIG", f"{place}: is a pipe or socket: a log must be a file on a disk; choose another file")
-        if not path.is_file() or path.stat().st_size == 0:
-            return
-        with path.open("rb") as file:
-            begins = file.read(8).lstrip().lower()
-    except OSError:  # the write that follows reports it
-        return
-    if not begins.startswith(_BEGINS[kind]):
+    if not _may_replace(path, 8, lambda begins: begins.lstrip().lower().startswith(_BEGINS[kind])):
         raise Fault("CONFIG", f"{place}: {path.name} exists and holds no {kind}: it would be lost; choose another file")
 
 
 def refuse_to_replace_text(path: Path, begins: str, place: str) -> None:
     """Raise Fault CONFIG if `path` is a file whose text does not start with `begins`, as the text of the command does."""
-    try:
-        if not path.is_file() or path.stat().st_size == 0:
-            return
-        with path.open("rb") as file:
-            same = file.read(len(begins.encode())) == begins.encode()
-    except OSError:  # the write that follows reports it
-        return
-    if not same:
+    known = begins.encode()
+    if not _may_replace(path, len(known), known.__eq__):
         raise Fault("CONFIG", not_ours(path, place))
 
 
 def refuse_to_replace_corrected(path: Path, text: str, place: str) -> None:
     """Raise Fault CONFIG if `path` is a file with another text than `text`: an operator may have corrected it."""
+    if not _may_replace(path, -1, text.encode().__eq__):
+        which = "exists with another content, which would be lost; give it to --map, or remove it"
+        raise Fault("CONFIG", f"{place}: {path.name} {which}")
+
+
+def _may_replace(path: Path, size: int, is_known: Callable[[bytes], bool]) -> bool:
+    """Whether the first `size` bytes of a file are known; also True for an empty, absent or unreadable file."""
     try:
-        same = not path.is_file() or path.stat().st_size == 0 or path.read_bytes() == text.encode()
+        if not path.is_file() or path.stat().st_size == 0:
+            return True
+        with path.open("rb") as file:
+            return is_known(file.read(size))
     except OSError:  # the write that follows reports it
-        return
-    if not same:
-        raise Fault(
-            "CONFIG",
-            f"{place}: {path.name} exists with another content, which would be lost; give it to --map, or remove it",
-        )
+        return True
 
 
 def not_ours(path: Path, place: str) -> str:
@@ -215,21 +207,3 @@ def write_whole(path: Path, text: str) -> None:
     """Write a text file completely or not at all, and create its folder. Raises Fault LOG_WRITE, OSError."""
     with replacing(path) as file:
         file.write(text.encode("utf-8"))
-
-
-def strict_json(value: Any) -> Any:
-    """`value` in JSON types: a named tuple is an object, a path a text, NaN and infinity are null."""
-    if isinstance(value, tuple) and hasattr(value, "_asdict"):
-        value = value._asdict()  # pyright: ignore[reportAttributeAccessIssue]
-    if isinstance(value, dict):
-        return {key: strict_json(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [strict_json(inner) for inner in value]
-    if isinstance(value, Path):
-        return shown(value)
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def write_json(path: Path, value: Any) -> None:
-    """Write `value` as strict JSON, completely or not at all, and create the folder. Raises OSError."""
-    write_whole(path, json.dumps(strict_json(value), allow_nan=False, indent=1) + "\n")

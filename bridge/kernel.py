@@ -19,7 +19,8 @@ R = TypeVar("R")
 
 # A record: one element of a numpy structured array, `array[0]`, read and written by field name. Both numba and the plain
 # interpreter accept a record. A kernel call costs 0.5 us with records and 8.5 us with NamedTuples of the same 70 numbers
-# (docs/decisions/1-records-not-namedtuples.md), and the bytes of a record are the snapshot that the log keeps.
+# (docs/decisions/1-records-not-namedtuples.md), and the bytes of a record are the snapshot that the log keeps. `bridge.layouts`
+# names the layouts with known fields; this name is for parts of records, such as the samples of a channel.
 Record = Any
 
 _settings: Any = numba.config  # pyright: ignore[reportPrivateImportUsage]

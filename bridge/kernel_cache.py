@@ -17,10 +17,10 @@ from pathlib import Path
 from numba.core.caching import UserProvidedCacheLocator
 
 from bridge.compiling import compiling
-from bridge.plain import ANOTHER_COMPILES, say
+from bridge.plain import ANOTHER_COMPILES, print_line
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("bridge", "controller", "plant", "diagnosis", "cockpit")
+PACKAGES = ("bridge", "controller", "plant", "diagnosis", "cockpit", "bench")
 _IMPORT = re.compile(r"^[ \t]*(?:from ([\w.]+) import (\([^)]*\)|.*)|import ([\w.]+))", re.MULTILINE)
 FOLDER = "NUMBA_CACHE_DIR"
 
@@ -103,7 +103,7 @@ def compile_once(what: str, load: Callable[[], object]) -> None:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
-                say(f"stickslip: {ANOTHER_COMPILES}{what}: waiting for it")
+                print_line(f"stickslip: {ANOTHER_COMPILES}{what}: waiting for it")
                 fcntl.flock(lock, fcntl.LOCK_EX)
             except OSError:  # a file system without locks: each process compiles
                 pass
@@ -124,7 +124,7 @@ def _private(folder: Path) -> Path:
     private = folder / f"stickslip-{os.geteuid()}"
     if not private.exists():
         private.mkdir(mode=0o700)
-        say(
+        print_line(
             f"stickslip: {folder}: is another user's, or others may write there: compiled kernels are code, so they are stored "
             f"in the private folder {private}"
         )
@@ -152,6 +152,6 @@ def usable_folder() -> Path:
             f"stickslip: {folder}: {error.strerror}: compiled kernels cannot be stored, so every command compiles them again, "
             f"which takes up to 1 min; set {FOLDER} to a writable folder"
         )
-        say(line)
+        print_line(line)
         return Path(temporary)
     return folder

@@ -19,14 +19,14 @@ def plain(text: str) -> str:
     return _CONTROL.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
-def say(line: str) -> None:
+def print_line(line: str) -> None:
     """Print a line on stderr, plain."""
     print(plain(line), file=sys.stderr, flush=True)
 
 
 # Reports a step in the life of a process: its name (waiting, joined, running, ended) and a text.
-Tell = Callable[[str, str], None]
+StepReport = Callable[[str, str], None]
 
 
-def untold(_what: str, _text: str) -> None:
+def no_report(_what: str, _text: str) -> None:
     """Discard the report."""

@@ -15,13 +15,13 @@ def this_process() -> str:
     return json.dumps({"pid": os.getpid(), "host": socket.gethostname(), "started": _started(os.getpid())})
 
 
-def pid_here(role: str, told: str) -> int:
+def pid_here(role: str, identity_text: str) -> int:
     """The pid in the identity `told`.
 
     Raises Fault NO_PEER for an invalid identity, and for a process that has ended or is of another computer or user.
     """
     try:
-        identity = json.loads(told)
+        identity = json.loads(identity_text)
         pid, host, started = int(identity["pid"]), str(identity["host"]), identity["started"]
     except (ValueError, KeyError, TypeError):
         line = f"{role}: sends no process identity: must be of this version; end it by hand"

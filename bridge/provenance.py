@@ -51,10 +51,7 @@ class Provenance(NamedTuple):
         if self.command:
             line += f": <code>{html.escape(self.command)}</code>"
         files = "".join(f"<br>{html.escape(file.name)}: SHA-256 <code>{file.sha256}</code>" for file in self.inputs)
-        style = (
-            "margin-top: 2em; border-top: 1px solid #d5d8dc; font-size: 0.85em; color: #566573; overflow-wrap: anywhere"
-        )
-        return f'<footer style="{style}">{line}.{files}</footer>'
+        return f"<footer>{line}.{files}</footer>"
 
     def whole(self) -> str:
         """Command and files with whole hashes, for metadata."""
@@ -93,7 +90,7 @@ def provenance(inputs: Iterable[Path] = ()) -> Provenance:
         number = "unknown"
     words = COMMAND.get()
     command = "" if words is None else shown_name(shlex.join(["stickslip", *words]))
-    files = [Input(shown_name(path.name), _sha256(path)) for path in dict.fromkeys(inputs)]
+    files = [Input(shown_name(path.name), file_sha256(path)) for path in dict.fromkeys(inputs)]
     return Provenance(number, command, _now(), files)
 
 
@@ -109,6 +106,7 @@ def _now() -> datetime:
     return datetime.now(UTC).replace(microsecond=0)
 
 
-def _sha256(path: Path) -> str:
+def file_sha256(path: Path) -> str:
+    """Hash of a file, in hexadecimal. Raises OSError."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

@@ -8,7 +8,7 @@ import sys
 import typer
 
 from cockpit.cli import app as stickslip
-from cockpit.run.child_process import guarded, prepare_stdout
+from cockpit.run.child_process import exit_status_of, prepare_stdout
 
 
 def main(app: typer.Typer = stickslip) -> None:
@@ -34,7 +34,7 @@ def main(app: typer.Typer = stickslip) -> None:
     # Registered first, so it runs last, and ends the process before the interpreter is torn down: an Arrow thread that frees a
     # table during the teardown aborts the process. With both cores busy 7 of 48 commands that read a CSV ended by SIGABRT.
     atexit.register(end)
-    status = guarded(lambda: _status(app))
+    status = exit_status_of(lambda: _status(app))
     sys.exit(status)
 
 

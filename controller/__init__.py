@@ -17,7 +17,6 @@ telemetry      the state for plots and the memory for replay
 node, app      the controller as a participant of the bus; the process
 freshness      whether blocks come in time; stalls of the controller itself
 replay         the controller on the frames of a log, piece by piece; replay_steps: its steps compared with the log's
-codes          modes, states, reasons and limits as numbers
 loop_design    margins of the amplitude loop where its delay is off
 message_faults faults of the messages that it receives; rig_header: whether it can control the rig
 

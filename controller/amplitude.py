@@ -9,7 +9,8 @@ never measured starts at a tenth of the rigid mount's stroke, as a mount may res
 import math
 
 from bridge.kernel import Record, kernel
-from controller.codes import CHECKING, HELD, PIEZO_WEAK
+from bridge.layouts import ControllerMemory, ControllerParams
+from bridge.wire.stickslip_pb2 import CHECKING, HELD, PIEZO_WEAK
 from controller.trips.band import banded, is_known, note_known
 from controller.trips.delivered import is_even, note_command
 from controller.trips.doubts import ACCELEROMETER
@@ -41,19 +42,19 @@ _ALARM_RATIO = 1.05  # v_a / v_d below which a vibration is too weak
 
 
 @kernel
-def note_sent(p: Record, s: Record) -> None:
+def note_sent(p: ControllerParams, s: ControllerMemory) -> None:
     """Remember the commanded and the wanted v_a of this step [m/s]."""
     s.sent_m[s.steps % REMEMBERED] = s.allowed_m
     sent_mps, slot = TWO_PI * s.allowed_Hz * s.allowed_m, s.steps // p.slot_steps % p.slots
-    anew = s.steps % p.slot_steps == 0
-    s.least_sent_mps[slot] = sent_mps if anew else min(s.least_sent_mps[slot], sent_mps)
-    s.most_sent_mps[slot] = sent_mps if anew else max(s.most_sent_mps[slot], sent_mps)
+    is_new_slot = s.steps % p.slot_steps == 0
+    s.least_sent_mps[slot] = sent_mps if is_new_slot else min(s.least_sent_mps[slot], sent_mps)
+    s.most_sent_mps[slot] = sent_mps if is_new_slot else max(s.most_sent_mps[slot], sent_mps)
     wanted_mps = s.wanted_velocity_mps
-    s.most_wanted_mps[slot] = wanted_mps if anew else max(s.most_wanted_mps[slot], wanted_mps)
+    s.most_wanted_mps[slot] = wanted_mps if is_new_slot else max(s.most_wanted_mps[slot], wanted_mps)
 
 
 @kernel
-def _largest(p: Record, slots: Record) -> float:
+def _largest(p: ControllerParams, slots: Record) -> float:
     largest = 0.0
     for i in range(p.slots):
         largest = max(largest, slots[i])
@@ -61,7 +62,7 @@ def _largest(p: Record, slots: Record) -> float:
 
 
 @kernel
-def _least(p: Record, slots: Record) -> float:
+def _least(p: ControllerParams, slots: Record) -> float:
     least = math.inf
     for i in range(p.slots):
         least = min(least, slots[i])
@@ -69,7 +70,7 @@ def _least(p: Record, slots: Record) -> float:
 
 
 @kernel
-def listen(p: Record, s: Record, late: bool) -> None:
+def listen(p: ControllerParams, s: ControllerMemory, late: bool) -> None:
     """Learn loop delay and gain from the v_a of this block, and correct the gain where v_a is too large.
 
     A block that comes `late` shows a v_a that was commanded longer ago than is known: nothing is learnt from it. Soon after a
@@ -113,7 +114,7 @@ def listen(p: Record, s: Record, late: bool) -> None:
 
 
 @kernel
-def _learn(p: Record, s: Record, i: int, most_mps: float) -> None:
+def _learn(p: ControllerParams, s: ControllerMemory, i: int, most_mps: float) -> None:
     """Learn a candidate's gain from a v_a that no recent command explains; `most_mps` is the largest of these commands."""
     now_mps = s.vibration_velocity_mps
     if s.expected_mps <= 0.0 or now_mps <= 0.0:
@@ -132,7 +133,7 @@ def _learn(p: Record, s: Record, i: int, most_mps: float) -> None:
 
 
 @kernel
-def _note_silence(s: Record) -> None:
+def _note_silence(s: ControllerMemory) -> None:
     """Learn the accelerometer's noise while the base is at rest."""
     s.noise_steps = min(s.noise_steps + 1, _MEAN_STEPS)
     s.noise_mps += (s.fast_mps - s.noise_mps) / s.noise_steps
@@ -144,7 +145,7 @@ def _bounded(log_gain: float) -> float:
 
 
 @kernel
-def _note_delay(s: Record) -> None:
+def _note_delay(s: ControllerMemory) -> None:
     """The first vibration is heard: the steps since it was commanded are the loop delay."""
     if s.loop_delay_steps < 0:
         s.loop_delay_steps = s.onset_steps
@@ -156,7 +157,7 @@ def _note_delay(s: Record) -> None:
 
 
 @kernel
-def _hold_down(p: Record, s: Record, i: int, most_mps: float) -> None:
+def _hold_down(p: ControllerParams, s: ControllerMemory, i: int, most_mps: float) -> None:
     wanted_mps = _largest(p, s.most_wanted_mps)
     ratio = s.fast_mps / wanted_mps if wanted_mps > 0.0 else 0.0
     s.loud_steps = s.loud_steps + 1 if ratio > _LOUDER else 0
@@ -168,7 +169,7 @@ def _hold_down(p: Record, s: Record, i: int, most_mps: float) -> None:
 
 
 @kernel
-def amplitude(p: Record, s: Record) -> None:
+def amplitude(p: ControllerParams, s: ControllerMemory) -> None:
     """Set the wanted amplitude [m] for the wanted v_a, and decide whether the piezo is too weak for it."""
     velocity_mps = s.wanted_velocity_mps
     s.cut_steps = max(s.cut_steps - 1, 0)
@@ -198,7 +199,7 @@ def amplitude(p: Record, s: Record) -> None:
 
 
 @kernel
-def _judge_piezo(p: Record, s: Record, weak: bool) -> None:
+def _judge_piezo(p: ControllerParams, s: ControllerMemory, weak: bool) -> None:
     if not is_judged(s):
         s.weak_s = 0.0
         return

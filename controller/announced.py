@@ -3,7 +3,8 @@
 import math
 from typing import Final
 
-from bridge.kernel import Record, kernel
+from bridge.kernel import kernel
+from bridge.layouts import ControllerMemory
 
 # Announcements that are kept. A rig whose velocity changes in every block announces one a block: the ring then looks so many
 # blocks ahead, and a rig file is refused that would look further.
@@ -11,7 +12,7 @@ MOST_ANNOUNCED: Final = 64
 
 
 @kernel
-def take_announcement(s: Record, holds_from_ns: int, drive_velocity_mps: float) -> None:
+def take_announcement(s: ControllerMemory, holds_from_ns: int, drive_velocity_mps: float) -> None:
     """Remember an announcement in place of the oldest one: from when the drive has which velocity.
 
     The n-th of all, from 0, is at place n % MOST_ANNOUNCED; `s.announced_count` of them came so far.
@@ -23,7 +24,7 @@ def take_announcement(s: Record, holds_from_ns: int, drive_velocity_mps: float) 
 
 
 @kernel
-def announced_ahead(s: Record, t_ns: int, until_ns: int) -> float:
+def announced_ahead(s: ControllerMemory, t_ns: int, until_ns: int) -> float:
     """The fastest announced velocity of the drive between two times [m/s], backwards below 0; 0 where none is announced."""
     holding_ns, holding_mps, fastest_mps = -1, 0.0, 0.0
     for i in range(min(s.announced_count, MOST_ANNOUNCED)):

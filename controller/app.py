@@ -4,7 +4,7 @@ import threading
 from collections.abc import Callable
 
 from bridge.faults import Fault
-from bridge.plain import Tell, untold
+from bridge.plain import StepReport, no_report
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.clock import time
@@ -51,20 +51,20 @@ def run(
     header: wire.Header,
     lockstep: bool,
     stop: threading.Event,
-    tell: Tell = untold,
+    report: StepReport = no_report,
 ) -> int:
     """Answer every block on the bus until the plant ends its run or `stop` is set; return the number of steps.
 
-    `tell`: reports the life of this process to the operator.
+    `report`: reports the life of this process to the operator.
 
     Raises Fault NO_PEER, PEER_DIED, BAD_MESSAGE, CONFIG, ENDPOINT_BUSY.
     """
     node = ControllerNode(config, lockstep)
     node.warm_up()
-    tell("waiting", f"for a rig at {bus_config.endpoint}, at most {bus_config.wait_s:g} s")
+    report("waiting", f"for a rig at {bus_config.endpoint}, at most {bus_config.wait_s:g} s")
     with Bus(bus_config, "controller", lockstep, stop) as bus:
         bus.serve_header(header)
-        process = ControllerProcess(config, node, bus, lockstep, tell=tell)
+        process = ControllerProcess(config, node, bus, lockstep, report=report)
         process.prepare()
         _refuse_a_second(bus, bus_config.endpoint)
         refuse_another_rig(bus.headers(["plant"], _HEADER_S, stop).get("plant"), config)
@@ -76,9 +76,9 @@ def run(
         else:
             granted = realtime.claim(realtime.core(1))  # before the announcement, as the rig may begin right after
         bus.announce()
-        tell("joined", f"the rig at {bus_config.endpoint}; waiting for its first block")
+        report("joined", f"the rig at {bus_config.endpoint}; waiting for its first block")
         process.loop(stop, granted)
-    tell("ended", "stopped" if stop.is_set() else "with the rig")
+    report("ended", "stopped" if stop.is_set() else "with the rig")
     return node.steps
 
 
@@ -119,9 +119,9 @@ class ControllerProcess:
         bus: Bus,
         lockstep: bool,
         inbox: Inbox | None = None,
-        tell: Tell = untold,
+        report: StepReport = no_report,
     ) -> None:
-        self._tell = tell
+        self._report = report
         self._node = node
         self._bus = bus
         self._lockstep = lockstep
@@ -136,7 +136,7 @@ class ControllerProcess:
         self._restarts = 0
         self._rig_again = RigAgain(self._rig_header, config)
         self._rig_came = 0
-        self._rig_lost = ""  # the reason, from RIG_LOST until blocks come again
+        self._rig_lost = ""  # the reason, from RIG_LOST until blocks arrive
         self._blocks = Freshness(config.block_s, config.limits.stale_after_s)
         self._unreadable = False  # NOT_FINITE was published, and no FRESH since
         self._unreadable_reported_s = -1.0
@@ -160,7 +160,7 @@ class ControllerProcess:
         self._events += 1
         self._send[CONTROLLER_EVENT.name](event.SerializeToString())
         if is_listed(code):
-            self._tell(code, text)
+            self._report(code, text)
 
     def loop(self, stop: threading.Event, granted: str) -> None:
         """Consume blocks in order and answer each block; the plant applies the newest answer that it has.
@@ -195,7 +195,7 @@ class ControllerProcess:
                     self._publish(blocks.heard(time.monotonic(), self._node.block_was_late))
                 if received.topic is SENSORS and not started:
                     started = True
-                    self._tell("running", granted or "in lockstep")
+                    self._report("running", granted or "in lockstep")
                     if not self._lockstep:
                         # now, as the plant sends its first block only when the recorder listens
                         self.event("START", granted)
@@ -277,7 +277,7 @@ class ControllerProcess:
             self.event("RIG_RESTARTED", text)
             self._rig_again.begin()
         if self._rig_lost:  # with the reason again: RIG_LOST may not have passed the broken link
-            self._tell("joined", "the rig again")
+            self._report("joined", "the rig again")
             self.event("RIG_BACK", f"blocks arrive again, from block {node.last_block} on; {self._rig_lost}")
             self._rig_lost = ""
         if self._end_sent_s is not None and time.monotonic() - self._end_sent_s > _PLANT_LOST_S:
@@ -343,5 +343,5 @@ class ControllerProcess:
             raise Fault("PEER_DIED", f"{text}, {silent_s:.1f} s ago")
         if not self._rig_lost:
             self._rig_lost = f"{text} then"
-            self._tell("waiting", f"for the rig, at most {_GIVEN_UP_S:g} s: {text}")
+            self._report("waiting", f"for the rig, at most {_GIVEN_UP_S:g} s: {text}")
             self.event("RIG_LOST", f"{text}; waiting for it for {_GIVEN_UP_S:g} s")

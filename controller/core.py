@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy.typing as npt
 
-from bridge.kernel import Record, kernel, shared_kernel
+from bridge.kernel import kernel, shared_kernel
+from bridge.layouts import CommandRow, ControllerMemory, ControllerParams, SensorRow, TraceRow
+from bridge.wire.messages import BLOCK, LATE
 from controller.amplitude import FIRST_SHARE, amplitude, listen, note_sent
-from controller.codes import BLOCK, LATE
 from controller.estimate.contact import contact
 from controller.estimate.learning import begin, forces, spring, stiffness
 from controller.estimate.motion import drive_velocity
@@ -42,14 +43,14 @@ def step(
     Args:
         params, state: one record each of `controller.records.PARAMS` and `STATE`.
         sensors: one sensor block; not read when `events` has no BLOCK.
-        events: bits of `controller.codes`: BLOCK, GAP, STALE, STOP, RESET, ANNOUNCED, LATE.
+        events: bits of `bridge.wire.messages`: BLOCK, GAP, STALE, STOP, RESET, ANNOUNCED, LATE.
         gap_blocks: number of lost blocks just before this block.
         t_ns: time of the frame.
         command, trace: one message record each; all is filled except the trace's lateness.
 
     """
-    p: Record = params[0]
-    s: Record = state[0]
+    p: ControllerParams = params[0]
+    s: ControllerMemory = state[0]
     if s.steps == 0:
         _begin(p, s)
     end_trips(p, s, events)
@@ -57,7 +58,7 @@ def step(
     force_N = 0.0
     usable = True
     if events & BLOCK:
-        block: Record = sensors[0]
+        block: SensorRow = sensors[0]
         s.block = block.sequence
         s.run, s.guard_state = block.run, block.guard_state
         note_check(p, s, float(block.check_Hz), float(block.check_gain))
@@ -80,7 +81,7 @@ def step(
     allow(p, s, events, s.wanted_Hz, s.wanted_m if usable else math.nan)
     note_sent(p, s)
 
-    c: Record = command[0]
+    c: CommandRow = command[0]
     c.sequence = s.steps
     c.t_ns = t_ns
     c.block = s.block
@@ -91,7 +92,7 @@ def step(
     c.reason = reported_reason(s)
     c.run = s.run
 
-    t: Record = trace[0]
+    t: TraceRow = trace[0]
     t.sequence = s.steps
     t.t_ns = t_ns
     t.block = s.block
@@ -128,7 +129,7 @@ def step(
 
 
 @kernel
-def _begin(p: Record, s: Record) -> None:
+def _begin(p: ControllerParams, s: ControllerMemory) -> None:
     """Set the memory that is not zero at the start."""
     begin(p, s)
     begin_known(p, s)
@@ -144,7 +145,9 @@ def _begin(p: Record, s: Record) -> None:
 
 
 @kernel
-def _mean(p: Record, s: Record, block: Record, first: int, samples: int) -> tuple[float, float, float]:
+def _mean(
+    p: ControllerParams, s: ControllerMemory, block: SensorRow, first: int, samples: int
+) -> tuple[float, float, float]:
     """Means of force [N], slide and drive position [m] over some samples; without a force sensor the spring's own force."""
     force_N, slide_m, drive_m = 0.0, 0.0, 0.0
     for i in range(first, first + samples):
@@ -164,7 +167,7 @@ def _mean(p: Record, s: Record, block: Record, first: int, samples: int) -> tupl
 
 
 @kernel
-def _bridge(p: Record, s: Record, block: Record) -> None:
+def _bridge(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> None:
     """Fill the windows evenly over lost blocks; empty them where more are lost than the shortest windows remember."""
     bins = s.missing_blocks * (p.samples_per_block // p.bin_samples)
     if bins > _MOST_BRIDGED_BINS or s.pushed[0] < BINS:
@@ -188,7 +191,7 @@ def _bridge(p: Record, s: Record, block: Record) -> None:
 
 
 @kernel
-def _look(p: Record, s: Record, block: Record) -> float:
+def _look(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> float:
     """Estimate motion and contact, tick by tick; return the mean force of the block [N]."""
     if s.steps % _STEPS_LOOK == 0:
         note_steps(s, FORCE, block.drive_force_N)

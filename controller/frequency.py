@@ -2,13 +2,14 @@
 
 import math
 
-from bridge.kernel import Record, kernel
+from bridge.kernel import kernel
+from bridge.layouts import ControllerMemory, ControllerParams
 
 TWO_PI = 2.0 * math.pi
 
 
 @kernel
-def cost(p: Record, s: Record, i: int, velocity_mps: float) -> float:
+def cost(p: ControllerParams, s: ControllerMemory, i: int, velocity_mps: float) -> float:
     """Cost of a v_a [m/s] at a candidate: the shares of stroke and of the accelerometer's range that it takes, squared.
 
     A resonance that was measured takes less stroke but its gain moves; so no gain counts as more than 1.
@@ -21,7 +22,7 @@ def cost(p: Record, s: Record, i: int, velocity_mps: float) -> float:
 
 
 @kernel
-def cheapest(p: Record, s: Record, velocity_mps: float, but: int) -> int:
+def cheapest(p: ControllerParams, s: ControllerMemory, velocity_mps: float, but: int) -> int:
     """The candidate of least cost, the lowest of equals; never candidate `but` where there is another."""
     best, least = -1, math.inf
     for i in range(p.candidates):

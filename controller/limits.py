@@ -2,9 +2,10 @@
 
 import math
 
-from bridge.kernel import Record, kernel
-from controller.codes import (
-    BLOCK,
+from bridge.kernel import kernel
+from bridge.layouts import ControllerMemory, ControllerParams
+from bridge.wire.messages import BLOCK, RESET, STALE, STOP
+from bridge.wire.stickslip_pb2 import (
     FREQUENCY_BAND,
     GAIN_LIMIT,
     HELD_OPEN_LOOP,
@@ -13,11 +14,8 @@ from controller.codes import (
     NOT_FINITE,
     OPERATOR_STOP,
     RANGE,
-    RESET,
     SLEW,
-    STALE,
     STALE_INPUT,
-    STOP,
 )
 from controller.trips.doubts import ACCELEROMETER, DRIVE
 
@@ -25,7 +23,7 @@ TWO_PI = 2.0 * math.pi
 
 
 @kernel
-def _allowed_frequency(p: Record, frequency_Hz: float) -> float:
+def _allowed_frequency(p: ControllerParams, frequency_Hz: float) -> float:
     """The nearest frequency inside the range and outside every forbidden band, upwards first [Hz]."""
     result = min(max(frequency_Hz, p.frequency_min_Hz), p.frequency_max_Hz)
     for i in range(p.bands):  # the bands are 2 Hz or more apart, so 1 Hz outside a band lies in no other
@@ -38,7 +36,7 @@ def _allowed_frequency(p: Record, frequency_Hz: float) -> float:
 
 
 @kernel
-def allow(p: Record, s: Record, events: int, wanted_Hz: float, wanted_m: float) -> None:
+def allow(p: ControllerParams, s: ControllerMemory, events: int, wanted_Hz: float, wanted_m: float) -> None:
     """Set `allowed_Hz`, `allowed_m` and the `limit` that changed the wanted vibration.
 
     The amplitude goes to zero, at the slew limit, on an operator's stop, without fresh input, and for NaN or infinity. A stop
@@ -91,7 +89,7 @@ def allow(p: Record, s: Record, events: int, wanted_Hz: float, wanted_m: float) 
 
 
 @kernel
-def _of_trips(s: Record) -> int:
+def _of_trips(s: ControllerMemory) -> int:
     """The limit on the amplitude that a doubt causes."""
     if s.doubted & DRIVE:
         return NO_DRIVE

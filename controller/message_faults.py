@@ -15,12 +15,12 @@ class MessageFaults:
     Args:
         node: the controller.
         inbox: where its messages wait.
-        tell: publishes an event with a code and a text.
+        publish: publishes an event with a code and a text.
 
     """
 
-    def __init__(self, node: ControllerNode, inbox: Inbox, tell: Callable[[str, str], None]) -> None:
-        self.complaints = Complaints(tell)
+    def __init__(self, node: ControllerNode, inbox: Inbox, publish: Callable[[str, str], None]) -> None:
+        self.complaints = Complaints(publish)
         self._node = node
         self._inbox = inbox
         self._seen: dict[str, int] = {}

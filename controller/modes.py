@@ -1,7 +1,8 @@
 """How the controller goes from one mode to another, and which frequency it vibrates at."""
 
-from bridge.kernel import Record, kernel
-from controller.codes import EXCITE, WATCH
+from bridge.kernel import kernel
+from bridge.layouts import ControllerMemory, ControllerParams
+from bridge.wire.stickslip_pb2 import EXCITE, WATCH
 from controller.frequency import cheapest
 from controller.needs.need import swing_held, way_of
 
@@ -9,7 +10,7 @@ _RETRY_S = 60.0  # until a vibration that could not help is tried again; doubles
 
 
 @kernel
-def enter(s: Record, mode: int, reason: int) -> None:
+def enter(s: ControllerMemory, mode: int, reason: int) -> None:
     """Set mode and reason; a change of mode resets the counters of the mode."""
     if s.mode != mode:
         s.mode = mode
@@ -22,7 +23,7 @@ def enter(s: Record, mode: int, reason: int) -> None:
 
 
 @kernel
-def excite(p: Record, s: Record, reason: int, ratio: float) -> None:
+def excite(p: ControllerParams, s: ControllerMemory, reason: int, ratio: float) -> None:
     """Begin, or go on, to vibrate at least at `ratio`."""
     way = way_of(s)
     s.ratio[way] = max(s.ratio[way], ratio)
@@ -35,7 +36,7 @@ def excite(p: Record, s: Record, reason: int, ratio: float) -> None:
 
 
 @kernel
-def tune_to(p: Record, s: Record, candidate: int) -> None:
+def tune_to(p: ControllerParams, s: ControllerMemory, candidate: int) -> None:
     """Vibrate at a candidate frequency."""
     s.candidate = candidate
     s.wanted_Hz = p.candidate_Hz[candidate]
@@ -43,7 +44,7 @@ def tune_to(p: Record, s: Record, candidate: int) -> None:
 
 
 @kernel
-def stop_helping(s: Record, reason: int) -> None:
+def stop_helping(s: ControllerMemory, reason: int) -> None:
     """Leave the axis alone for a time that doubles."""
     way = way_of(s)
     s.off_s[way] = _RETRY_S if s.off_s[way] == 0.0 else 2.0 * s.off_s[way]

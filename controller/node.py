@@ -7,13 +7,12 @@ from bridge.kernel_cache import compile_once
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.block_numbers import BlockNumbers, NumberCheck
 from bridge.wire.messages import ANNOUNCE as ANNOUNCE_LAYOUT
+from bridge.wire.messages import ANNOUNCED, BLOCK, GAP, LATE, RESET, STALE, STOP, has_checksum, is_whole, sensor_block
 from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
 from bridge.wire.messages import TRACE as TRACE_LAYOUT
-from bridge.wire.messages import has_checksum, is_whole, sensor_block
 from bridge.wire.payloads import sequence_and_time
 from bridge.wire.topics import ANNOUNCE, COMMAND, SENSORS, SNAPSHOT, STATE, TRACE, Outgoing
 from controller.announced import take_announcement
-from controller.codes import ANNOUNCED, BLOCK, GAP, LATE, RESET, STALE, STOP
 from controller.config import ControllerConfig
 from controller.core import step
 from controller.records import build
@@ -60,7 +59,7 @@ class ControllerNode:
         self._wrong_lengths_ns: list[int] = []
         self._operator_events = 0
         self._announced = 0  # the bit ANNOUNCED where announcements came since the last frame
-        self._teller = TripEvents()
+        self._trip_events = TripEvents()
         self.age = Age()
         self._lockstep = lockstep
         self.slide_accel_unread = False  # the slide's accelerometer shows no numbers
@@ -215,7 +214,7 @@ class ControllerNode:
 
     def news(self) -> list[tuple[str, str]]:
         """Codes and texts of trips and limits that the last step began, or ended."""
-        return self._teller.news(self._trace[0], bool(self._state[0]["quiet_s"] < SETTLED_S))
+        return self._trip_events.news(self._trace[0], bool(self._state[0]["quiet_s"] < SETTLED_S))
 
     def rest(self, lateness_ns: int) -> list[Outgoing]:
         """The messages after the command: the trace, and at their rates the plotted state and a snapshot of the memory."""

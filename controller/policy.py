@@ -7,9 +7,9 @@ PROBE   fade out, no faster than the slide follows, to see whether the vibration
 
 import math
 
-from bridge.kernel import Record, kernel
-from controller.announced import announced_ahead
-from controller.codes import (
+from bridge.kernel import kernel
+from bridge.layouts import ControllerMemory, ControllerParams
+from bridge.wire.stickslip_pb2 import (
     ACTIVE,
     ARMED,
     BLIND,
@@ -34,6 +34,7 @@ from controller.codes import (
     STOPPED,
     WATCH,
 )
+from controller.announced import announced_ahead
 from controller.config import MODES
 from controller.frequency import cheapest
 from controller.modes import enter, excite, stop_helping, tune_to
@@ -81,7 +82,7 @@ _WORSE = 1.1  # roughness with vibration over that without from which the vibrat
 
 
 @kernel
-def decide(p: Record, s: Record, t_ns: int, force_N: float, block_s: float) -> None:
+def decide(p: ControllerParams, s: ControllerMemory, t_ns: int, force_N: float, block_s: float) -> None:
     """Set the mode and its reason, and the wanted vibration velocity amplitude [m/s]."""
     s.mode_s += block_s
     way = way_of(s)
@@ -131,7 +132,7 @@ def decide(p: Record, s: Record, t_ns: int, force_N: float, block_s: float) -> N
 
 
 @kernel
-def _still_sliding_mps(s: Record) -> float:
+def _still_sliding_mps(s: ControllerMemory) -> float:
     """Velocity of a slide that still slows down after its drive: v_a must not fall below it, or the slide is lost.
 
     Only a decrease counts: a slide that speeds up is released by the vibration itself, and more v_a would release more.
@@ -144,7 +145,7 @@ def _still_sliding_mps(s: Record) -> float:
 
 
 @kernel
-def _held_ratio(p: Record, s: Record, way: int, force_N: float, speed_mps: float) -> float:
+def _held_ratio(p: ControllerParams, s: ControllerMemory, way: int, force_N: float, speed_mps: float) -> float:
     """The ratio in EXCITE. v_d is measured a window late, so a drive that speeds up needs more."""
     if s.steady_s > STEADY_S or s.held_mps > _RISING * speed_mps:
         return s.ratio[way]
@@ -156,7 +157,7 @@ def _held_ratio(p: Record, s: Record, way: int, force_N: float, speed_mps: float
 
 
 @kernel
-def _look_ahead_s(p: Record, s: Record) -> float:
+def _look_ahead_s(p: ControllerParams, s: ControllerMemory) -> float:
     """Time from a command to v_a: loop delay, and for a drive at rest also the slew to the largest amplitude.
 
     A moving drive gets no more, as an early v_a would release a slide that a smaller v_a holds.
@@ -171,7 +172,7 @@ def _look_ahead_s(p: Record, s: Record) -> float:
 
 
 @kernel
-def _stand(p: Record, s: Record) -> None:
+def _stand(p: ControllerParams, s: ControllerMemory) -> None:
     if p.mode == SETTLE and s.mode == EXCITE:
         s.settle_left_s, s.settle_mps = p.settle_s, s.held_mps
         enter(s, WATCH, SETTLING)
@@ -180,7 +181,9 @@ def _stand(p: Record, s: Record) -> None:
 
 
 @kernel
-def _watch(p: Record, s: Record, way: int, speed_mps: float, ahead_mps: float, block_s: float) -> float:
+def _watch(
+    p: ControllerParams, s: ControllerMemory, way: int, speed_mps: float, ahead_mps: float, block_s: float
+) -> float:
     """Without vibration; returns the ratio of a vibration that dies out after a move."""
     if s.reason == SETTLING:
         s.settle_left_s = max(s.settle_left_s - block_s, 0.0)
@@ -230,7 +233,7 @@ def _watch(p: Record, s: Record, way: int, speed_mps: float, ahead_mps: float, b
 
 
 @kernel
-def _hold(p: Record, s: Record, way: int, force_N: float, speed_mps: float, block_s: float) -> None:
+def _hold(p: ControllerParams, s: ControllerMemory, way: int, force_N: float, speed_mps: float, block_s: float) -> None:
     starting_s = _STARTING_S + 12.0 * max(s.loop_delay_steps, 0) * block_s
     if p.mode == START_ONLY and s.moved_s > p.start_s:
         enter(s, WATCH, NOTHING_TO_DO)
@@ -276,7 +279,9 @@ def _hold(p: Record, s: Record, way: int, force_N: float, speed_mps: float, bloc
 
 
 @kernel
-def _note_swing(p: Record, s: Record, force_N: float, speed_mps: float, block_s: float, settle_s: float) -> None:
+def _note_swing(
+    p: ControllerParams, s: ControllerMemory, force_N: float, speed_mps: float, block_s: float, settle_s: float
+) -> None:
     """Remember the swing of friction that makes v_s swing, without the swing caused by the ratio or its wobble."""
     share = min(block_s / min(max(_PERIODS * TWO_PI * settle_s, _LEAST_CALM_S), _LONGEST_S), 1.0)
     if s.steps % _LOOK_STEPS == 0 or s.swing_level < 0:
@@ -300,7 +305,7 @@ def _note_swing(p: Record, s: Record, force_N: float, speed_mps: float, block_s:
 
 
 @kernel
-def _more(p: Record, s: Record, way: int, by: float) -> None:
+def _more(p: ControllerParams, s: ControllerMemory, way: int, by: float) -> None:
     """The vibration does not do: more of it, then another frequency, then none."""
     if s.at_limit == 0 and s.ratio[way] < p.most_ratio:
         raise_ratio(p, s, by)
@@ -317,7 +322,7 @@ def _more(p: Record, s: Record, way: int, by: float) -> None:
 
 
 @kernel
-def _note_roughness(s: Record, speed_mps: float, block_s: float) -> None:
+def _note_roughness(s: ControllerMemory, speed_mps: float, block_s: float) -> None:
     """Add up (v_s / v_d - 1)^2, which shows whether a vibration makes the motion worse."""
     if s.level < 0 or s.moving == 0:
         return

@@ -17,8 +17,7 @@ import numpy.typing as npt
 from bridge.faults import Fault
 from bridge.log.logfile import RunData
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import ANNOUNCE, COMMAND, TRACE, Records, sensor_block
-from controller.codes import BLOCK
+from bridge.wire.messages import ANNOUNCE, BLOCK, COMMAND, TRACE, Records, sensor_block
 from controller.config import ControllerConfig
 from controller.records import LAYOUT_ID, STATE, build
 from controller.replay_steps import (

@@ -7,9 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.kernel import Record, kernel, unlocked_kernel
-from bridge.wire.messages import COMMAND, TRACE, Layout, Records
+from bridge.layouts import ControllerMemory, TraceRow
+from bridge.wire.messages import BLOCK, COMMAND, TRACE, Layout, Records
 from controller.announced import take_announcement
-from controller.codes import BLOCK
 from controller.core import step
 
 _OF_A_CLOCK = "lateness_ns"  # the field that is not compared
@@ -81,10 +81,10 @@ def _steps(
     command_bytes: npt.NDArray[np.uint8],
 ) -> tuple[int, int, int, int, int]:
     """Steps up to the first that differs, whose answer `command` and `trace` then hold, or that cannot be taken; see `Taken`."""
-    s: Record = state[0]
+    s: ControllerMemory = state[0]
     compared, lacks, block_at, command_at = 0, 0, -1, -1
     for i in range(logged_trace.shape[0]):
-        t: Record = logged_trace[i]
+        t: TraceRow = logged_trace[i]
         # of the type that the process has: for another the whole step would be compiled once more
         events: Any = np.int64(t.events)
         gap_blocks: Any = np.int64(t.gap_blocks)

@@ -3,6 +3,7 @@
 import math
 
 from bridge.kernel import Record, kernel
+from bridge.layouts import ControllerMemory, ControllerParams
 
 TWO_PI = 2.0 * math.pi
 
@@ -34,7 +35,7 @@ def _fit(samples: Record, step_rad: float, start_rad: float) -> tuple[float, flo
 
 
 @kernel
-def measure(p: Record, s: Record, base_accel_mps2: Record) -> None:
+def measure(p: ControllerParams, s: ControllerMemory, base_accel_mps2: Record) -> None:
     """Demodulate the base accelerometer at the commanded frequency into v_a = a / (2 pi f).
 
     Args:
@@ -55,7 +56,7 @@ def measure(p: Record, s: Record, base_accel_mps2: Record) -> None:
 
 
 @kernel
-def _velocity(p: Record, frequency_Hz: float, in_phase_mps2: float, quadrature_mps2: float) -> float:
+def _velocity(p: ControllerParams, frequency_Hz: float, in_phase_mps2: float, quadrature_mps2: float) -> float:
     """v_a of an acceleration, with the accelerometer's roll-off undone."""
     rolled_off = frequency_Hz / p.accel_bandwidth_Hz
     amplitude_mps2 = math.sqrt(in_phase_mps2 * in_phase_mps2 + quadrature_mps2 * quadrature_mps2)
@@ -63,13 +64,13 @@ def _velocity(p: Record, frequency_Hz: float, in_phase_mps2: float, quadrature_m
 
 
 @kernel
-def velocity_of(p: Record, frequency_Hz: float, samples: Record) -> float:
+def velocity_of(p: ControllerParams, frequency_Hz: float, samples: Record) -> float:
     """v_a of one block of an accelerometer [m/s], by itself."""
     a, b = _fit(samples, TWO_PI * frequency_Hz * p.sample_s, 0.0)
     return _velocity(p, frequency_Hz, a, b)
 
 
 @kernel
-def skip(p: Record, s: Record, blocks: int) -> None:
+def skip(p: ControllerParams, s: ControllerMemory, blocks: int) -> None:
     """Turn the demodulator's phase through lost blocks, during which the exciter went on."""
     s.phase_rad = (s.phase_rad + TWO_PI * s.allowed_Hz * p.block_s * blocks) % TWO_PI

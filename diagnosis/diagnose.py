@@ -35,9 +35,8 @@ from diagnosis.verdict.held_out import HeldOut
 from diagnosis.verdict.judge import Verdict, with_outside
 from diagnosis.verdict.selection import Contest, Hints, Progress
 
-_FOR_FITS = (
-    0.7  # share of the time budget for the fits; the rest is for held-out runs, the next experiment and pictures
-)
+# share of the time budget for the fits; the rest is for held-out runs, the next experiment and pictures
+_FOR_FITS = 0.7
 _NO_FIT = Finding("budget", "fits", "none was made: names and shares come from relations and friction alone")
 _CUT_SHORT = Finding("budget", "fits", "ended before every effect was tried: this is the best answer by then")
 

@@ -19,6 +19,7 @@ from joblib.externals.loky import BrokenProcessPool
 
 from bridge.faults import Fault
 from bridge.files import shown
+from bridge.results import in_json
 from bridge.wire import certificates
 from bridge.wire.bus_config import is_loopback
 from diagnosis.evidence.folder import Evidence, load_evidence
@@ -39,12 +40,26 @@ class EvidenceFolder(NamedTuple):
     folder: Path
 
 
+class FolderFault(NamedTuple):
+    """Why a folder has no diagnosis."""
+
+    fault: str  # code
+    line: str
+
+
 class FolderResult(NamedTuple):
     """The result of one folder: a diagnosis, or the code and the line of a fault."""
 
     source: EvidenceFolder
     diagnosis: Diagnosis | None
-    fault: tuple[str, str] | None
+    fault: FolderFault | None
+    JSON_HIDDEN = ("source",)
+    JSON_OPTIONAL = "diagnosis", "fault"
+
+    @in_json
+    def evidence(self) -> str:
+        """Name of the folder."""
+        return self.source.name
 
 
 def find_sources(folders: list[Path]) -> list[EvidenceFolder]:
@@ -147,20 +162,20 @@ def _one(source: EvidenceFolder, task: _Task) -> FolderResult:
             diagnosis = task.diagnose(load_evidence(source.folder), lambda _text, _share: None, task.jobs)
         return FolderResult(source, diagnosis, None)
     except Fault as fault:
-        return FolderResult(source, None, (fault.kind.code, fault.line))
+        return FolderResult(source, None, FolderFault(fault.kind.code, fault.line))
     except BrokenProcessPool as error:
         return _died(source, error)
     except Exception as error:  # an error in one folder must not end the work on the others
         at = traceback.extract_tb(error.__traceback__)[-1]
         line = f"{type(error).__name__}: {error} ({Path(at.filename).name}, line {at.lineno})"
-        return FolderResult(source, None, ("DIAGNOSIS_BROKE", line))
+        return FolderResult(source, None, FolderFault("DIAGNOSIS_BROKE", line))
 
 
 def _died(source: EvidenceFolder, error: Exception) -> FolderResult:
     line = (
         f"{source.folder}: its worker process died ({type(error).__name__}); out of memory? Try fewer or shorter runs"
     )
-    return FolderResult(source, None, ("PEER_DIED", line))
+    return FolderResult(source, None, FolderFault("PEER_DIED", line))
 
 
 class _Workers(NamedTuple):

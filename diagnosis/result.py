@@ -1,13 +1,20 @@
-"""The answer of a diagnosis, and its JSON form (`diagnosis/2`, a fixed contract)."""
+"""The answer of a diagnosis; its JSON (`diagnosis/2`) is a fixed contract."""
 
+import math
 from pathlib import PurePath
-from typing import Any, Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 from bridge.arrays import Floats
 from bridge.log.finding import Finding
+from bridge.results import in_json
 
-FORMAT = "diagnosis/2"
+FORMAT: Final = "diagnosis/2"
 PARAMETERS = "parameters alone"  # the baseline in the comparison on the held-out runs
+
+
+def _name(file: str) -> str:
+    """The file of a run, relative to the evidence folder, without its suffix."""
+    return str(PurePath(file).with_suffix(""))
 
 
 class Estimate(NamedTuple):
@@ -25,6 +32,7 @@ class Candidate(NamedTuple):
     form: str = ""  # the formula of the effect that fitted best
     parameters: dict[str, Estimate] = {}  # names carry their units
     chi2: float | None = None  # of the fit with this effect alone, with the priors of the nuisances; None: not refitted
+    JSON_OPTIONAL = "form", "parameters"
 
 
 class Cell(NamedTuple):
@@ -33,8 +41,14 @@ class Cell(NamedTuple):
     signal: str
     regime: str  # stick, breakaway, slip, restick, steady
     band_Hz: tuple[float, float]
-    run: str
+    file: str  # data file of the run
     share: float
+    JSON_HIDDEN = ("file",)
+
+    @in_json
+    def run(self) -> str:
+        """The run goes by the name of its file without the suffix."""
+        return _name(self.file)
 
 
 class Shrinkage(NamedTuple):
@@ -53,15 +67,21 @@ class Gap(NamedTuple):
     """The gap on held-out runs, in noise floors; 1.0 is a perfect model."""
 
     definition: str
-    runs: tuple[str, ...]  # files of the held-out runs
-    nominal: float  # of the rig as described
-    retuned: float  # of the baseline
-    with_effect: float
-    floor: float
-    shrinkage: float | None
-    interval_90: tuple[float, float] | None
-    compared: tuple[Shrinkage, ...]  # best effect, runner-up, parameters alone, flexible residual
+    files: tuple[str, ...] = ()  # data files of the held-out runs
+    nominal: float = math.nan  # of the rig as described
+    retuned: float = math.nan  # of the baseline
+    with_effect: float = math.nan
+    floor: float = 1.0
+    shrinkage: float | None = None
+    interval_90: tuple[float, float] | None = None
+    compared: tuple[Shrinkage, ...] = ()  # best effect, runner-up, parameters alone, flexible residual
     refuted: tuple[str, ...] = ()  # effects that the fitted runs show and the held-out runs do not confirm
+    JSON_HIDDEN = ("files",)
+
+    @in_json
+    def runs(self) -> tuple[str, ...]:
+        """The held-out runs, each by the name of its file without the suffix."""
+        return tuple(map(_name, self.files))
 
 
 class RigNumber(NamedTuple):
@@ -107,9 +127,8 @@ class Share(NamedTuple):
     what: str  # a cause, "noise" or "unexplained"
     share: float
     interval_90: tuple[float, float] | None  # None for noise
-    null_90: (
-        float | None
-    )  # share that the same noise without that cause stays below in 9 of 10 draws; None for noise and unexplained
+    # share that the same noise without that cause stays below in 9 of 10 draws; None for noise and unexplained
+    null_90: float | None
 
     @property
     def beyond_chance(self) -> bool:
@@ -179,63 +198,9 @@ class Diagnosis(NamedTuple):
     left_out: tuple[LeftOut, ...] = ()
     numbers: tuple[RelationNumber, ...] = ()
     cannot_show: tuple[str, ...] = ()  # effects that this kind of drive, or these runs, cannot show
+    JSON_HIDDEN = ("pictures",)
 
-
-def _name(run: str) -> str:
-    """The file of a run, relative to the evidence folder, without its suffix."""
-    return str(PurePath(run).with_suffix(""))
-
-
-def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
-    """The JSON object of the contract `diagnosis/2`; the pictures are left out.
-
-    A run goes by the name of its file without the suffix.
-    """
-    return {
-        "format": FORMAT,
-        "verdict": diagnosis.verdict,
-        "effects": list(diagnosis.effects),
-        "summary": list(diagnosis.summary),
-        "candidates": [_candidate(candidate) for candidate in diagnosis.candidates],
-        "not_distinguishable": [list(group) for group in diagnosis.not_distinguishable],
-        "where": [
-            {**cell._asdict(), "band_Hz": list(cell.band_Hz), "run": _name(cell.run)} for cell in diagnosis.where
-        ],
-        "gap": {
-            **diagnosis.gap._asdict(),
-            "runs": [_name(run) for run in diagnosis.gap.runs],
-            "interval_90": _listed(diagnosis.gap.interval_90),
-            "compared": [{**row._asdict(), "interval_90": _listed(row.interval_90)} for row in diagnosis.gap.compared],
-        },
-        "next_experiment": diagnosis.next_experiment._asdict(),
-        "rig": [parameter._asdict() for parameter in diagnosis.rig],
-        "findings": [finding._asdict() for finding in diagnosis.findings],
-        "compared_features": diagnosis.compared_features,
-        "elapsed_s": round(diagnosis.elapsed_s, 2),
-        "shares": [{**share._asdict(), "interval_90": _listed(share.interval_90)} for share in diagnosis.shares],
-        "remainder": None if diagnosis.remainder is None else diagnosis.remainder._asdict(),
-        "relations": [{**relation._asdict(), "causes": list(relation.causes)} for relation in diagnosis.relations],
-        "left_out": [omitted._asdict() for omitted in diagnosis.left_out],
-        "cannot_show": list(diagnosis.cannot_show),
-        "numbers": [{**number._asdict(), "interval_90": list(number.interval_90)} for number in diagnosis.numbers],
-    }
-
-
-def _candidate(candidate: Candidate) -> dict[str, Any]:
-    result: dict[str, Any] = {
-        "effect": candidate.effect,
-        "probability": candidate.probability,
-        "chi2": None if candidate.chi2 is None else round(candidate.chi2, 2),
-    }
-    if candidate.form:
-        result["form"] = candidate.form
-    if candidate.parameters:
-        result["parameters"] = {
-            name: {"value": estimate.value, "interval_90": list(estimate.interval_90)}
-            for name, estimate in candidate.parameters.items()
-        }
-    return result
-
-
-def _listed(interval: tuple[float, float] | None) -> list[float] | None:
-    return None if interval is None else list(interval)
+    @in_json
+    def format(self) -> Literal["diagnosis/2"]:
+        """The contract that the JSON keeps."""
+        return FORMAT

@@ -18,7 +18,7 @@ class Constant(NamedTuple):
     file: str
     name: str
     value: str
-    says: str
+    note: str
     counted: str
 
 
@@ -33,7 +33,7 @@ def sections() -> Iterator[tuple[str, list[list[str]]]]:
     """Each room with the cells of its rows."""
     for room in _ROOMS:
         rows = [row for row in constants() if row.file.startswith(f"{room}/")]
-        yield room, [[f"`{row.name}`", row.file, f"`{row.value}`", row.says, row.counted] for row in rows]
+        yield room, [[f"`{row.name}`", row.file, f"`{row.value}`", row.note, row.counted] for row in rows]
 
 
 def _of_module(path: Path) -> Iterator[Constant]:
@@ -45,14 +45,14 @@ def _of_module(path: Path) -> Iterator[Constant]:
         target, value = _assigned(node)
         if target is None or value is None or not _is_number(value):
             continue
-        says = _comment(lines, node.lineno - 1, node.end_lineno or node.lineno)
+        note = _comment(lines, node.lineno - 1, node.end_lineno or node.lineno)
         names = [name.id for name in ast.walk(target) if isinstance(name, ast.Name)]
-        pages = {*_COUNTED.findall(says), *(page for page, body in method.items() if _tells(body, names, path.name))}
+        pages = {*_COUNTED.findall(note), *(page for page, body in method.items() if _counts(body, names, path.name))}
         counted = ", ".join(f"[{page}](../method/{page}.md)" for page in sorted(pages))
-        yield Constant(file, ", ".join(names), ast.unparse(value), says, counted)
+        yield Constant(file, ", ".join(names), ast.unparse(value), note, counted)
 
 
-def _tells(page: str, names: list[str], module: str) -> bool:
+def _counts(page: str, names: list[str], module: str) -> bool:
     """Whether a page has a heading on one of the constants, below the heading of the module."""
     for part in re.split(r"^## ", page, flags=re.MULTILINE)[1:]:
         if part.startswith(f"{module}\n"):

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from bridge.config import Strict
 from bridge.faults import FAULTS
-from bridge.wire.event_codes import EVENTS, LETTERS
+from bridge.wire.event_codes import EVENTS, SEVERITIES
 from bridge.wire.words import words
 from cockpit import cli
 from cockpit.run.scenario import Scenario
@@ -42,10 +42,10 @@ _FAULTS_INTRO = (
 _WORDS_INTRO = """\
 Meaning of the numbers in the columns `mode`, `state`, `reason` and `limit` of a log and of its tables.
 `stickslip explain reason` prints a column, `stickslip explain PIEZO_WEAK` a word."""
-_LETTER_MEANINGS = "; ".join(f"{letter}, {meaning}" for letter, meaning in LETTERS.items() if letter)
-_EVENTS_INTRO = f"""\
-Events that plant, controller and recorder publish on the bus and in a log. The letter follows NAMUR NE 107: {_LETTER_MEANINGS}.
-A run with an event of letter F is not good. `stickslip explain GAP` prints one, `stickslip explain event` all of them."""
+_EVENTS_INTRO = """\
+Events that plant, controller and recorder publish on the bus and in a log. The severity follows NAMUR NE 107: failure (data
+were lost, or a part does not work), out of specification, check (an operator's action, or a test), maintenance, or news.
+A run with a failure is not good. `stickslip explain GAP` prints one, `stickslip explain event` all of them."""
 _FILES_INTRO = """\
 Keys of the TOML files, with their defaults and ranges. A misspelt key or a value out of range is an error that names file,
 key, rule and remedy. Units are in the names."""
@@ -210,7 +210,7 @@ def _faults() -> list[str]:
     lines += ["## Events", "", _EVENTS_INTRO, ""]
     lines += _table(
         ("code", "from", "NE 107", "meaning"),
-        ([f"`{event.code}`", event.sources, event.letter, event.help] for event in EVENTS.values()),
+        ([f"`{event.code}`", event.sources, SEVERITIES[event.letter], event.help] for event in EVENTS.values()),
     )
     return lines
 

@@ -11,6 +11,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from bench.control.axes_map import reduce_colours
+
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
 KEPT = Path(__file__).parent / "start" / "example.txt"
@@ -46,6 +48,7 @@ def kept(readme: str, picture: Path) -> str:
         text = "\n".join(f"$ {command}\n{run(command, Path(folder))}" for command in commands(readme))
         run("stickslip plot runs/demo.mcap", Path(folder))
         shutil.copyfile(Path(folder) / "runs" / "demo.png", picture)
+    reduce_colours(picture)
     return text
 
 

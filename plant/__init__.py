@@ -13,26 +13,22 @@ Symbols of this package, as in the paper (A. Leus et al., longitudinal tangentia
     e    extension of the drive's spring, s_d - q - x [m]      v_lag  v_r as a lagging Stribeck curve sees it [m/s]
     q    displacement of the frame that holds the drive [m]    age    how long the contact has been at rest [s]
     s_e  position of the drive without ripple, `even_m` [m]
-    config, config_limits  a rig file, checked; rejection of rigs that no real rig can be
-    drive_config  the motion of the drive, in a rig file
-    drive_motion  its position over time: profiles, jerk-limited moves, cycles
-    pairs, effects  the friction pairs; the effects that a real rig has and the nominal rig lacks
-    records  the derived numbers (`PARAMS`) and all memory (`STATE`)
-    contact, piezo  one step of friction and slide; the motion of the base
-    core  one block of contact, drive, piezo and analogue filters: `advance`, `advance_disturbed` with effects
-    sensors  the digital half of the channels
-    loop_delay  commands on their way to the exciter
-    step  one whole block with its messages
-    simulate  a run without bus and sensors
-    stability  the slider linearised around steady sliding
-    inputs  velocity of the drive, its announcements, noise and delays, block by block, drawn ahead by a thread
-    faults/  faults of sensors, exciter, clock and bus, ordered by a scenario or an operator
-    node, app  the rig as a participant of the bus; the process
-    effects/  effects of a real rig that the nominal rig lacks
-    four_rigs_step  one step of four or eight rigs side by side, whose numbers are in one array, in rows of `LANES` at
 
-and, for the effects of a real rig:
-
-
-four_rigs*              the same for four or eight rigs at once, in vector registers; one step of them
+config, config_limits  a rig file, checked; rejection of rigs that no real rig can be
+drive_config  the motion of the drive, in a rig file
+drive_motion  its position over time: profiles, jerk-limited moves, cycles
+pairs         the friction pairs
+records       the derived numbers (`PARAMS`) and all memory (`STATE`)
+contact, piezo  one step of friction and slide; the motion of the base
+core          one block of contact, drive, piezo and analogue filters: `advance`, `advance_disturbed` with effects
+sensors       the digital half of the channels
+loop_delay    commands on their way to the exciter
+step          one whole block with its messages
+simulate      a run without bus and sensors
+stability     the slider linearised around steady sliding
+inputs        velocity of the drive, its announcements, noise and delays, block by block, drawn ahead by a thread
+node, app     the rig as a participant of the bus; the process
+effects/      effects of a real rig that the nominal rig lacks
+faults/       faults of sensors, exciter, clock and bus, ordered by a scenario or an operator
+four_rigs, four_rigs_step  the same for four or eight rigs side by side, in vector registers; one step of them
 """

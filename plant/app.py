@@ -6,13 +6,13 @@ import threading
 from collections.abc import Sequence
 
 from bridge.faults import Fault
-from bridge.guard.codes import RESET, STOP
 from bridge.guard.config import wider
 from bridge.guard.events import GuardEvents
 from bridge.guard.kept_gain import KeptGain
 from bridge.guard.latch import StopLatch
 from bridge.guard.received import CommandQueue
-from bridge.plain import Tell, say, untold
+from bridge.guard.states import RESET, STOP
+from bridge.plain import StepReport, no_report, print_line
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.clock import time
@@ -48,7 +48,7 @@ def run(
     arm: bool,
     latch: StopLatch | None,
     faults: Sequence[FaultTable] = (),
-    tell: Tell = untold,
+    report: StepReport = no_report,
 ) -> int:
     """Serve the rig on the bus until `duration_s` is over (0: for ever) or `stop` is set. Returns the number of blocks.
 
@@ -71,7 +71,7 @@ def run(
     blocks = round(duration_s / rig.solver.block_s) if duration_s > 0 else 2**62
     with Bus(bus_config, "plant", lockstep) as bus:
         bus.serve_header(header)
-        process = PlantProcess(node, bus, latch, tell, kept)
+        process = PlantProcess(node, bus, latch, report, kept)
         # before the other processes see this one: claimed later, the link may lapse on busy cores (docs/method/rig.md)
         if lockstep:
             realtime.claim(realtime.core(bus_config.port), realtime.LOCKSTEP_PRIORITY)
@@ -80,13 +80,13 @@ def run(
             granted = realtime.claim(realtime.core(0))
         bus.announce()
         if wait_for and bus.wait_for(wait_for, 0.0):
-            tell("waiting", f"for {' and '.join(wait_for)} at {bus_config.endpoint}, at most {bus_config.wait_s:g} s")
+            report("waiting", f"for {' and '.join(wait_for)} at {bus_config.endpoint}, at most {bus_config.wait_s:g} s")
         wait_for_peers(bus, bus_config, wait_for, stop)
         if wait_for and not stop.is_set():
-            tell("joined", " and ".join(wait_for))
+            report("joined", " and ".join(wait_for))
         process.event("START", granted)
         how_long = f"for {duration_s:g} s" if duration_s > 0 else "until Ctrl-C"
-        tell("running", f"rig {rig.name} at {bus_config.endpoint}, {how_long}; {granted}")
+        report("running", f"rig {rig.name} at {bus_config.endpoint}, {how_long}; {granted}")
         if why_not:
             process.event(
                 "STATE_FOLDER", f"{why_not}: a stop cannot be kept over a restart, so the rig starts disarmed"
@@ -96,7 +96,9 @@ def run(
         advance = process.lockstep if lockstep else process.realtime
         advance(blocks, stop)
         process.end()
-        tell("ended", f"{'stopped' if stop.is_set() else 'at its end'}, after {node.block * rig.solver.block_s:.1f} s")
+        report(
+            "ended", f"{'stopped' if stop.is_set() else 'at its end'}, after {node.block * rig.solver.block_s:.1f} s"
+        )
         bus.wait_until_alone(_GOODBYE_S)  # this process relays the messages of the others, so it leaves last
     return node.block
 
@@ -119,19 +121,24 @@ class PlantProcess:
         node: the rig.
         bus: its session.
         latch: keeps the operator's stop; None: not kept.
-        say: reports important events to the operator.
+        report: reports important events to the operator.
         kept: keeps the accepted gain of the exciter; None: not kept.
 
     """
 
     def __init__(
-        self, node: PlantNode, bus: Bus, latch: StopLatch | None, say: Tell = untold, kept: KeptGain | None = None
+        self,
+        node: PlantNode,
+        bus: Bus,
+        latch: StopLatch | None,
+        report: StepReport = no_report,
+        kept: KeptGain | None = None,
     ) -> None:
         self._node = node
         self._kept, self._accepted_gain = kept, node.accepted_gain
-        self._say = say
+        self._report_step = report
         self._latch = latch
-        self._teller = GuardEvents()
+        self._guard_events = GuardEvents()
         self._operator_orders, self._fault_orders = Inbox(16), Inbox(16)
         self._injected = Orders(node.faults)
         self._bus = bus
@@ -161,7 +168,7 @@ class PlantProcess:
         self._events += 1
         self._send_event(event.SerializeToString())
         if is_listed(code):
-            self._say(code, text)
+            self._report_step(code, text)
 
     def end(self) -> None:
         """Publish END, and leave the bus as a rig: only both together end the other processes."""
@@ -181,7 +188,7 @@ class PlantProcess:
             self._send_sensors(sensors)
         realtime.let_the_bus_send()
         self._send_applied(applied)
-        self._tell()
+        self._publish_events()
         for code, text in faults.news():
             self.event(code, text)
 
@@ -229,7 +236,7 @@ class PlantProcess:
         except OSError as error:
             text = f"{self._latch.path}: {error.strerror}: the order does not outlast a restart"
             self.event("STATE_FOLDER", text)
-            say(f"stickslip: warning: STATE_FOLDER: {text}")
+            print_line(f"stickslip: warning: STATE_FOLDER: {text}")
 
     def _keep_gain(self, kept: KeptGain, gains: list[float]) -> None:
         try:
@@ -237,9 +244,9 @@ class PlantProcess:
         except (OSError, Fault) as error:
             self.event("STATE_FOLDER", f"{kept.path}: {error}: the next run of this rig has no gain to compare with")
 
-    def _tell(self) -> None:
+    def _publish_events(self) -> None:
         applied = self._node.applied
-        for code, text in self._teller.news(applied):
+        for code, text in self._guard_events.news(applied):
             changed = f"by a factor of {self._node.gain_change:.2f}; " if code == "GAIN_CHANGED" else ""
             self.event(code, f"{changed}{text}")
             if code == "GUARD" and self._kept is not None and self._accepted_gain != self._node.accepted_gain:

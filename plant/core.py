@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy.typing as npt
 
-from bridge.kernel import Record, kernel, shared_kernel
+from bridge.kernel import kernel, shared_kernel
+from bridge.layouts import PlantMemory, PlantParams
 from plant.contact import elasto_plastic_share
 from plant.contact import step as contact_step
 from plant.effects.drive import spring_N, unevenness
@@ -57,8 +58,8 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
             truth: filled with quantities without a sensor, float64 [6, samples], rows as TRUTH.
 
         """
-        p: Record = params[0]
-        s: Record = state[0]
+        p: PlantParams = params[0]
+        s: PlantMemory = state[0]
         # copied to locals: the compiler would reload record fields after every store to an output array
         dt, m, k_d, h_d = p.dt_s, p.m, p.k_d, p.h_d
         fine_dt, stick_dt, stick_mps = dt, p.stick_dt_s, _STICK_SHARE * p.v_s

@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.arrays import Floats
-from bridge.kernel import Record, kernel
+from bridge.kernel import kernel
+from bridge.layouts import PlantMemory, PlantParams
 from plant import four_rigs_step as at
 from plant.effects.drive import extension_m, unevenness, yield_m
 from plant.effects.friction import level
@@ -55,8 +56,8 @@ def advance_lanes(
     w = np.zeros(at.ROWS * LANES)
     ripples = sags = settles = lags = ages = varies = rough = False
     for i in range(len(width)):
-        p: Record = params[i]
-        s: Record = state[i]
+        p: PlantParams = params[i]
+        s: PlantMemory = state[i]
         w[at.M + i], w[at.K_D + i], w[at.H_D + i], w[at.K_T + i] = p.m, p.k_d, p.h_d, p.k_t
         w[at.PER_K_T + i] = 1.0 / p.k_t
         w[at.H_T + i], w[at.H_V + i], w[at.F_C + i], w[at.F_S + i] = p.h_t, p.h_v, p.F_c, p.F_s
@@ -199,7 +200,7 @@ def advance_lanes(
 
 
 @kernel
-def _varies(p: Record) -> bool:
+def _varies(p: PlantParams) -> bool:
     """Whether the friction's level depends on position or time beyond a rough surface and waves."""
     return p.position_ratio != 0.0 or (p.load_ratio != 0.0 and p.load_seed >= 0.0)
 
@@ -208,7 +209,7 @@ def _varies(p: Record) -> bool:
 def _enter(w: Floats, width: Width, params: npt.NDArray[Any], drive_mps: float, force_N: Floats, age_s: Floats) -> None:
     """Place every slide so that its spring has a force [rigs]; it sticks if its age [rigs] is a number."""
     for i in range(len(width)):
-        p: Record = params[i]
+        p: PlantParams = params[i]
         w[at.FRAME + i], w[at.FRAME_V + i] = force_N[i] * p.frame_m_per_N, 0.0
         w[at.BASE + i], w[at.BASE_V + i] = force_N[i] * p.base_m_per_N, 0.0
         w[at.X + i] = w[at.S_D + i] - w[at.FRAME + i] - extension_m(p, force_N[i] - w[at.ARM + i])

@@ -15,7 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.arrays import Floats
-from bridge.kernel import Record, has_wide_vectors, kernel
+from bridge.kernel import has_wide_vectors, kernel
+from bridge.layouts import PlantParams
 from plant.effects.drive import spring_law_N
 from plant.effects.friction_memory import late_mps
 from plant.effects.waves import TWO_PI, lattice_value, noise_in_cell, with_second
@@ -177,7 +178,7 @@ def slide(w: Floats, width: Width, dt: float, z_dt: float, base_mid_mps: float, 
 
 
 @kernel
-def set_steps(w: Floats, p: Record, i: int, dt: float) -> None:
+def set_steps(w: Floats, p: PlantParams, i: int, dt: float) -> None:
     """The numbers of a rig that depend on the length of a step."""
     w[FRAME_LOSS + i] = p.frame_damping_ratio * TWO_PI * p.frame_Hz * dt
     w[FRAME_KEEP + i] = 1.0 / (1.0 + w[FRAME_LOSS + i])
@@ -204,7 +205,7 @@ def roughen(w: Floats, width: Width, params: npt.NDArray[Any]) -> None:
         entered += math.floor(at) != w[CELL + i]
     if entered > 0:
         for i in range(len(width)):
-            p: Record = params[i]
+            p: PlantParams = params[i]
             cell = math.floor(w[AT_CELL + i])
             if p.roughness_ratio != 0.0 and cell != w[CELL + i]:
                 w[CELL_BEGIN + i] = lattice_value(cell, p.roughness_seed)
@@ -220,7 +221,7 @@ def roughen(w: Floats, width: Width, params: npt.NDArray[Any]) -> None:
 def lag(w: Floats, width: Width, params: npt.NDArray[Any], state: npt.NDArray[Any], dt: float, t_s: float) -> None:
     """The velocity that the friction still goes by, where it lags."""
     for i in range(len(width)):
-        p: Record = params[i]
+        p: PlantParams = params[i]
         v_r = w[V_R_NOW + i]
         if p.lag_distance_m > 0.0:
             slid_m = math.fabs(v_r) * dt

@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from bridge.wire.messages import ANNOUNCE, CHANNELS, Records
+from bridge.wire.channels import CHANNELS
+from bridge.wire.messages import ANNOUNCE, Records
 from plant.config import RigConfig
 from plant.loop_delay import whole_blocks
 from plant.simulate import held_velocity

@@ -3,7 +3,8 @@
 import math
 from typing import Final
 
-from bridge.kernel import Record, kernel
+from bridge.kernel import kernel
+from bridge.layouts import CommandRow, PlantMemory
 
 LONGEST_DELAY_S: Final = 0.2  # of loop.delay_s; 50 ms is a slow converter on USB with its driver's queue
 LONGEST_JITTER_S: Final = 0.1
@@ -17,7 +18,7 @@ def whole_blocks(time_s: float, block_s: float) -> int:
 
 
 @kernel
-def send(s: Record, command: Record, delay_blocks: int) -> None:
+def send(s: PlantMemory, command: CommandRow, delay_blocks: int) -> None:
     """Queue a command received before block `s.block`; it acts `delay_blocks` later."""
     due = s.block + delay_blocks
     if s.line_count > 0:
@@ -32,7 +33,7 @@ def send(s: Record, command: Record, delay_blocks: int) -> None:
 
 
 @kernel
-def receive(s: Record) -> None:
+def receive(s: PlantMemory) -> None:
     """Take the newest command that is due in block `s.block`, if any, as the command in force."""
     while s.line_count > 0 and s.line_due[s.line_first] <= s.block:
         s.commanded_Hz = s.line_Hz[s.line_first]

@@ -8,15 +8,13 @@ import numpy as np
 
 from bridge.faults import Fault
 from bridge.guard.check import gain_change
-from bridge.guard.codes import LEAVE
-from bridge.guard.core import accept
-from bridge.guard.estimates import expect_drive
-from bridge.guard.states import apply_order
+from bridge.guard.states import LEAVE, apply_order
 from bridge.kernel_cache import compile_once
+from bridge.wire.channels import CHANNELS
 from bridge.wire.messages import ANNOUNCE as ANNOUNCE_LAYOUT
 from bridge.wire.messages import APPLIED as APPLIED_LAYOUT
-from bridge.wire.messages import CHANNELS, sealed, sensor_block
 from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
+from bridge.wire.messages import sealed, sensor_block
 from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, SENSORS, Outgoing
 from plant.config import RigConfig
 from plant.faults.schedule import Faults
@@ -68,7 +66,6 @@ class PlantNode:
         )
         self._announced = 0  # number of the drawn announcements already sent
         self.announcements: list[Outgoing] = []  # of the last block; sent before its samples
-        self._command = COMMAND_LAYOUT.blank()
         self._sensors = sensor_block(samples).blank()
         self._applied = APPLIED_LAYOUT.blank()
 
@@ -78,13 +75,11 @@ class PlantNode:
 
     def _step_copies(self) -> None:
         guard = self._guard_state.copy()
-        accept(self._guard_params[0], guard[0], self._command[0])
-        expect_drive(guard[0], 0.0)
         apply_order(guard[0], LEAVE)
         state, sensors = self._state.copy(), sensor_block(self._drawn.noise.shape[2]).blank()
         act(
-            self._params, state, self._guard_params, guard, 0.0, self._command, 0, 0, self._drawn.noise[0],
-            self._analogue, self.truth, sensors,
+            self._params, state, self._guard_params, guard, 0.0, COMMAND_LAYOUT.blank(0), 0, self._drawn.announce,
+            self._drawn.noise[0], self._analogue, self.truth, sensors,
         )  # fmt: skip
         report(self._params, state, self._guard_params, guard, 0, 0, 0, 0, sensors, APPLIED_LAYOUT.blank())
 
@@ -101,11 +96,7 @@ class PlantNode:
         faults = self.faults
         if faults.busy:
             faults.begin_block(self.block)
-        accepted = 0
-        for payload in commands:
-            command = COMMAND_LAYOUT.read(payload, COMMAND.name)
-            if accept(self._guard_params[0], self._guard_state[0], command[0]):
-                self._command, accepted = command, accepted + 1
+        payloads = b"".join(COMMAND_LAYOUT.canonical(payload, COMMAND.name) for payload in commands)
         at = self.block % _BATCH_BLOCKS
         if at == 0:
             self._drawn = self._inputs.draw(_BATCH_BLOCKS)
@@ -115,11 +106,10 @@ class PlantNode:
         self.announcements = [
             Outgoing(ANNOUNCE, announce[row : row + 1].tobytes()) for row in range(first, self._announced)
         ]
-        for row in range(first, self._announced):
-            expect_drive(self._guard_state[0], announce[row].drive_velocity_mps)
-        act(
-            self._params, self._state, self._guard_params, self._guard_state, velocity_mps[at], self._command, accepted,
-            int(delay_blocks[at]), noise[at], self._analogue, self.truth, self._sensors,
+        accepted = act(
+            self._params, self._state, self._guard_params, self._guard_state, velocity_mps[at],
+            COMMAND_LAYOUT.record(payloads), int(delay_blocks[at]), announce[first : self._announced], noise[at],
+            self._analogue, self.truth, self._sensors,
         )  # fmt: skip
         if faults.busy:
             faults.spoil(self._sensors, self.block)

@@ -6,13 +6,14 @@ the ramp of u0 is over. The phase continues through a change of frequency; it re
 
 import math
 
-from bridge.kernel import Record, kernel
+from bridge.kernel import kernel
+from bridge.layouts import PlantMemory, PlantParams
 from plant.effects.piezo import heat_share, load_share, mode_gain, roll_off
 from plant.effects.waves import TWO_PI
 
 
 @kernel
-def delivered_share(p: Record, frequency_Hz: float) -> float:
+def delivered_share(p: PlantParams, frequency_Hz: float) -> float:
     """Delivered share of the commanded amplitude at this frequency; 1 on a rigid mount without effects."""
     share = p.delivered_ratio
     if p.mount_resonance_Hz > 0.0:
@@ -29,7 +30,7 @@ def delivered_share(p: Record, frequency_Hz: float) -> float:
 
 
 @kernel
-def accepted(p: Record, frequency_Hz: float, amplitude_m: float) -> tuple[float, float]:
+def accepted(p: PlantParams, frequency_Hz: float, amplitude_m: float) -> tuple[float, float]:
     """The commanded frequency [Hz] and amplitude [m], clipped to the exciter's own limits."""
     return (
         min(max(frequency_Hz, p.frequency_min_Hz), p.frequency_max_Hz),
@@ -38,7 +39,7 @@ def accepted(p: Record, frequency_Hz: float, amplitude_m: float) -> tuple[float,
 
 
 @kernel
-def base_velocity_mps(p: Record, s: Record) -> float:
+def base_velocity_mps(p: PlantParams, s: PlantMemory) -> float:
     """The vibration velocity amplitude v_a = 2 pi f u0 of the base at the end of the last block [m/s].
 
     Args:

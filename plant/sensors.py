@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy.typing as npt
 
-from bridge.kernel import Record, kernel
+from bridge.kernel import kernel
+from bridge.layouts import PlantParams, SensorRow
 
 
 @kernel
@@ -16,7 +17,7 @@ def _digital(value: float, low: float, high: float, resolution: float) -> float:
 
 
 @kernel
-def _position(p: Record, true_m: float, noise: float) -> float:
+def _position(p: PlantParams, true_m: float, noise: float) -> float:
     # a bow over the whole range, its largest deviation the stated linearity
     lowest_m, highest_m = p.position_lowest_m, p.position_range_m
     share = (true_m - lowest_m) / (highest_m - lowest_m)
@@ -26,7 +27,7 @@ def _position(p: Record, true_m: float, noise: float) -> float:
 
 
 @kernel
-def digitise(p: Record, analogue: npt.NDArray[Any], noise: npt.NDArray[Any], block: Record) -> None:
+def digitise(p: PlantParams, analogue: npt.NDArray[Any], noise: npt.NDArray[Any], block: SensorRow) -> None:
     """Turn analogue signals into the samples that the rig's data acquisition reports.
 
     Args:

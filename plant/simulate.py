@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from bridge.arrays import Floats
 from bridge.kernel import kernel
-from bridge.wire.messages import CHANNELS
+from bridge.wire.channels import CHANNELS
 from plant.config import RigConfig
 from plant.core import advance, advance_disturbed
 from plant.drive_motion import mean_velocity_mps

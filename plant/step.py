@@ -5,8 +5,10 @@ from typing import Any
 import numpy.typing as npt
 
 from bridge.guard.check import write_gain
-from bridge.guard.core import allow, look
-from bridge.kernel import Record, kernel, shared_kernel
+from bridge.guard.core import accept, allow, look
+from bridge.guard.estimates import expect_drive
+from bridge.kernel import shared_kernel
+from bridge.layouts import AppliedRow, GuardMemory, GuardParams, PlantMemory, PlantParams, SensorRow
 from plant.core import advance, advance_disturbed
 from plant.loop_delay import receive, send
 from plant.sensors import digitise
@@ -19,30 +21,51 @@ def act(
     guard_params: npt.NDArray[Any],
     guard_state: npt.NDArray[Any],
     drive_velocity_mps: float,
-    command: npt.NDArray[Any],
-    commands: int,
+    commands: npt.NDArray[Any],
     delay_blocks: int,
+    announce: npt.NDArray[Any],
     noise: npt.NDArray[Any],
     analogue: npt.NDArray[Any],
     truth: npt.NDArray[Any],
     sensors: npt.NDArray[Any],
-) -> None:
-    """Advance `state` by one block, in place, up to the samples of its sensors; arguments as in `step`."""
-    p: Record = params[0]
-    s: Record = state[0]
-    if commands > 0:
-        send(s, command[0], delay_blocks)
+) -> int:
+    """Advance `state` by one block, in place, up to the samples of its sensors; return the number of accepted commands.
+
+    Args:
+        params, state: one record each of `plant.records.PARAMS` and `STATE`.
+        guard_params, guard_state: one record each of `bridge.guard.records`.
+        drive_velocity_mps: held over the block.
+        commands: received since the last block; the newest that the guard accepts goes to the exciter.
+        delay_blocks: additional delay of this command on its way to the exciter.
+        announce: the rig's announcements before these samples.
+        noise: standard normal numbers, float64 [5, samples].
+        analogue, truth: filled, as in `plant.core.advance`.
+        sensors: one message record, filled up to the fields of the guard.
+
+    """
+    p: PlantParams = params[0]
+    s: PlantMemory = state[0]
+    gp: GuardParams = guard_params[0]
+    g: GuardMemory = guard_state[0]
+    accepted, newest = 0, 0
+    for i in range(commands.shape[0]):
+        if accept(gp, g, commands[i]):
+            accepted, newest = accepted + 1, i
+    for i in range(announce.shape[0]):
+        expect_drive(g, announce[i].drive_velocity_mps)
+    if accepted > 0:
+        send(s, commands[newest], delay_blocks)
     receive(s)
-    g: Record = guard_state[0]
-    allow(guard_params[0], g, s.command_block, s.commanded_Hz, s.commanded_m)
+    allow(gp, g, s.command_block, s.commanded_Hz, s.commanded_m)
     if p.disturbed:
         advance_disturbed(params, state, drive_velocity_mps, g.frequency_Hz, g.amplitude_m, analogue, truth)
     else:
         advance(params, state, drive_velocity_mps, g.frequency_Hz, g.amplitude_m, analogue, truth)
-    block: Record = sensors[0]
+    block: SensorRow = sensors[0]
     block.sequence = s.block
     block.t_ns = (s.block + 1) * p.block_ns
     digitise(p, analogue, noise, block)
+    return accepted
 
 
 @shared_kernel
@@ -58,17 +81,25 @@ def report(
     sensors: npt.NDArray[Any],
     applied: npt.NDArray[Any],
 ) -> None:
-    """Pass the samples to the guard, and end the block that `act` began: fill in the applied vibration."""
-    p: Record = params[0]
-    s: Record = state[0]
-    gp: Record = guard_params[0]
-    g: Record = guard_state[0]
-    block: Record = sensors[0]
+    """Pass the samples to the guard, and end the block that `act` began: fill in the applied vibration.
+
+    Args:
+        params, state, guard_params, guard_state, sensors: as in `act`.
+        commands: number of accepted commands.
+        commands_late, round_trip_ns, late_ns: copied to `applied`.
+        applied: one message record, filled.
+
+    """
+    p: PlantParams = params[0]
+    s: PlantMemory = state[0]
+    gp: GuardParams = guard_params[0]
+    g: GuardMemory = guard_state[0]
+    block: SensorRow = sensors[0]
     look(gp, g, block)
     block.run = gp.run
     block.guard_state = g.state
     write_gain(gp, g, block)
-    a: Record = applied[0]
+    a: AppliedRow = applied[0]
     a.sequence = s.block
     a.t_ns = (s.block + 1) * p.block_ns
     a.frequency_Hz = s.frequency_Hz
@@ -86,43 +117,3 @@ def report(
     g.refused = 0
     a.heat_share = g.heat
     s.block += 1
-
-
-@kernel
-def step(
-    params: npt.NDArray[Any],
-    state: npt.NDArray[Any],
-    guard_params: npt.NDArray[Any],
-    guard_state: npt.NDArray[Any],
-    drive_velocity_mps: float,
-    command: npt.NDArray[Any],
-    commands: int,
-    delay_blocks: int,
-    noise: npt.NDArray[Any],
-    commands_late: int,
-    round_trip_ns: int,
-    late_ns: int,
-    analogue: npt.NDArray[Any],
-    truth: npt.NDArray[Any],
-    sensors: npt.NDArray[Any],
-    applied: npt.NDArray[Any],
-) -> None:
-    """Advance `state` by one block, in place, and fill in `sensors` and `applied`.
-
-    Args:
-        params, state: one record each of `plant.records.PARAMS` and `STATE`.
-        guard_params, guard_state: one record each of `bridge.guard.records`; the guard has accepted `command`.
-        drive_velocity_mps: held over the block.
-        command, commands: the newest command, and the number of commands since the last block; at 0 `command` is not read.
-        delay_blocks: blocks that this command takes to the exciter besides.
-        noise: standard normal numbers, float64 [5, samples].
-        commands_late, round_trip_ns, late_ns: copied to `applied`.
-        analogue, truth: filled, as in `plant.core.advance`.
-        sensors, applied: one message record each, filled.
-
-    """
-    act(
-        params, state, guard_params, guard_state, drive_velocity_mps, command, commands, delay_blocks, noise,
-        analogue, truth, sensors,
-    )  # fmt: skip
-    report(params, state, guard_params, guard_state, commands, commands_late, round_trip_ns, late_ns, sensors, applied)

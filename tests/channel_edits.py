@@ -7,7 +7,7 @@ import numpy as np
 
 from bridge.log.check.channel import ChannelLimits
 from bridge.log.logfile import RunData
-from bridge.wire.messages import CHANNELS
+from bridge.wire.channels import CHANNELS
 
 Edit = Callable[[Any, int], None]  # of the sensor blocks, from a row on
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from bridge.config import validate
-from bridge.wire.messages import CHANNELS
+from bridge.wire.channels import CHANNELS
 from plant.config import RigConfig
 from plant.core import advance, advance_disturbed
 from plant.records import TRUTH, build

@@ -17,7 +17,7 @@ from cockpit.judge.judged import judge_tables
 from cockpit.judge.verdict import RunVerdict
 from cockpit.run.in_process import run_onboard
 from cockpit.run.scenario import load_scenario
-from diagnosis.features.cycles import Cycles
+from diagnosis.slips import Cycles
 
 Tables = dict[str, Any]
 

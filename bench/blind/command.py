@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 import typer
 
 from bridge.files import refuse_to_lose
-from cockpit.commands.as_json.option import Json, JsonGroup, carry_out, tell
+from cockpit.commands.as_json.option import Json, JsonGroup, carry_out, print_result
 from cockpit.run.child_process import end_like_ctrl_c
 from cockpit.run.writable import PAGE, check_output, writing
 
@@ -51,7 +51,7 @@ def blind_run(folder: SetArgument, jobs: Jobs = None, as_json: Json = None) -> N
                 left_min = (time.monotonic() - began) / done * (todo - done) / 60.0
                 progress(f"{done} of {todo}, {left_min:.0f} min left: {in_a_line(outcome)}", done / todo)
         words = [f"all cases have results    {folder}", f"next    python -m bench blind score {folder} --key KEY"]
-        tell(as_json, SetDone(str(folder), todo), words)
+        print_result(as_json, SetDone(str(folder), todo), words)
 
     carry_out(work, as_json)
 
@@ -123,4 +123,4 @@ def _told(opened_set: "OpenedSet", name: str, as_json: Path | None, report: Path
         if report is not None:
             write_report(methods, opened_set.sealed, name, report, files)
     words = [table(methods, opened_set.sealed), *(["", f"report     {report}"] if report is not None else [])]
-    tell(as_json, kept_scores(opened_set, methods), words)
+    print_result(as_json, kept_scores(opened_set, methods), words)

@@ -14,7 +14,7 @@ from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableTyp
 
 from bench.blind.outcomes import Opened
 from bench.blind.scoring import Oracle
-from bridge.files import write_json
+from bridge.results import write_json
 from diagnosis.evidence.folder import load_evidence
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.retuning import retuned_rig

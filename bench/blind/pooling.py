@@ -8,25 +8,35 @@ import json
 import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, Literal, NamedTuple
 
 from bench.blind.locating import LEAST_SHARE, shares
 from bench.blind.opening import OpenedSet
 from bench.blind.outcomes import Opened
-from bench.blind.scoring import Scores, as_json
+from bench.blind.scoring import Scores
 from bridge.faults import Fault
 from bridge.files import read_json
 
-FORMAT = "blind-scores/2"
+FORMAT: Final = "blind-scores/2"
 _MADE_BY = "take a file that `python -m bench blind score --json` wrote"
 _SCORED = ("verdict", "effects", "not_distinguishable", "compared_features", "elapsed_s")
 _SCORED_OF_GAP = ("shrinkage", "interval_90", "retuned", "with_effect", "compared")
 
 
-def kept_scores(opened_set: OpenedSet, methods: dict[str, Scores]) -> dict[str, Any]:
+class BlindScores(NamedTuple):
     """The input of `pooled`: every score, and for every case its answer and its result."""
-    about = {"format": FORMAT, "sealed": opened_set.sealed, "tool": opened_set.tool, "methods": as_json(methods)}
-    return about | {"cases": [_row(opened_set, case) for case in opened_set.cases]}
+
+    format: Literal["blind-scores/2"]
+    sealed: bool
+    tool: str
+    methods: dict[str, Scores]
+    cases: list[dict[str, Any]]
+
+
+def kept_scores(opened_set: OpenedSet, methods: dict[str, Scores]) -> BlindScores:
+    """Every score, and the rows of the cases."""
+    rows = [_row(opened_set, case) for case in opened_set.cases]
+    return BlindScores(FORMAT, opened_set.sealed, opened_set.tool, methods, rows)
 
 
 def pooled(paths: Sequence[Path]) -> OpenedSet:

@@ -1,7 +1,5 @@
 """The scores as one HTML file that needs no network."""
 
-import base64
-import io
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +9,7 @@ import numpy as np
 from bench.blind.scoring import Scores
 from bench.blind.table import TOOL, headline, rows, table, with_interval
 from bridge.files import write_whole
+from bridge.pages import filled_page, png
 from bridge.provenance import provenance
 
 if TYPE_CHECKING:
@@ -21,21 +20,18 @@ _DPI = 110.0
 
 def write_report(methods: dict[str, Scores], sealed: bool, name: str, path: Path, files: Iterable[Path] = ()) -> None:
     """Write the page; at its foot are the hashes of `files`, which the scores come from. Raises OSError."""
-    from jinja2 import Environment, StrictUndefined
-
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    template = Path(__file__).with_name("report.html.j2").read_text(encoding="utf-8")
     tool = methods[TOOL]
-    page = environment.from_string(template).render(
-        name=name,
-        footer=provenance(files).footer(),
+    page = filled_page(
+        Path(__file__).with_name("report.html.j2"),
+        f"Blind score of {name}",
+        provenance(files).footer(),
         headline=headline(tool, sealed),
         methods=list(methods),
         rows=[row for row in rows(methods) if any(score is not None for score in row.scores)],
         with_interval=with_interval,
         pictures=[
-            ("Does 80 % mean 80 %?", _png(_reliability(tool))),
-            ("Wrong answers", _png(_confusions(tool))),
+            ("Does 80 % mean 80 %?", png(_reliability(tool), _DPI)),
+            ("Wrong answers", png(_confusions(tool), _DPI)),
         ],
         text=table(methods, sealed),
     )
@@ -84,9 +80,3 @@ def _confusions(scores: Scores) -> "Figure":
             axis.text(column, row, f"{count:.0f}", ha="center", va="center", fontsize=7, color=color)
     axis.set(xlabel="answer", ylabel="truth")
     return figure
-
-
-def _png(figure: "Figure") -> str:
-    memory = io.BytesIO()
-    figure.savefig(memory, format="png", dpi=_DPI)
-    return base64.b64encode(memory.getvalue()).decode()

@@ -8,10 +8,9 @@ from typing import Any
 
 from bench.blind.sealing import RESULTS, read_set
 from bridge.faults import Fault
-from bridge.files import write_json
+from bridge.results import strict_json, write_json
 from diagnosis import diagnose_many as many
 from diagnosis.diagnose_many import EvidenceFolder, FolderResult
-from diagnosis.result import to_json
 from diagnosis.version import tool_version
 
 FAULT_FORMAT = "fault/1"
@@ -50,7 +49,7 @@ def run(folder: Path, jobs: int) -> Generator[FolderResult]:
 
 def _as_json(outcome: FolderResult) -> dict[str, Any]:
     if outcome.diagnosis is not None:
-        return to_json(outcome.diagnosis)
+        return strict_json(outcome.diagnosis)
     code, line = outcome.fault or ("", "")
     return {"format": FAULT_FORMAT, "fault": code, "line": line}
 

@@ -4,7 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from bench.blind.calibration import Bin, calibration_error, error_of_perfect, judged, log_score, reliability
 from bench.blind.intervals import Score, mean, rate, ratio
@@ -210,14 +210,3 @@ def _confusions(cases: Sequence[Opened]) -> tuple[tuple[str, str, int], ...]:
         if not right:
             counts[truth, answer] += 1
     return tuple((truth, answer, count) for (truth, answer), count in counts.most_common())
-
-
-def as_json(value: Any) -> Any:
-    """Scores as JSON: a named tuple becomes an object."""
-    if isinstance(value, tuple) and hasattr(value, "_asdict"):
-        return {key: as_json(inner) for key, inner in value._asdict().items()}  # pyright: ignore[reportAttributeAccessIssue]
-    if isinstance(value, dict):
-        return {key: as_json(inner) for key, inner in value.items()}
-    if isinstance(value, tuple | list):
-        return [as_json(inner) for inner in value]
-    return value

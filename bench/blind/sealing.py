@@ -17,7 +17,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from bridge.faults import Fault
-from bridge.files import read_json, write_json
+from bridge.files import read_json
+from bridge.results import write_json
 from diagnosis.version import tool_version
 
 Answer = dict[str, Any]

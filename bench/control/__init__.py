@@ -9,8 +9,7 @@ answer.py     the controller's response: announcements, false claims, sums over 
 watch.py      a stretch of a run judged with both
 run.py        one scenario with one subject, to its end
 figures.py    the figures of a run, compared with the scenario's expectation
-least.py      the least constant v_a / v_d that leaves no slip
-oracle.py     the best that any controller can do, where ours slips
+oracle.py     the least constant v_a / v_d that leaves no slip; the best that any controller can do, where ours slips
 suite.py      all scenarios and subjects, in processes
 cost.py       CPU time of a controller step
 bars.py       the figures of all runs against their bars

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from bench.control.motion import natural_stick_s, put, put_stick
 from bench.control.record import BLOCK_RING, CLAIMED, REASONS
 from bridge.kernel import Record, kernel
-from controller.codes import EXCITE, PROBE, SLIP, STICK, STICK_SEEN
+from bridge.wire.stickslip_pb2 import EXCITE, PROBE, SLIP, STICK, STICK_SEEN
 
 _SETTLED_S = 10.0  # after the first announcement, from when on the energy is compared
 _EXCITED = 0.05  # v_a / v_d from which the rig is vibrated

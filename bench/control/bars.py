@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from bench.control.figures import SILENT, Figures
-from bench.control.least import Least
-from bench.control.oracle import LIMIT, TOO_LATE
+from bench.control.oracle import LIMIT, TOO_LATE, Least
 from bench.control.rules import MOVING, NAMES
 
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from cockpit.commands.as_json.option import Json, carry_out, tell
+from cockpit.commands.as_json.option import Json, carry_out, print_result
 from cockpit.run.child_process import end_like_ctrl_c
 from cockpit.run.writable import PAGE, PICTURE, check_output, writing
 
@@ -57,7 +57,7 @@ def control(
             with writing(axes):
                 draw(result.scenarios, [run.figures for run in result.done if run.figures.subject == OWN], axes)
         written = [f"{name:<11}{path}" for name, path in (("report", report), ("map", axes)) if path is not None]
-        tell(as_json, result.as_json(), [*in_words(result), *written], indent=1)
+        print_result(as_json, result, [*in_words(result), *written], indent=1)
         return 0 if result.passed else 3
 
     carry_out(work, as_json)

@@ -7,10 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.kernel import kernel
-from bridge.wire.messages import COMMAND, TRACE
+from bridge.wire.messages import BLOCK, COMMAND, TRACE
 from cockpit.run.closed_loop import ClosedLoop
 from cockpit.run.scenario import load_scenario
-from controller.codes import BLOCK
 from controller.core import step
 from controller.records import build as controller_records
 from plant.records import build as plant_records

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from bench.control.record import BINS, RING, SLIPPED, STUCK, SURGED
 from bridge.kernel import Record, kernel
-from controller.codes import EXCITE
+from bridge.wire.stickslip_pb2 import EXCITE
 
 _STICKS, _SLIDES = 0.1, 0.5  # of v_d: below, a stick begins; above, it ends
 _SETTLED = 1.1  # of v_d: below, a slip or surge has ended

@@ -1,12 +1,18 @@
-"""The best that any controller can do on a scenario: an oracle with the same exciter, which knows the truth of the rig.
+"""The best that knowledge of the true rig allows on a scenario: the least constant ratio without slips, and an oracle.
 
-It knows v_d without noise and the gain of exciter and mount, vibrates at the full slew as soon as there is a v_d, and holds the
-best of a few ratios, the whole stroke among them. One oracle sees v_d when it is there, another one knows it beforehand, early
-enough for the slew and for the loop delay. Where even that one slips, nothing that is commanded prevents it.
+The least constant v_a / v_d that leaves no slip and no surge is found by trying, as the measure of energy. It is held from the
+start with the exciter's true gain and the drive's true velocity, as only a simulation can.
+
+The oracle has the same exciter. It knows v_d without noise and the gain of exciter and mount, vibrates at the full slew as soon
+as there is a v_d, and holds the best of a few ratios, the whole stroke among them. One oracle sees v_d when it is there, another
+one knows it beforehand, early enough for the slew and for the loop delay. Where even that one slips, nothing that is commanded
+prevents it.
 """
 
 import math
 from typing import NamedTuple
+
+import numpy as np
 
 from bench.control import rules
 from bench.control.run import Curves, Judged, Subject, judge, wrong_from
@@ -22,6 +28,48 @@ _WHOLE_STROKE = 1e3  # of v_d: more than any stroke reaches
 _RATIOS = (1.2, 1.7, 2.4, _WHOLE_STROKE)
 _LONGEST_SLEW_S = 1.0
 _AS_OFTEN = 0.9  # of the controller's slips: where nothing helps, one more or less is chance
+_SETTLED_S = 1.0  # after enabling, from when on a slip counts
+_TO = 1.02  # the search ends where its two sides are so near
+_FLOOR, _LOWEST, _HIGHEST, _STEP = 1.0, 0.25, 5.0, 1.25
+
+
+class Least(NamedTuple):
+    """Ratios v_a / v_d; infinite where none helps."""
+
+    from_one: float  # the least that is 1.00 or more
+    of_all: float  # the least of all down to 0.25
+
+
+def is_clean(scenario: BankScenario, ratio: float, from_s: float) -> bool:
+    """Whether a constant ratio leaves no slip and no surge after a time."""
+    judged = judge(scenario, Subject(rules.CONSTANT, ratio), from_s)
+    return not (judged.broken or np.any(wrong_from(judged.events, from_s)))
+
+
+def least(scenario: BankScenario) -> Least:
+    """Search to 2 %."""
+    from_s = scenario.enabled_from_s + _SETTLED_S
+    if is_clean(scenario, _FLOOR, from_s):
+        if is_clean(scenario, _LOWEST, from_s):
+            return Least(_FLOOR, _LOWEST)
+        return Least(_FLOOR, _between(scenario, from_s, _LOWEST, _FLOOR))
+    slips, ratio = _FLOOR, _FLOOR
+    while ratio < _HIGHEST:
+        slips, ratio = ratio, ratio * _STEP
+        if is_clean(scenario, ratio, from_s):
+            between = _between(scenario, from_s, slips, ratio)
+            return Least(between, between)
+    return Least(math.inf, math.inf)
+
+
+def _between(scenario: BankScenario, from_s: float, slips: float, clean: float) -> float:
+    while clean > _TO * slips:
+        middle = math.sqrt(slips * clean)
+        if is_clean(scenario, middle, from_s):
+            clean = middle
+        else:
+            slips = middle
+    return clean
 
 
 class Oracle(NamedTuple):

@@ -3,8 +3,6 @@
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, StrictUndefined
-
 from bench.control.oracle import IN_PART, LIMIT, MISSED, TOO_LATE
 from bench.control.plots import picture
 from bench.control.record import CLAIMED, STUCK
@@ -13,6 +11,7 @@ from bench.control.rules import NAMES, NONE
 from bench.control.run import Judged
 from bench.control.suite import Done
 from bridge.files import write_whole
+from bridge.pages import filled_page
 from bridge.provenance import provenance
 
 
@@ -25,12 +24,12 @@ def write_page(result: BankResult, path: Path) -> None:
         for run in result.explained
         if run.figures.oracle is not None
     ]
-    template = Path(__file__).with_name("page.html.j2").read_text(encoding="utf-8")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     subjects = list(dict.fromkeys(run.figures.subject for run in result.done))
-    text = environment.from_string(template).render(
+    text = filled_page(
+        Path(__file__).with_name("page.html.j2"),
+        f"The controller on {len(result.scenarios)} made scenarios",
+        provenance().footer(),
         result=result,
-        footer=provenance().footer(),
         missed=sum(bar.holds is False for bar in result.bars),
         subjects=subjects,
         own=OWN,

@@ -1,7 +1,5 @@
 """A failed run as a picture: the whole run on the left, where it first went wrong on the right."""
 
-import base64
-import io
 from itertools import pairwise
 from typing import Any
 
@@ -9,10 +7,11 @@ import numpy as np
 
 from bench.control.record import BLOCK_ROWS
 from bench.control.run import Curves, Judged
-from controller.codes import EXCITE, PROBE, STICK
+from bridge.pages import png
+from bridge.wire.stickslip_pb2 import EXCITE, PROBE, STICK
 
 _INK, _RED, _BLUE, _GREEN, _PURPLE = "#1f2d3a", "#b5402a", "#2a6fb5", "#2e7d32", "#8e44ad"
-_SHADES = {EXCITE: "#dcebd8", PROBE: "#d5e3f0"}
+_SHADES: dict[int, str] = {EXCITE: "#dcebd8", PROBE: "#d5e3f0"}
 _FORCE, _SPEED, _DRIVE, _V_A, _STATE, _MODE = range(len(BLOCK_ROWS))
 _DETAIL_S, _LEAST_DETAIL_S, _DETAIL_LENGTHS = 0.5, 0.1, 12.0  # shown around the failure
 
@@ -58,9 +57,7 @@ def picture(judged: Judged, at_s: float, length_s: float, oracle: Curves | None)
     axes[1][0].set_ylabel("[mm/s]")
     axes[0][1].legend(loc="best", fontsize=7, frameon=False)
     axes[1][1].legend(loc="best", fontsize=7, frameon=False, ncols=4)
-    out = io.BytesIO()
-    figure.savefig(out, dpi=75, format="png")
-    return base64.b64encode(out.getvalue()).decode()
+    return png(figure, 75)
 
 
 def _around(curves: Curves, at_s: float, length_s: float) -> Curves:

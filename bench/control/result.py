@@ -3,15 +3,16 @@
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from bench.control import rules
 from bench.control.bars import Bar, bars
 from bench.control.cost import step_cost_ratio
 from bench.control.figures import Figures
-from bench.control.least import Least
+from bench.control.oracle import Least
 from bench.control.scenario import BankScenario
 from bench.control.suite import Done, find_least, run_bank, warm_up
+from bridge.results import in_json
 from bridge.units import counted
 
 OWN = rules.NAMES[rules.CONTROLLER]
@@ -27,8 +28,9 @@ class BankResult(NamedTuple):
     step_cost_ratio: float
     scenarios: list[BankScenario]
     elapsed_s: float
+    JSON_HIDDEN = "done", "scenarios"
 
-    @property
+    @in_json
     def passed(self) -> bool:
         """Whether no bar is missed."""
         return all(bar.holds is not False for bar in self.bars)
@@ -43,17 +45,10 @@ class BankResult(NamedTuple):
         """The controller's runs with slips or surges that miss no bar: the exciter had not started yet or is too weak."""
         return [run for run in self.done if run.figures.oracle is not None and not run.figures.failures]
 
-    def as_json(self) -> dict[str, Any]:
-        """The result as plain dictionaries."""
-        runs: list[Figures] = [run.figures for run in self.done]
-        return {
-            "passed": self.passed,
-            "bars": [bar._asdict() for bar in self.bars],
-            "runs": [run._asdict() for run in runs],
-            "least": {name: ratio._asdict() for name, ratio in self.least.items()},
-            "step_cost_ratio": self.step_cost_ratio,
-            "elapsed_s": self.elapsed_s,
-        }
+    @in_json
+    def runs(self) -> list[Figures]:
+        """The figures of every run."""
+        return [run.figures for run in self.done]
 
 
 def bench(bank: Sequence[BankScenario], rivals: bool, jobs: int, progress: Callable[[float, str], None]) -> BankResult:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.kernel import Record, kernel, record
-from controller.codes import EXCITE, HELD, NOTHING_TO_DO, SMOOTH, WATCH
+from bridge.wire.stickslip_pb2 import EXCITE, HELD, NOTHING_TO_DO, SMOOTH, WATCH
 from plant.config import RigConfig
 from plant.piezo import delivered_share
 from plant.records import build as plant_records

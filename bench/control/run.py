@@ -8,12 +8,11 @@ import numpy.typing as npt
 
 from bench.control import record, rules
 from bench.control.answer import end_stroke
-from bench.control.loop import Hum, JudgedLoop, Pair
+from bench.control.loop import Hum, JudgedLoop
 from bench.control.scenario import BankScenario
 from bench.control.watch import watch
 from bridge.wire import stickslip_pb2 as wire
-from controller.config import ControllerConfig
-from controller.records import build as controller_records
+from cockpit.run.closed_loop import Pair
 from plant.config import RigConfig
 from plant.loop_delay import whole_blocks
 
@@ -73,16 +72,15 @@ def judge(
     enabled_from_s = scenario.enabled_from_s
     velocity_max_mps = float(limits.get("velocity_max_mps", 5e-3))
     forbidden = [(float(low), float(high)) for low, high in limits.get("forbidden_Hz", [(4600.0, 5000.0)])]
-    config = scenario.scenario().controller if subject.rule == rules.CONTROLLER else None
-    records: Pair = controller_records(config or ControllerConfig())
     candidates_Hz = rules.frequencies_Hz(rig, forbidden)
     if subject.rule == rules.CONSTANT:
         candidates_Hz = [rules.frequency_Hz(rig, candidates_Hz)]
     if subject.rule == rules.ORACLE:
         candidates_Hz = [rules.frequency_Hz(rig, candidates_Hz, subject.ratio)]
     rule = rules.build(subject.rule, rig, enabled_from_s, velocity_max_mps, candidates_Hz, subject.ratio)
+    controls = scenario.scenario().controller if subject.rule == rules.CONTROLLER else rule
     hum = Hum(bank.hum.frequency_Hz, bank.hum.force_N, bank.hum.position_m)
-    loop = JudgedLoop(rig, scenario.seed, records, rule, config is None, hum, _sees_blocks(rig, subject))
+    loop = JudgedLoop(rig, scenario.seed, controls, hum, _sees_blocks(rig, subject))
     blind = dict(wire.Reason.items()).get("BLIND", -1)
     of_judge = record.build(rig, scenario.slowest_mps, enabled_from_s, velocity_max_mps, blind)
     return _to_the_end(scenario, loop, of_judge, ends_at_slip_from_s, keep_at_s)
@@ -113,9 +111,9 @@ def _to_the_end(
         begin = loop.block
         length = min(stretch, blocks - begin)
         made = loop.advance(length)
-        done = len(made.traces)
+        done = len(made.trace)
         broken = done < length
-        count = watch(*of_judge, made.truth, made.v_a_mps, made.frequency_Hz, made.gain, made.traces, room, rows[:done])
+        count = watch(*of_judge, made.truth, made.v_a_mps, made.frequency_Hz, made.gain, made.trace, room, rows[:done])
         new = room[: min(count, len(room))].copy()
         events.append(new)
         slipped = bool(np.any(wrong_from(new, ends_at_slip_from_s)))

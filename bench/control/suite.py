@@ -7,8 +7,7 @@ from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableTyp
 
 from bench.control import rules
 from bench.control.figures import Figures, figures, refused
-from bench.control.least import Least, least
-from bench.control.oracle import ask
+from bench.control.oracle import Least, ask, least
 from bench.control.run import Curves, Judged, Subject, judge, wrong_from
 from bench.control.scenario import BankScenario
 from bridge.faults import Fault

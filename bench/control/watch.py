@@ -9,6 +9,7 @@ import numpy.typing as npt
 from bench.control.answer import add_up, announce, follow_turn, follow_vibration
 from bench.control.motion import follow
 from bench.control.record import RING
+from bridge.arrays import Floats
 from bridge.kernel import Record, unlocked_kernel
 from plant.records import TRUTH
 
@@ -22,10 +23,10 @@ _SHAKING_MPS = 1e-9
 def watch(
     params: npt.NDArray[Any],
     state: npt.NDArray[Any],
-    truth: npt.NDArray[np.float64],
-    v_a_mps: npt.NDArray[np.float64],
-    frequency_Hz: npt.NDArray[np.float64],
-    gain: npt.NDArray[np.float64],
+    truth: Floats,
+    v_a_mps: Floats,
+    frequency_Hz: Floats,
+    gain: Floats,
     traces: npt.NDArray[Any],
     events: npt.NDArray[np.float64],
     rows: npt.NDArray[np.float32],
@@ -34,7 +35,7 @@ def watch(
 
     Args:
         params, state: one record each of `bench.control.record`; the state is advanced.
-        truth: rows as `plant.records.TRUTH`, [6, blocks * samples].
+        truth: rows as `plant.records.TRUTH`, [blocks, 6, samples].
         v_a_mps, frequency_Hz: of the base at the end of each block, true, [blocks].
         gain: v_a for one metre of commanded amplitude at that frequency, [blocks].
         traces: of the controller, [blocks].
@@ -50,11 +51,10 @@ def watch(
         shaking = v_a_mps[i] > _SHAKING_MPS
         window_s = math.ceil(p.window_s * frequency_Hz[i]) / frequency_Hz[i] if shaking else p.window_s
         force_N = 0.0
-        for j in range(i * p.samples, (i + 1) * p.samples):
-            force_N += truth[_FORCE, j]
-            count = follow(
-                p, s, truth[_PLACE, j], truth[_BRISTLE, j], truth[_DRIVE, j], window_s, v_a_mps[i], events, count
-            )
+        for j in range(p.samples):
+            force_N += truth[i, _FORCE, j]
+            place_m, bristle_m, drive_m = truth[i, _PLACE, j], truth[i, _BRISTLE, j], truth[i, _DRIVE, j]
+            count = follow(p, s, place_m, bristle_m, drive_m, window_s, v_a_mps[i], events, count)
         newest = (s.at - 1) % RING
         count = announce(p, s, t, shaking, events, count)
         add_up(p, s, t, v_a_mps[i], s.drive_m[newest] - s.x_m[newest])

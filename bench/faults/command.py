@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from bridge.files import write_whole
-from cockpit.commands.as_json.option import Json, carry_out, tell
+from cockpit.commands.as_json.option import Json, carry_out, print_result
 from cockpit.run.child_process import end_like_ctrl_c
 from cockpit.run.writable import check_output, writing
 
@@ -25,9 +25,9 @@ def faults(
         from joblib import cpu_count
 
         from bench.faults.page import page
-        from bench.faults.run import bench
+        from bench.faults.run import bench, chosen
         from cockpit.commands.diagnose_output import watched
-        from cockpit.faults.catalogue import chosen, load_catalogue
+        from cockpit.faults.catalogue import load_catalogue
 
         end_like_ctrl_c()
         if report is not None:
@@ -38,7 +38,7 @@ def faults(
         if report is not None:
             with writing(report):
                 write_whole(report, page(result))
-        tell(as_json, result.as_json(), [*result.in_words(), *([f"report   {report}"] if report else [])], indent=1)
+        print_result(as_json, result, [*result.in_words(), *([f"report   {report}"] if report else [])], indent=1)
         return 1 if result.worse else 0
 
     carry_out(work, as_json)

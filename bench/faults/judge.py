@@ -20,8 +20,9 @@ from bridge.wire.messages import TRACE as TRACE_LAYOUT
 from bridge.wire.payloads import sequence_and_time
 from bridge.wire.topics import SENSORS, TRACE
 from cockpit.faults.catalogue import CatalogueEntry
+from cockpit.run.in_process import TimedAction
 from cockpit.run.scenario import load_scenario
-from cockpit.run.simulated.run import ScriptedAction, SimulatedRun, Truth
+from cockpit.run.simulated.run import SimulatedRun, Truth
 from plant.faults.schedule import BEGAN, ENDED
 
 SAFE, SILENT, UNSAFE = "safe", "SILENT", "UNSAFE"
@@ -138,9 +139,12 @@ def _run(case: CatalogueEntry, with_faults: bool) -> Happened:
     scenario = load_scenario(entry.scenario, [*case.settings, f"duration_s={seconds}"])
     if with_faults:
         scenario = scenario.model_copy(update={"fault": case.faults})
-    words = [ScriptedAction(entry.begin_s + word.at_s, wire.Operator.Action.Value(word.word)) for word in entry.said]
+    words = [
+        TimedAction(round((entry.begin_s + word.at_s) * 1e9), wire.Operator.Action.Value(word.word))
+        for word in entry.said
+    ]
     if entry.checked:
-        words.append(ScriptedAction(_ARM_S, wire.Operator.ARM))
+        words.append(TimedAction(round(_ARM_S * 1e9), wire.Operator.ARM))
     run = SimulatedRun(scenario, words, arm=not entry.checked)
     ear = _Ear(entry.begin_s, scenario.controller.block_s)
     run.listen(ear)

@@ -9,6 +9,7 @@ from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableTyp
 from bench.faults.judge import SAFE, SILENT, UNSAFE, Outcome, judge, refused
 from bridge.faults import Fault
 from bridge.kernel_cache import compile_once
+from bridge.results import in_json
 from bridge.units import counted
 from cockpit.faults.catalogue import CatalogueEntry
 
@@ -18,7 +19,7 @@ class FaultBench(NamedTuple):
 
     outcomes: list[Outcome]
 
-    @property
+    @in_json
     def counts(self) -> dict[str, int]:
         """How many of each verdict."""
         counts = Counter(outcome.verdict for outcome in self.outcomes)
@@ -29,10 +30,10 @@ class FaultBench(NamedTuple):
         """Entries worse than their known verdict."""
         return [outcome for outcome in self.outcomes if not outcome.as_known]
 
-    def as_json(self) -> dict[str, Any]:
-        """For `--json`."""
-        worse = [outcome.name for outcome in self.worse]
-        return {"outcomes": self.outcomes, "counts": self.counts, "worse_than_known": worse}
+    @in_json
+    def worse_than_known(self) -> list[str]:
+        """Names of these entries."""
+        return [outcome.name for outcome in self.worse]
 
     def in_words(self) -> list[str]:
         """Lines of text: the counts, and each entry that is not safe."""
@@ -40,6 +41,19 @@ class FaultBench(NamedTuple):
         lines = [f"faults   {counted(len(self.outcomes), 'fault')}: {counts}"]
         lines += [f"{row.verdict:<8} {row.name}: {row.why}" for row in self.outcomes if row.verdict != SAFE]
         return lines + [f"WORSE    {bad.name}: is {bad.verdict}, must be {bad.open or SAFE}" for bad in self.worse]
+
+
+def chosen(catalogue: Sequence[CatalogueEntry], only: Sequence[str]) -> list[CatalogueEntry]:
+    """Entries by group or by start of the name; all without a selection. Raises Fault CONFIG."""
+
+    def fits(named: CatalogueEntry, word: str) -> bool:
+        return named.group == word or named.entry.name.startswith(word)
+
+    for word in only:
+        if not any(fits(named, word) for named in catalogue):
+            groups = ", ".join(dict.fromkeys(named.group for named in catalogue))
+            raise Fault("CONFIG", f"--only {word}: no such group or entry; groups: {groups}")
+    return [named for named in catalogue if not only or any(fits(named, word) for word in only)]
 
 
 def judge_one(case: CatalogueEntry) -> Outcome:

@@ -10,7 +10,6 @@ It is a process stop and no safety function: an emergency stop belongs in the su
     check    the loop check: sensors alive, exciter answers, its gain
     core     `accept` a command, `look` at a block, `allow` a vibration
     latch    the operator's stop, kept over restarts
-    codes    states and causes of the guard as plain numbers for kernels, and the operator's orders to the guard
     events   events of a rig's guard
     kept_gain  the accepted exciter gain of a rig's loop check, kept over restarts
     received valid commands of the bus, in order

@@ -2,7 +2,10 @@
 
 import math
 
-from bridge.guard.codes import (
+from bridge.guard.states import enter, trip
+from bridge.kernel import Record, kernel
+from bridge.layouts import GuardMemory, GuardParams, SensorRow
+from bridge.wire.stickslip_pb2 import (
     ARMED,
     CHECK_PASSED,
     EXCITER_SILENT,
@@ -13,8 +16,6 @@ from bridge.guard.codes import (
     SENSOR_FROZEN,
     SENSOR_NOT_FINITE,
 )
-from bridge.guard.states import enter, trip
-from bridge.kernel import Record, kernel
 
 _TWO_PI = 2.0 * math.pi
 _QUIET_S = 0.5  # of listening to the sensors at rest; long enough for a 16-bit converter to show some noise
@@ -25,7 +26,7 @@ _WILD = 20.0  # largest factor either way from a rigid mount's gain; a mount may
 
 
 @kernel
-def check_tone(p: Record, s: Record) -> tuple[float, float]:
+def check_tone(p: GuardParams, s: GuardMemory) -> tuple[float, float]:
     """Frequency and amplitude of the check's present tone; amplitude 0 before the first and after the last tone."""
     at = _tone(p, s.check_blocks)
     if at < 0 or at >= p.tones:
@@ -34,18 +35,18 @@ def check_tone(p: Record, s: Record) -> tuple[float, float]:
 
 
 @kernel
-def _tone(p: Record, blocks: int) -> int:
+def _tone(p: GuardParams, blocks: int) -> int:
     quiet_blocks, tone_blocks = _blocks(p, _QUIET_S), _blocks(p, _TONE_S)
     return (blocks - quiet_blocks) // tone_blocks if blocks >= quiet_blocks else -1
 
 
 @kernel
-def _blocks(p: Record, time_s: float) -> int:
+def _blocks(p: GuardParams, time_s: float) -> int:
     return max(math.ceil(time_s / p.block_s), 2)
 
 
 @kernel
-def follow_check(p: Record, s: Record, block: Record, square_mps2: float) -> None:
+def follow_check(p: GuardParams, s: GuardMemory, block: SensorRow, square_mps2: float) -> None:
     """Add a block of samples to the check; at its end go to ARMED, to READY if the gain has changed, or to FAULT.
 
     Args:
@@ -91,7 +92,7 @@ def follow_check(p: Record, s: Record, block: Record, square_mps2: float) -> Non
 
 
 @kernel
-def _end(p: Record, s: Record) -> None:
+def _end(p: GuardParams, s: GuardMemory) -> None:
     """Compare the gain with the last accepted gain; arm if it is the same, or if none was accepted."""
     if s.accepted[0] == 0.0:
         s.accepted[:] = s.gain
@@ -103,7 +104,7 @@ def _end(p: Record, s: Record) -> None:
 
 
 @kernel
-def gain_change(p: Record, s: Record) -> float:
+def gain_change(p: GuardParams, s: GuardMemory) -> float:
     """Largest factor, either way, between the gains of the last check and the accepted gains."""
     largest = 1.0
     for at in range(p.tones):
@@ -113,7 +114,7 @@ def gain_change(p: Record, s: Record) -> float:
 
 
 @kernel
-def _judge(p: Record, s: Record, at: int) -> None:
+def _judge(p: GuardParams, s: GuardMemory, at: int) -> None:
     omega = _TWO_PI * p.tone_Hz[at]
     s.gain[at] = math.sqrt(max(s.tone_mps2 - s.quiet_mps2, 0.0)) / (omega * omega * p.check_m)
     if s.tone_mps2 < _HEARD * s.quiet_mps2:
@@ -125,7 +126,7 @@ def _judge(p: Record, s: Record, at: int) -> None:
 
 
 @kernel
-def write_gain(p: Record, s: Record, block: Record) -> None:
+def write_gain(p: GuardParams, s: GuardMemory, block: SensorRow) -> None:
     """Write one tone of the last check and its gain into a block, the next tone into each next block; zeros without a check."""
     at = s.block % p.tones
     block.check_Hz = p.tone_Hz[at] if s.verified == 1 else 0.0
@@ -133,7 +134,7 @@ def write_gain(p: Record, s: Record, block: Record) -> None:
 
 
 @kernel
-def _note(s: Record, channel: int, samples: Record) -> bool:
+def _note(s: GuardMemory, channel: int, samples: Record) -> bool:
     for i in range(samples.shape[0]):
         value = float(samples[i])
         if not math.isfinite(value):

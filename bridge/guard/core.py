@@ -3,17 +3,27 @@
 import math
 
 from bridge.guard.check import check_tone, follow_check
-from bridge.guard.codes import ACTIVE, ARMED, ARMED_BY_SCENARIO, CHECKING, COMMAND_LOST, DISARMED, NO_CAUSE, SLEW_RATE
 from bridge.guard.estimates import see_drive, see_vibration
 from bridge.guard.limits import held, watch
 from bridge.guard.states import enter, note_vibration
-from bridge.kernel import Record, kernel
+from bridge.kernel import kernel
+from bridge.layouts import CommandRow, GuardMemory, GuardParams, SensorRow
+from bridge.wire.stickslip_pb2 import (
+    ACTIVE,
+    ARMED,
+    ARMED_BY_SCENARIO,
+    CHECKING,
+    COMMAND_LOST,
+    DISARMED,
+    NO_CAUSE,
+    SLEW_RATE,
+)
 
 NO_COMMAND = -1  # as the unsigned number of the wire: bridge.wire.messages.NO_BLOCK
 
 
 @kernel
-def accept(p: Record, s: Record, command: Record) -> bool:
+def accept(p: GuardParams, s: GuardMemory, command: CommandRow) -> bool:
     """Whether a command is valid: of this run, newer than the last, finite, and the answer to a block already sent.
 
     A restarted controller counts from 0, so after a time without fresh commands any number is newer.
@@ -29,7 +39,7 @@ def accept(p: Record, s: Record, command: Record) -> bool:
 
 
 @kernel
-def allow(p: Record, s: Record, command_block: int, frequency_Hz: float, amplitude_m: float) -> None:
+def allow(p: GuardParams, s: GuardMemory, command_block: int, frequency_Hz: float, amplitude_m: float) -> None:
     """Set `frequency_Hz` and `amplitude_m` of the next block, from the command in force.
 
     Args:
@@ -67,7 +77,7 @@ def allow(p: Record, s: Record, command_block: int, frequency_Hz: float, amplitu
 
 
 @kernel
-def look(p: Record, s: Record, block: Record) -> None:
+def look(p: GuardParams, s: GuardMemory, block: SensorRow) -> None:
     """Process the samples of the block that vibrated as `allow` set; the next block begins."""
     see_drive(p, s, block)
     see_vibration(p, s, block)

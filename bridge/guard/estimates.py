@@ -4,13 +4,14 @@ import math
 
 from bridge.guard.records import RING
 from bridge.kernel import Record, kernel
+from bridge.layouts import GuardMemory, GuardParams, SensorRow
 
 _TWO_PI = 2.0 * math.pi
 _PARTS = 5  # of the window for the drive's velocity
 
 
 @kernel
-def see_drive(p: Record, s: Record, block: Record) -> None:
+def see_drive(p: GuardParams, s: GuardMemory, block: SensorRow) -> None:
     """Largest recent velocity of the drive [m/s]: over 50 ms of its positions, decaying slowly.
 
     A position jump affects at most two of five parts of the 50 ms, so the velocity is at most the median of the parts.
@@ -32,7 +33,7 @@ def see_drive(p: Record, s: Record, block: Record) -> None:
 
 
 @kernel
-def _median(p: Record, s: Record, blocks: int) -> float:
+def _median(p: GuardParams, s: GuardMemory, blocks: int) -> float:
     """Median velocity of the drive over the parts of its last blocks [m/s]; sets `fastest_mps` to the largest."""
     fastest_mps, second_mps, third_mps = 0.0, 0.0, 0.0
     newer = s.seen_blocks
@@ -53,13 +54,13 @@ def _median(p: Record, s: Record, blocks: int) -> float:
 
 
 @kernel
-def expect_drive(s: Record, velocity_mps: float) -> None:
+def expect_drive(s: GuardMemory, velocity_mps: float) -> None:
     """Note a future velocity of the drive: a vibration may begin before the move."""
     s.drive_mps = max(s.drive_mps, math.fabs(velocity_mps))
 
 
 @kernel
-def see_vibration(p: Record, s: Record, block: Record) -> None:
+def see_vibration(p: GuardParams, s: GuardMemory, block: SensorRow) -> None:
     """Velocity amplitude of the base [m/s], from its acceleration at the vibration frequency, block by block."""
     square = _square_at(block.base_accel_mps2, _TWO_PI * s.frequency_Hz * p.sample_s)
     if math.isfinite(square):

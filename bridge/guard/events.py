@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from bridge.guard.codes import FAULT, GAIN_CHANGED, LIMITS, READY, STOP_BY_PERSON, STOP_KEPT
+from bridge.guard.records import LIMITS
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.stickslip_pb2 import FAULT, GAIN_CHANGED, READY, STOP_BY_PERSON, STOP_KEPT
 from bridge.wire.words import words
 
 _AGAIN_S = 1.0  # shortest time between two reports of the same limit

@@ -2,17 +2,18 @@
 
 import math
 
-from bridge.guard.codes import BAND, DRIVE_MAX, DRIVE_RATIO, DUTY, HEAT, LOUD, OVERTRAVEL
 from bridge.guard.records import FIRST
 from bridge.guard.states import trip
-from bridge.kernel import Record, kernel
+from bridge.kernel import kernel
+from bridge.layouts import GuardMemory, GuardParams
+from bridge.wire.stickslip_pb2 import BAND, DRIVE_MAX, DRIVE_RATIO, DUTY, HEAT, LOUD, OVERTRAVEL
 
 _TWO_PI = 2.0 * math.pi
 _REPORT_PARTS = 10  # a loud vibration is reported after 1/10 of the time until it trips
 
 
 @kernel
-def passes(p: Record, s: Record, limit: int, value: float) -> bool:
+def passes(p: GuardParams, s: GuardMemory, limit: int, value: float) -> bool:
     """Whether a value is within the alarm level of a limit, else set `limit`; trip after too long above the abort level."""
     i = limit - FIRST
     s.over_blocks[i] = s.over_blocks[i] + 1 if value > p.abort[i] else 0
@@ -25,7 +26,7 @@ def passes(p: Record, s: Record, limit: int, value: float) -> bool:
 
 
 @kernel
-def exciter_gain(p: Record, s: Record, frequency_Hz: float) -> float:
+def exciter_gain(p: GuardParams, s: GuardMemory, frequency_Hz: float) -> float:
     """Delivered over commanded v_a at a frequency, from the loop check; linear between its tones."""
     if frequency_Hz <= p.tone_Hz[0]:
         return s.gain[0]
@@ -37,7 +38,7 @@ def exciter_gain(p: Record, s: Record, frequency_Hz: float) -> float:
 
 
 @kernel
-def _inside(p: Record, frequency_Hz: float) -> bool:
+def _inside(p: GuardParams, frequency_Hz: float) -> bool:
     inside = p.frequency_min_Hz <= frequency_Hz <= p.frequency_max_Hz
     for i in range(p.bands):
         inside = inside and not p.band_Hz[i, 0] <= frequency_Hz <= p.band_Hz[i, 1]
@@ -45,7 +46,7 @@ def _inside(p: Record, frequency_Hz: float) -> bool:
 
 
 @kernel
-def held(p: Record, s: Record, frequency_Hz: float, amplitude_m: float) -> float:
+def held(p: GuardParams, s: GuardMemory, frequency_Hz: float, amplitude_m: float) -> float:
     """The commanded amplitude, held at the limits [m]."""
     if amplitude_m == 0.0:
         s.ratio_blocks = 0
@@ -74,7 +75,7 @@ def held(p: Record, s: Record, frequency_Hz: float, amplitude_m: float) -> float
 
 
 @kernel
-def watch(p: Record, s: Record) -> None:
+def watch(p: GuardParams, s: GuardMemory) -> None:
     """Update warmth, duty and loudness of the present vibration."""
     warmth = p.heat_per_Hz_m2 * s.frequency_Hz * s.amplitude_m * s.amplitude_m
     s.heat += p.heat_share * (warmth - s.heat)

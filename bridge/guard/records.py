@@ -6,7 +6,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from bridge.guard.codes import (
+from bridge.guard.config import MOST_BANDS, GuardConfig, Level
+from bridge.kernel import record
+from bridge.wire.channels import CHANNELS
+from bridge.wire.stickslip_pb2 import (
     ARMED,
     ARMED_BY_SCENARIO,
     BAND,
@@ -16,16 +19,13 @@ from bridge.guard.codes import (
     DUTY,
     FAULT,
     HEAT,
-    LIMITS,
     LOUD,
     OVERTRAVEL,
     POWER_UP,
     STOP_KEPT,
 )
-from bridge.guard.config import MOST_BANDS, GuardConfig, Level
-from bridge.kernel import record
 
-CHANNELS = 5
+LIMITS = OVERTRAVEL, DRIVE_MAX, DRIVE_RATIO, LOUD, BAND, HEAT, DUTY  # limits with a level and a hold time
 FIRST = min(LIMITS)  # the tables below count the causes of limits from here
 MOST_TONES = 8
 _RING = 256  # block means of the drive's position: 50 ms of blocks of 0.25 ms
@@ -68,7 +68,7 @@ STATE = np.dtype(
     ]
     + [("over_blocks", "i8", (len(LIMITS),)), ("drive_m", "f8", (_RING,)), ("gain", "f8", (MOST_TONES,))]
     + [("accepted", "f8", (MOST_TONES,))]  # gains of the tones that later checks are compared with; 0: none yet
-    + [(name, "f8", (CHANNELS,)) for name in ("lowest", "highest")],
+    + [(name, "f8", (len(CHANNELS),)) for name in ("lowest", "highest")],
     align=True,
 )
 RING = _RING

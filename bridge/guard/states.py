@@ -1,33 +1,34 @@
 """The states of a rig and their transitions. Nothing arms by itself: not after a freeze, a restart or a new link."""
 
-from bridge.guard.codes import (
-    ACCEPT_GAIN,
+from bridge.kernel import kernel
+from bridge.layouts import GuardMemory
+from bridge.wire.stickslip_pb2 import (
     ACTIVE,
-    ARM,
     ARMED,
     ARMED_BY_PERSON,
     CHECKING,
-    DISARM,
     DISARMED,
     DISARMED_BY_PERSON,
     FAULT,
     GAIN_ACCEPTED,
     GAIN_CHANGED,
-    LEAVE,
     READY,
-    RESET,
     RESET_BY_PERSON,
     RUN_ENDED,
-    STOP,
     STOP_BY_PERSON,
     VIBRATION_BEGAN,
     VIBRATION_ENDED,
+    Operator,
 )
-from bridge.kernel import Record, kernel
+
+# orders to the guard; numba reads no values of the nested enum
+STOP, RESET, ARM, DISARM = Operator.STOP, Operator.RESET, Operator.ARM, Operator.DISARM
+ACCEPT_GAIN = Operator.ACCEPT_GAIN
+LEAVE = -1  # the rig's process ends
 
 
 @kernel
-def enter(s: Record, state: int, cause: int) -> None:
+def enter(s: GuardMemory, state: int, cause: int) -> None:
     """Go to a state; a change of state resets the counters of the state."""
     if s.state != state:
         s.lost_blocks, s.check_blocks, s.heard = 0, 0, 0
@@ -36,14 +37,14 @@ def enter(s: Record, state: int, cause: int) -> None:
 
 
 @kernel
-def trip(s: Record, cause: int) -> None:
+def trip(s: GuardMemory, cause: int) -> None:
     """Go to FAULT until the operator resets it; the first cause is kept, except that the operator's stop replaces it."""
     if s.state != FAULT:
         enter(s, FAULT, cause)
 
 
 @kernel
-def apply_order(s: Record, word: int) -> bool:
+def apply_order(s: GuardMemory, word: int) -> bool:
     """Apply an order of the operator or of the ending process. Returns whether it changed the state.
 
     A stop is valid in every state. ARM begins a check in DISARMED, in ARMED without a check, and in READY after a change of the
@@ -71,7 +72,7 @@ def apply_order(s: Record, word: int) -> bool:
 
 
 @kernel
-def note_vibration(s: Record) -> None:
+def note_vibration(s: GuardMemory) -> None:
     """ARMED becomes ACTIVE when the vibration starts, and ARMED again when it ends."""
     if s.state == ARMED and s.amplitude_m > 0.0:
         s.state, s.cause = ACTIVE, VIBRATION_BEGAN

@@ -3,7 +3,7 @@
 library, live            the header of every log; the lock of a log that is being recorded
 mcap_chunks, runlog      writing in small chunks, so that a kill costs at most one chunk
 viewers/                 topics for the viewers of other programs
-storage/                 the files of a log: their order, the reaction to a failing disk, proof that no byte was changed
+storage/                 the files of a log: their order, the reaction to a failing disk, checksums, the verdict file
 block_rows               the messages of many blocks as the bytes of a chunk
 screen                   which messages go into a log
 recorder                 the process that writes every message on the bus

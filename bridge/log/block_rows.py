@@ -7,10 +7,8 @@ import numpy as np
 import numpy.typing as npt
 from mcap.opcode import Opcode
 
+from bridge.log.chunk_messages import FIELDS_BYTES, HEAD, INDEX_ENTRY
 from bridge.wire.messages import Records
-
-FIELDS_BYTES = 22  # in a message record, between its length and its payload
-_INDEX_ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
 
 
 class MessageRows(NamedTuple):
@@ -23,8 +21,7 @@ class MessageRows(NamedTuple):
 
 
 def _record(payload_bytes: int) -> np.dtype[Any]:
-    head = [("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log_ns", "<u8")]
-    return np.dtype([*head, ("publish_ns", "<u8"), ("payload", f"V{payload_bytes}")])
+    return np.dtype([*HEAD.descr, ("payload", f"V{payload_bytes}")])
 
 
 def _fill(place: npt.NDArray[Any], channel: int, messages: Records, log_ns: npt.NDArray[np.int64]) -> None:
@@ -69,8 +66,8 @@ def rows(
         log_times = messages["t_ns"] if log_ns is None else log_ns
         _fill(place, channel, messages, log_times)
         fields: Any = outer.fields
-        entries[channel] = np.empty(len(messages), _INDEX_ENTRY)
-        entries[channel]["log_time"] = log_times
+        entries[channel] = np.empty(len(messages), INDEX_ENTRY)
+        entries[channel]["log_ns"] = log_times
         entries[channel]["offset"] = (offsets + np.uint64(fields[str(channel)][1])).ravel()
     times = next(iter(each.values()))["t_ns"] if log_ns is None else log_ns
     return MessageRows(laid_out.view(np.uint8).data, entries, int(times[0]), int(times[-1]))

@@ -1,6 +1,5 @@
 """Places of the messages in the bytes of chunks: from their indexes if these are right, else by a walk through the records."""
 
-import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 from mcap.opcode import Opcode
 
-_RECORD = struct.Struct("<BQ")  # opcode, length of the content
+from bridge.log.library import HEAD as _RECORD
+
 HEAD = np.dtype(  # of a message record, before its payload
     [
         ("opcode", "u1"),
@@ -22,9 +22,9 @@ HEAD = np.dtype(  # of a message record, before its payload
         ("publish_ns", "<u8"),
     ]
 )
-_FIELDS_BYTES = HEAD.itemsize - _RECORD.size
+FIELDS_BYTES = HEAD.itemsize - _RECORD.size  # in a message record, between its length and its payload
 _INDEX_HEAD_BYTES = 6  # channel, length of the entries
-_INDEX_ENTRY = np.dtype([("log_ns", "<u8"), ("offset", "<u8")])
+INDEX_ENTRY = np.dtype([("log_ns", "<u8"), ("offset", "<u8")])
 
 Bytes = npt.NDArray[np.uint8]
 Column = npt.NDArray[np.int64]
@@ -78,7 +78,7 @@ class Messages:
     def payloads(self, most: int | None = None) -> list[bytes]:
         """The payload of each, or of the first `most`."""
         starts = self.start[:most]
-        ends = starts + self.heads["length"][:most].astype(np.int64) - _FIELDS_BYTES
+        ends = starts + self.heads["length"][:most].astype(np.int64) - FIELDS_BYTES
         return [self.data[start:end].tobytes() for start, end in zip(starts, ends, strict=True)]
 
     @cached_property
@@ -87,7 +87,7 @@ class Messages:
         lengths = self.heads["length"]
         if not len(lengths) or (lengths != lengths[0]).any():
             return None
-        size = int(lengths[0]) - _FIELDS_BYTES
+        size = int(lengths[0]) - FIELDS_BYTES
         return cut(self.data, self.start, size).view(np.uint8).reshape(-1, size) if size else None
 
 
@@ -111,10 +111,10 @@ def messages_of(chunks: Sequence[Chunked]) -> Messages:
 def _indexed(chunks: Sequence[Chunked], begins: Column) -> Column:
     """Offsets of the messages according to the indexes, in file order, unchecked."""
     parts = [
-        np.frombuffer(content, _INDEX_ENTRY, offset=_INDEX_HEAD_BYTES)["offset"].astype(np.int64) + begin
+        np.frombuffer(content, INDEX_ENTRY, offset=_INDEX_HEAD_BYTES)["offset"].astype(np.int64) + begin
         for chunk, begin in zip(chunks, begins, strict=False)
         for content in chunk.indexes
-        if len(content) > _INDEX_HEAD_BYTES and len(content) % _INDEX_ENTRY.itemsize == _INDEX_HEAD_BYTES
+        if len(content) > _INDEX_HEAD_BYTES and len(content) % INDEX_ENTRY.itemsize == _INDEX_HEAD_BYTES
     ]
     # a few ascending parts, which a stable sort merges: 15 times as fast as the usual one
     return np.sort(np.concatenate(parts), kind="stable") if parts else np.empty(0, np.int64)
@@ -130,7 +130,7 @@ def _heads(data: Bytes, offsets: Column) -> npt.NDArray[Any] | None:
 def _tile(begins: Column, offsets: Column, heads: npt.NDArray[Any]) -> bool:
     """Whether the chunks consist of messages at these offsets and of nothing else, so that a walk gives the same result."""
     ends = offsets + _RECORD.size + heads["length"].astype(np.int64)
-    messages = (heads["opcode"] == Opcode.MESSAGE) & (heads["length"] >= _FIELDS_BYTES)
+    messages = (heads["opcode"] == Opcode.MESSAGE) & (heads["length"] >= FIELDS_BYTES)
     whole = offsets[0] == 0 and (ends[:-1] == offsets[1:]).all() and ends[-1] == begins[-1] and messages.all()
     # no message crosses the border of two chunks
     return bool(
@@ -152,7 +152,7 @@ def _walked(data: bytes) -> ChunkWalk:
             break
         if opcode != Opcode.MESSAGE:
             others.append((opcode, data[begin : begin + length]))
-        elif length >= _FIELDS_BYTES:
+        elif length >= FIELDS_BYTES:
             offsets.append(at)
         else:
             broken += 1

@@ -3,9 +3,10 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from bridge.log.finding import Finding
+from bridge.log.finding import Finding, findings_at
 from bridge.units import counted
 
+_COUNTS = ("cut_bytes", "bad_chunks", "bad_records", "nameless", "missing")
 _MOST_TOPICS = 4  # of other programs that are named
 
 
@@ -24,12 +25,19 @@ class Damage(NamedTuple):
     @property
     def whole(self) -> bool:
         """Whether the log was closed and everything in it could be read."""
-        lost = (self.cut_bytes, self.bad_chunks, self.bad_records, self.nameless, self.missing)
-        return self.closed and not any(lost)
+        return self.closed and not any(getattr(self, name) for name in _COUNTS)
 
     def and_also(self, **more: int) -> "Damage":
         """Add counts to the given fields."""
         return self._replace(**{name: getattr(self, name) + count for name, count in more.items()})
+
+
+def of_all_files(damages: list[Damage]) -> Damage:
+    """The damage of a log of several files."""
+    counts = {name: sum(getattr(damage, name) for damage in damages) for name in _COUNTS}
+    before = "; ".join(damage.before for damage in damages if damage.before)
+    first_bad = next((damage.first_bad for damage in damages if damage.first_bad), "")
+    return Damage(**counts, closed=all(damage.closed for damage in damages), before=before, first_bad=first_bad)
 
 
 def also_before(damage: Damage, lost: str) -> Damage:
@@ -55,35 +63,23 @@ def lost_in_words(damage: Damage) -> str:
 
 def damage_findings(damage: Damage, path: Path) -> list[Finding]:
     """A finding for each kind of loss in a log."""
-    findings: list[Finding] = []
     remedy = f"`stickslip log recover {path}` saves the rest"
-    if not damage.closed:
-        text = f"has no end, {damage.cut_bytes} bytes of an open chunk were lost; {remedy}"
-        findings.append(Finding("cut", path.name, text, max(damage.cut_bytes, 1)))
-    if damage.bad_chunks:
-        findings.append(
-            Finding(
-                "damaged",
-                path.name,
-                f"{counted(damage.bad_chunks, 'chunk is', 'chunks are')} damaged; {remedy}",
-                damage.bad_chunks,
-            )
-        )
-    if damage.bad_records:
-        first = f", first: {damage.first_bad}" if damage.first_bad else ""
-        text = f"{damage.bad_records} definitions, messages or stretches of bytes make no sense{first}; {remedy}"
-        findings.append(Finding("damaged", path.name, text, damage.bad_records))
-    if damage.nameless:
-        whose = counted(damage.nameless, "message belongs", "messages belong")
-        text = f"{whose} to a channel whose definition is lost: the topic cannot be known"
-        findings.append(Finding("damaged", path.name, text, damage.nameless))
-    if damage.missing:
-        text = f"the file's own count has {counted(damage.missing, 'message')} more than are in it"
-        findings.append(Finding("damaged", path.name, text, damage.missing))
-    if damage.before:
-        text = f"was saved from a log that was not whole; how many messages are missing is not known: {damage.before}"
-        findings.append(Finding("recovered", path.name, text))
-    return findings
+    cut = 0 if damage.closed else max(damage.cut_bytes, 1)
+    chunks = counted(damage.bad_chunks, "chunk is", "chunks are")
+    first = f", first: {damage.first_bad}" if damage.first_bad else ""
+    nonsense = f"{damage.bad_records} definitions, messages or stretches of bytes make no sense{first}"
+    whose = counted(damage.nameless, "message belongs", "messages belong")
+    more = counted(damage.missing, "message")
+    before = f"was saved from a log that was not whole; how many messages are missing is not known: {damage.before}"
+    rows = (
+        ("cut", cut, f"has no end, {damage.cut_bytes} bytes of an open chunk were lost; {remedy}"),
+        ("damaged", damage.bad_chunks, f"{chunks} damaged; {remedy}"),
+        ("damaged", damage.bad_records, f"{nonsense}; {remedy}"),
+        ("damaged", damage.nameless, f"{whose} to a channel whose definition is lost: the topic cannot be known"),
+        ("damaged", damage.missing, f"the file's own count has {more} more than are in it"),
+        ("recovered", int(bool(damage.before)), before),
+    )
+    return findings_at(path.name, rows)
 
 
 def foreign_in_words(foreign: dict[str, int]) -> list[str]:

@@ -1,6 +1,7 @@
 """A finding: one fault of a log or of evidence, and its place."""
 
-from typing import Any, NamedTuple
+from collections.abc import Iterable
+from typing import NamedTuple
 
 
 class Finding(NamedTuple):
@@ -11,10 +12,11 @@ class Finding(NamedTuple):
     text: str
     times: int = 1  # number of rows, messages or bytes concerned; `text` gives the kind
 
-    def as_dict(self) -> dict[str, Any]:
-        """The finding as an object for `--json`."""
-        return self._asdict()
-
     def in_words(self) -> str:
         """One line for the operator."""
         return f"{self.kind:<16} {self.where}: {self.text}"
+
+
+def findings_at(where: str, rows: Iterable[tuple[str, int, str]]) -> list[Finding]:
+    """A finding for each row of kind, number and text whose number is not 0."""
+    return [Finding(kind, where, text, times) for kind, times, text in rows if times]

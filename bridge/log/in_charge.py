@@ -10,7 +10,7 @@ from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.event_codes import WEAK_REASONS
 from bridge.wire.messages import Records
-from bridge.wire.words import words
+from bridge.wire.words import help_of
 
 NO_COMMAND = (1 << 64) - 1  # in `Applied.command_block`: the rig has none, before the first or on its way out
 # A longer fallback means that the controller is absent, not stalled. Smaller: a controller that stalls for 0.5 s counts as
@@ -55,9 +55,8 @@ class InCharge(NamedTuple):
             share = self.unanswered / max(self.answerable, 1)
             text = f"{counted(self.unanswered, 'block')} of {self.answerable} have no command that answers them"
             rows.append(("UNANSWERED", text, share > UNANSWERED_SHARE))
-        helps = {word.word: word.help for word in words() if word.column == "reason"}
         for name, seconds in self.reasons_s.items():
-            rows.append((name, f"for {seconds:.2f} s: {helps[name]}", seconds > WEAK_S))
+            rows.append((name, f"for {seconds:.2f} s: {help_of('reason', name)}", seconds > WEAK_S))
         return rows
 
     def findings(self) -> list[Finding]:

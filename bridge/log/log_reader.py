@@ -7,12 +7,13 @@ cannot be read the pass goes on with the next whole chunk.
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from io import BytesIO
+from itertools import chain
 from pathlib import Path
 from typing import IO, NamedTuple
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Header, Metadata, Schema, Statistics
+from mcap.records import Chunk, Header, Metadata, Statistics
 
 from bridge.faults import Fault
 from bridge.log.chunk_messages import Chunked, Messages, messages_of
@@ -41,54 +42,18 @@ _DEFINITIONS = (Opcode.SCHEMA, Opcode.CHANNEL)
 _MOST_NAMES = 3  # schemas of another program that a message lists
 
 
+_Part = tuple[Chunk | bytes | None, list[bytes]]  # a chunk, or a message outside of chunks; the indexes after it
+
+
 class _Group(NamedTuple):
-    """Chunks, or messages outside of chunks, that a second thread parses."""
-
-    apart: "Future[_Apart]"
-    end_bytes: int  # place of their end in the file
-
-
-class _Apart(NamedTuple):
-    """The messages of a group."""
+    """Messages of chunks, or outside of chunks, that a second thread has parsed."""
 
     messages: Messages | None  # None if none of its chunks can be read
     bad_chunks: int
+    end_bytes: int  # place of their end in the file
 
 
-class _Filling:
-    """The group being read: chunks with their indexes, and messages outside of chunks."""
-
-    def __init__(self) -> None:
-        self._parts: list[tuple[Chunk | bytes | None, list[bytes]]] = []
-        self._loose: list[bytes] = []
-        self.bytes = 0  # uncompressed, as the chunks claim
-
-    def add_chunk(self, chunk: Chunk | None) -> list[bytes]:
-        """Add a chunk, and return the list for the indexes that follow it."""
-        self._end_loose()
-        indexes: list[bytes] = []
-        self._parts.append((chunk, indexes))
-        self.bytes += chunk.uncompressed_size if chunk is not None else 0
-        return indexes
-
-    def add_message(self, content: bytes) -> None:
-        """Add a message outside of chunks."""
-        self._loose.append(HEAD.pack(Opcode.MESSAGE, len(content)) + content)
-        self.bytes += len(content) + HEAD.size
-
-    def _end_loose(self) -> None:
-        if self._loose:
-            self._parts.append((b"".join(self._loose), []))
-            self._loose = []
-
-    def taken(self, end_bytes: int, worker: ThreadPoolExecutor) -> _Group | None:
-        """Submit everything read so far to the worker; None if nothing was read."""
-        self._end_loose()
-        parts, self._parts, self.bytes = self._parts, [], 0
-        return _Group(worker.submit(_taken_apart, parts), end_bytes) if parts else None
-
-
-def _taken_apart(parts: list[tuple[Chunk | bytes | None, list[bytes]]]) -> _Apart:
+def _parsed(parts: list[_Part], end_bytes: int) -> _Group:
     """The messages of a group, and the number of its damaged chunks."""
     chunks: list[Chunked] = []
     for part, indexes in parts:
@@ -98,7 +63,7 @@ def _taken_apart(parts: list[tuple[Chunk | bytes | None, list[bytes]]]) -> _Apar
     messages = messages_of(chunks) if chunks else None
     for mine in messages.by_channel.values() if messages is not None else ():
         _ = mine.stacked  # computed here, because the caller's thread has more work
-    return _Apart(messages, len(parts) - len(chunks))
+    return _Group(messages, len(parts) - len(chunks), end_bytes)
 
 
 class LogReader:
@@ -119,23 +84,13 @@ class LogReader:
         self.header: Header | None = None
         self.metadata: dict[str, dict[str, str]] = {}
         self.foreign: dict[str, int] = {}  # skipped messages in topics of other programs
-        self.attachments: list[tuple[Path, int, int]] = []  # file, first byte and number of bytes of the content
+        self.attachments = 0
         self.size_bytes = 0
         self.position_bytes = 0  # end of the part that was read
-        self._definitions = Definitions(path)
+        self.definitions = Definitions(path)  # of the file being read
         self._any_own = False
         self._claimed_bytes = 0  # uncompressed size of the chunks so far
         self._stated: int | None = None  # number of messages according to the file's statistics
-
-    @property
-    def schemas(self) -> dict[int, Schema]:
-        """The schemas of the file being read, by number."""
-        return self._definitions.schemas
-
-    @property
-    def channels(self) -> dict[int, Channel]:
-        """The channels of the file being read, by number."""
-        return self._definitions.channels
 
     def count_bad_messages(self, count: int, why: str) -> None:
         """Add `count` whole messages that do not fit their topic to the damage; `why` is the fault of the first."""
@@ -144,12 +99,12 @@ class LogReader:
 
     def topic(self, channel_id: int) -> str | None:
         """The topic of a channel of this project; None if it belongs to another program, or its definition is lost."""
-        return self._definitions.topic(channel_id) if self._definitions.find(channel_id) else None
+        return self.definitions.topic(channel_id) if self.definitions.find(channel_id) else None
 
     def pass_over(self, channel_id: int, messages: int) -> None:
         """Count messages of a channel without a topic of this project."""
-        if self._definitions.find(channel_id):
-            name = self.channels[channel_id].topic
+        if self.definitions.find(channel_id):
+            name = self.definitions.channels[channel_id].topic
             self.foreign[name] = self.foreign.get(name, 0) + messages
         else:
             self.damage = self.damage.and_also(nameless=messages)
@@ -168,13 +123,13 @@ class LogReader:
             for path, size_bytes in zip(paths, sizes_bytes, strict=True):
                 self._begin(path)
                 read = 0
-                for messages in self._some_at_once(path, size_bytes, before_bytes):
+                for messages in self._groups(path, size_bytes, before_bytes):
                     read += len(messages.start)
                     yield messages
                 closed &= self.damage.closed
                 if self._stated is not None:
                     self.damage = self.damage.and_also(missing=max(self._stated - read, 0))
-                self._any_own |= self._definitions.any_own()
+                self._any_own |= self.definitions.any_own()
                 before_bytes += size_bytes
                 self.position_bytes = before_bytes
             self.damage = self.damage._replace(closed=closed)
@@ -186,92 +141,81 @@ class LogReader:
 
     def _begin(self, path: Path) -> None:
         """Reset the state of the previous file: channel numbers are valid within one file only."""
-        self._any_own |= self._definitions.any_own()
+        self._any_own |= self.definitions.any_own()
         self.damage = self.damage._replace(closed=False)
-        self._definitions = Definitions(path)
+        self.definitions = Definitions(path)
         self._stated = None
 
-    def _some_at_once(self, path: Path, size_bytes: int, before_bytes: int) -> Iterator[Messages]:
+    def _groups(self, path: Path, size_bytes: int, before_bytes: int) -> Iterator[Messages]:
         # A second thread parses a group while the caller works on the previous group. With 2, 4 and 8 groups ahead no log is read
-        # faster, and 8 hold 13 MB more. Definitions wait in the same list, so that each applies to the messages after it.
-        ahead: list[_Group | FileRecord] = []
+        # faster, and 8 hold 13 MB more. A definition waits in its place, so that it applies to the messages after it.
+        before: Future[_Group] | FileRecord | None = None
         with path.open("rb") as file, ThreadPoolExecutor(max_workers=1) as worker:
-            for item in self._items(file, worker, size_bytes):
-                if isinstance(item, _Group):
-                    for before in ahead:
-                        yield from self._taken_in(before, before_bytes)
-                    ahead = []
-                ahead.append(item)
-            for item in ahead:
-                yield from self._taken_in(item, before_bytes)
+            for item in chain(self._items(file, worker, size_bytes), [None]):
+                if isinstance(before, FileRecord):
+                    self._learn(before.opcode, before.content)
+                elif before is not None:
+                    messages, bad_chunks, end_bytes = before.result()
+                    self.position_bytes = before_bytes + end_bytes
+                    bad_records = messages.broken if messages is not None else 0
+                    self.damage = self.damage.and_also(bad_chunks=bad_chunks, bad_records=bad_records)
+                    if messages is not None:
+                        for opcode, content in messages.others:
+                            if opcode in _DEFINITIONS:
+                                self._learn(opcode, content)
+                        yield messages
+                before = item
 
-    def _taken_in(self, item: _Group | FileRecord, before_bytes: int) -> Iterator[Messages]:
-        """Store a definition, or return the messages of a group."""
-        if isinstance(item, FileRecord):
-            self._learn(item.opcode, item.content)
-            return
-        messages, bad_chunks = item.apart.result()
-        self.position_bytes = before_bytes + item.end_bytes
-        bad_records = messages.broken if messages is not None else 0
-        if bad_chunks or bad_records:
-            self.damage = self.damage.and_also(bad_chunks=bad_chunks, bad_records=bad_records)
-        if messages is None:
-            return
-        for opcode, content in messages.others:
-            if opcode in _DEFINITIONS:
-                self._learn(opcode, content)
-        yield messages
-
-    def _items(self, file: IO[bytes], worker: ThreadPoolExecutor, size_bytes: int) -> Iterator[_Group | FileRecord]:
-        """Groups of chunks, and the records between them, in file order."""
+    def _items(
+        self, file: IO[bytes], worker: ThreadPoolExecutor, size_bytes: int
+    ) -> Iterator[Future[_Group] | FileRecord]:
+        """Groups of chunks, and the definitions between them, in file order."""
         if file.read(len(MAGIC)) != MAGIC:
             line = f"{self.path}: {size_bytes} bytes, no MCAP file (its first 8 bytes differ); give a run log"
             raise Fault("BAD_LOG", line)
-        whole_bytes = len(MAGIC)
-        filling = _Filling()
+        at = len(MAGIC)  # end of the whole records
+        parts: list[_Part] = []
+        waiting_bytes = 0  # of the parts, uncompressed, as the chunks claim
         indexes: list[bytes] | None = None  # of the chunk just before
         while not self.damage.closed:
-            record = next_record(file, whole_bytes, size_bytes)
-            is_message = record is not None and record.opcode == Opcode.MESSAGE
+            record = next_record(file, at, size_bytes)
             is_index = record is not None and record.opcode == Opcode.MESSAGE_INDEX and not record.is_chunk
             is_definition = record is not None and record.opcode in _DEFINITIONS and not record.is_chunk
-            if is_definition or (filling.bytes > AT_ONCE_BYTES and not is_index):
-                group = filling.taken(whole_bytes, worker)
-                if group is not None:
-                    yield group
+            if parts and (is_definition or (waiting_bytes > AT_ONCE_BYTES and not is_index)):
+                yield worker.submit(_parsed, parts, at)
+                parts, waiting_bytes = [], 0
             if record is None:
-                start = self._after_damage(file, whole_bytes, size_bytes)
+                start = self._after_damage(file, at, size_bytes)
                 if start is None:
                     break
-                whole_bytes = file.seek(start)
-                indexes = None
+                at, indexes = file.seek(start), None
                 continue
-            content_at = whole_bytes + HEAD.size
-            whole_bytes = record.end_bytes
+            at = record.end_bytes
+            if is_index and indexes is not None:
+                indexes.append(record.content)
+                continue
+            indexes = None
             if record.is_chunk:
                 chunk = opened(record.content)
                 self._refuse_a_bomb(chunk)
-                indexes = filling.add_chunk(chunk)
-            elif is_message:
-                filling.add_message(record.content)
-                indexes = None
-            elif is_index and indexes is not None:
-                indexes.append(record.content)
+                indexes = []
+                parts.append((chunk, indexes))
+                waiting_bytes += chunk.uncompressed_size if chunk is not None else 0
+            elif record.opcode == Opcode.MESSAGE:
+                parts.append((HEAD.pack(Opcode.MESSAGE, len(record.content)) + record.content, []))
+                waiting_bytes += len(record.content)
             elif record.opcode == Opcode.FOOTER and len(record.content) == _FOOTER_BYTES:
                 self.damage = self.damage._replace(closed=True)
             elif record.opcode == Opcode.ATTACHMENT:
-                self.attachments.append((Path(file.name), content_at, whole_bytes - content_at))
+                self.attachments += 1
+            elif is_definition:
+                yield record
             else:
-                indexes = None
-                if is_definition:
-                    yield record
-                else:
-                    self._learn(record.opcode, record.content)
-        group = filling.taken(whole_bytes, worker)
-        if group is not None:
-            yield group
+                self._learn(record.opcode, record.content)
+        if parts:
+            yield worker.submit(_parsed, parts, at)
         if not self.damage.closed:
-            self.damage = self.damage.and_also(cut_bytes=size_bytes - whole_bytes)
+            self.damage = self.damage.and_also(cut_bytes=size_bytes - at)
 
     def _refuse_a_bomb(self, chunk: Chunk | None) -> None:
         """Raise Fault BAD_LOG for chunks that claim more data than a log of this size can hold, before any is uncompressed."""
@@ -292,7 +236,7 @@ class LogReader:
 
     def _must_be_ours(self) -> None:
         """Raise Fault BAD_LOG for a file without a topic of this project."""
-        foreign = self._definitions.foreign_schemas()
+        foreign = self.definitions.foreign_schemas()
         # a run that was cut before its first definition
         began = self.header is not None and self.header.library in READABLE
         if self._any_own or (began and not foreign):
@@ -323,7 +267,7 @@ class LogReader:
             if opcode == Opcode.HEADER:
                 self.header = Header.read(stream)
             elif opcode in _DEFINITIONS:
-                self._definitions.learn(opcode, content)
+                self.definitions.learn(opcode, content)
             elif opcode == Opcode.METADATA:
                 metadata = Metadata.read(stream)
                 if metadata.name == LOST:

@@ -4,14 +4,16 @@ import contextlib
 import mmap
 import os
 from collections import Counter
-from collections.abc import Container, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Container, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Indices
 from bridge.faults import Fault
 from bridge.files import check_file
 from bridge.log.chunk_messages import Bytes, Messages
@@ -19,8 +21,8 @@ from bridge.log.damage import Damage
 from bridge.log.log_reader import LogReader
 from bridge.log.metadata import configuration_of
 from bridge.log.reading.definitions import DERIVED
-from bridge.log.storage.chain import HashChain
-from bridge.log.storage.parts import chain_of_log, later_names
+from bridge.log.storage.checksums import Checksums, checksums_of
+from bridge.log.storage.parts import later_names
 from bridge.log.watches.arrays import median
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import ANNOUNCE, APPLIED, COMMAND, STATE, TRACE, Layout, Records, sensor_block
@@ -30,8 +32,8 @@ from bridge.wire.topics import BY_NAME
 STREAMING = ("sensors", "applied", "command", "trace", "state", "announce")
 _LAYOUTS = {"applied": APPLIED, "command": COMMAND, "trace": TRACE, "state": STATE, "announce": ANNOUNCE}
 _DEFAULT_SAMPLES = 20
-_COUNTED_BLOCKS = 100  # for their number of samples; a chunk of a run in real time holds as many
 _FIRST_BYTES = 1 << 26  # initial memory for a topic; a short run never outgrows it
+_COUNTED_BLOCKS = 100  # for their number of samples; a chunk of a run in real time holds as many
 
 
 class Piece(NamedTuple):
@@ -40,7 +42,24 @@ class Piece(NamedTuple):
     topic: str
     log_time_ns: npt.NDArray[np.int64]  # [messages], time of arrival
     records: Records  # [messages] for a streaming topic; empty for another topic
-    payloads: list[bytes]  # [messages] for a topic that does not stream; empty for a streaming topic
+    messages: list[Any]  # of a topic that does not stream; payloads of a topic unknown to this version
+
+
+def feed(reader: LogReader, watch: Any, progress: Callable[[float], None] | None = None) -> Checksums:
+    """Pass every message of a log to a watch with the methods of `LogWatch`; a second thread computes the checksums.
+
+    `progress` is called with the share of the log read so far, 0 to 1. Raises Fault BAD_LOG.
+    """
+    with ThreadPoolExecutor(max_workers=1) as worker:
+        checksums = worker.submit(checksums_of, reader.path, reader.alone)
+        for piece in iter_pieces(reader):
+            if piece.topic in STREAMING:
+                watch.add(piece.topic, piece.records, piece.log_time_ns)
+            else:
+                watch.add_others(piece.topic, piece.messages)
+            if progress is not None:
+                progress(reader.position_bytes / max(reader.size_bytes, 1))
+        return checksums.result().with_tables(reader.metadata)
 
 
 def iter_pieces(reader: LogReader, only: Container[str] | None = None) -> Iterator[Piece]:
@@ -67,25 +86,21 @@ def iter_pieces(reader: LogReader, only: Container[str] | None = None) -> Iterat
                     layouts[topic] = sensor_block(_samples(mine))
                 layout = layouts[topic]
                 stacked, kept, why = _stacked(mine, layout, "/" + topic)
-                reader.count_bad_messages(len(log_ns) - len(kept), why)
                 yield Piece(topic, log_ns[kept], np.frombuffer(stacked, layout.dtype), [])
             else:
-                payloads = mine.payloads()
-                kept, why = _readable(topic, payloads)
-                reader.count_bad_messages(len(payloads) - len(kept), why)
-                yield Piece(topic, log_ns[kept], np.empty(0), [payloads[index] for index in kept])
+                read, kept, why = _readable(mine.payloads(), partial(_message, topic))
+                yield Piece(topic, log_ns[kept], np.empty(0), read)
+            reader.count_bad_messages(len(log_ns) - len(kept), why)
 
 
 def _samples(messages: Messages) -> int:
     """Samples of a channel in a sensor block: the most frequent number at the beginning, as single blocks may be wrong."""
-    sizes: Counter[int] = Counter()
-    for payload in messages.payloads(_COUNTED_BLOCKS):
-        with contextlib.suppress(Fault):
-            sizes[len(parsed(wire.SensorBlock, payload, "/sensors").drive_force_N) or _DEFAULT_SAMPLES] += 1
+    blocks, _, _ = _readable(messages.payloads(_COUNTED_BLOCKS), partial(_message, "sensors"))
+    sizes = Counter(len(block.drive_force_N) or _DEFAULT_SAMPLES for block in blocks)
     return sizes.most_common(1)[0][0] if sizes else _DEFAULT_SAMPLES
 
 
-def _stacked(messages: Messages, layout: Layout, topic: str) -> tuple[Bytes, npt.NDArray[np.int64], str]:
+def _stacked(messages: Messages, layout: Layout, topic: str) -> tuple[Bytes, Indices, str]:
     """The readable payloads with all fields in order, [messages, size]; their rows; why the first other cannot be read."""
     stacked = messages.stacked
     if stacked is not None and (length := stacked.shape[1]) in layout.whole_sizes:
@@ -95,36 +110,27 @@ def _stacked(messages: Messages, layout: Layout, topic: str) -> tuple[Bytes, npt
             stacked = whole
         if layout.all_canonical(stacked):
             return stacked, np.arange(len(stacked)), ""
-    good: list[bytes] = []
-    kept: list[int] = []
-    why = ""
-    for index, payload in enumerate(messages.payloads()):
-        try:
-            good.append(layout.canonical(payload, topic))
-            kept.append(index)
-        except Fault as fault:
-            why = why or _without_remedy(fault)
-    return np.frombuffer(b"".join(good), np.uint8).reshape(-1, layout.size), np.array(kept, np.int64), why
+    good, kept, why = _readable(messages.payloads(), lambda payload: layout.canonical(payload, topic))
+    return np.frombuffer(b"".join(good), np.uint8).reshape(-1, layout.size), kept, why
 
 
-def _without_remedy(fault: Fault) -> str:
-    """The place and the rule of a fault. Its remedy concerns messages on the bus, so it is cut off."""
-    return fault.line.partition("; ")[0]
+def _message(topic: str, payload: bytes) -> Any:
+    """A message of its topic; the payload itself for an unknown topic. Raises Fault BAD_MESSAGE."""
+    return parsed(BY_NAME[topic].message, payload, "/" + topic) if topic in BY_NAME else payload
 
 
-def _readable(topic: str, payloads: list[bytes]) -> tuple[list[int], str]:
-    """Indices of the payloads that are messages of their topic, all for an unknown topic; why the first other cannot be read."""
-    if topic not in BY_NAME:
-        return list(range(len(payloads))), ""
+def _readable(payloads: list[bytes], read: Callable[[bytes], Any]) -> tuple[list[Any], Indices, str]:
+    """The payloads that can be read, as `read` returns them; their indices; why the first other cannot be read."""
+    good: list[Any] = []
     kept: list[int] = []
     why = ""
     for index, payload in enumerate(payloads):
         try:
-            parsed(BY_NAME[topic].message, payload, "/" + topic)
+            good.append(read(payload))
             kept.append(index)
         except Fault as fault:
-            why = why or _without_remedy(fault)
-    return kept, why
+            why = why or fault.line.partition("; ")[0]  # the remedy concerns messages on the bus
+    return good, np.array(kept, np.int64), why
 
 
 def block_period_ns(sensors: Records) -> float:
@@ -159,7 +165,7 @@ class RunData(NamedTuple):
     events: list[wire.Event]
     headers: dict[str, dict[str, str]]  # by role: schema_version, configuration, versions
     damage: Damage
-    chain: HashChain  # whether the bytes are those that were written
+    checksums: Checksums
     foreign: dict[str, int]  # messages of topics of other programs, which were passed over
 
     def configuration(self, role: str) -> dict[str, Any]:
@@ -197,12 +203,40 @@ class _Stack:
         return np.frombuffer(self._memory, np.uint8)[: self._used].view(dtype)
 
 
+class _Tables:
+    """Collects a log in memory. A topic is joined as bytes: numpy would join the fields and drop the tags between them."""
+
+    def __init__(self) -> None:
+        self.stored = {name: _Stack() for name in STREAMING}
+        self.dtypes = {name: layout.dtype for name, layout in _LAYOUTS.items()}
+        self.dtypes["sensors"] = sensor_block(_DEFAULT_SAMPLES).dtype
+        self.messages: dict[str, list[Any]] = {name: [] for name in BY_NAME}
+
+    def add(self, topic: str, records: Records, _log_time_ns: Indices) -> None:
+        """Take messages of a streaming topic, [messages]."""
+        self.dtypes[topic] = records.dtype
+        self.stored[topic].add(np.frombuffer(records, np.uint8))
+
+    def add_others(self, topic: str, messages: Sequence[Any]) -> None:
+        """Take messages of another topic."""
+        self.messages.setdefault(topic, []).extend(messages)
+
+
 def read_run(path: Path) -> RunData:
     """Read a log, whole or cut, all of its files, into memory. Raises Fault BAD_LOG when it is not a run log of this project."""
     check_log_file(path)
-    with ThreadPoolExecutor(max_workers=1) as worker:
-        chain = worker.submit(chain_of_log, path)
-        return _read(LogReader(path), path, chain)
+    reader, tables = LogReader(path), _Tables()
+    checksums = feed(reader, tables)
+    return RunData(
+        path,
+        *(tables.stored[name].records(tables.dtypes[name]) for name in STREAMING),
+        snapshots=tables.messages["snapshot"],
+        events=[event for role in ("plant", "controller", "recorder") for event in tables.messages["event/" + role]],
+        headers=reader.metadata,
+        damage=reader.damage,
+        checksums=checksums,
+        foreign=reader.foreign,
+    )
 
 
 def check_log_file(path: Path) -> None:
@@ -210,33 +244,3 @@ def check_log_file(path: Path) -> None:
     later = [] if os.path.lexists(path) else later_names(path)
     other = f"{later[0].name} in the same folder seems to be a later part of that log; " if later else ""
     check_file(path, "BAD_LOG", f"{other}give the path of a run log, .mcap")
-
-
-def _read(reader: LogReader, path: Path, chain: "Future[HashChain]") -> RunData:
-    # joined as bytes: numpy would join the fields of the records and drop the tags between them
-    stored = {name: _Stack() for name in STREAMING}
-    dtypes: dict[str, np.dtype[Any]] = {name: layout.dtype for name, layout in _LAYOUTS.items()}
-    dtypes["sensors"] = sensor_block(_DEFAULT_SAMPLES).dtype
-    payloads: dict[str, list[bytes]] = {name: [] for name in BY_NAME}
-    for piece in iter_pieces(reader):
-        if piece.topic in stored:
-            dtypes[piece.topic] = piece.records.dtype
-            stored[piece.topic].add(np.frombuffer(piece.records, np.uint8))
-        elif piece.topic in payloads:
-            payloads[piece.topic].extend(piece.payloads)
-    tables = {name: stored[name].records(dtypes[name]) for name in STREAMING}
-    events = [
-        parsed(wire.Event, payload, "/event/" + name)
-        for name in ("plant", "controller", "recorder")
-        for payload in payloads["event/" + name]
-    ]
-    return RunData(
-        path,
-        *(tables[name] for name in STREAMING),
-        snapshots=[parsed(wire.Snapshot, payload, "/snapshot") for payload in payloads["snapshot"]],
-        events=events,
-        headers=reader.metadata,
-        damage=reader.damage,
-        chain=chain.result(),
-        foreign=reader.foreign,
-    )

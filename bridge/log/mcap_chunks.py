@@ -3,18 +3,17 @@
 The library's Writer takes 5.5 us per message: with four messages per block, a fifth of the time of a block in a lockstep run.
 Packing a message in place takes 1 us. The tests read the files back with the library's readers.
 
-Each chunk is followed by a link of the hash chain (`chain`). The index of the chunks, some 170 bytes each, is collected in an
-unnamed temporary file until the log ends: in memory it would grow without bound during a run of days.
+The index of the chunks, some 170 bytes each, is collected in an unnamed temporary file until the log ends: in memory it would
+grow without bound during a run of days.
 """
 
-import hashlib
 import struct
 import tempfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from io import BytesIO
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import IO
 
 import numpy as np
 import zstandard
@@ -36,22 +35,36 @@ from mcap.records import (
 )
 
 from bridge.log.block_rows import MessageRows
+from bridge.log.chunk_messages import FIELDS_BYTES
 from bridge.log.library import MAGIC
-from bridge.log.storage.chain import link_record
 
 _MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
-_MESSAGE_FIELDS_BYTES = 22
 _INDEX_HEAD = struct.Struct("<BQHI")
 _INDEX_ENTRY = struct.Struct("<QQ")
 _INDEX_IN_MEMORY_BYTES = 1 << 16  # some 400 chunks. Larger: more memory; smaller: short runs need a temporary file
 _COPIED_BYTES = 1 << 18  # of the temporary file, copied at once
 
 
-class _Open(NamedTuple):
+class OpenChunk:
     """The chunk that is being filled."""
 
-    parts: list[bytes | memoryview]
-    entries: dict[int, list[bytes]]  # message index by channel
+    def __init__(self) -> None:
+        self.parts: list[bytes | memoryview] = []
+        self.entries: dict[int, list[bytes]] = {}  # message index by channel
+        self.size = self.first_ns = self.last_ns = 0
+
+    def add(self, parts: Iterable[bytes | memoryview], size: int, first_ns: int, last_ns: int) -> None:
+        """Add messages of `size` bytes, with log times from `first_ns` to `last_ns`."""
+        self.parts += parts
+        if not self.size or first_ns < self.first_ns:
+            self.first_ns = first_ns
+        if not self.size or last_ns > self.last_ns:
+            self.last_ns = last_ns
+        self.size += size
+
+    def counts(self) -> dict[int, int]:
+        """Number of messages by channel."""
+        return {channel: sum(map(len, entries)) // _INDEX_ENTRY.size for channel, entries in self.entries.items()}
 
 
 def _encoded(*records: McapRecord) -> bytes:
@@ -75,13 +88,10 @@ class ChunkWriter:
 
     def __init__(self, stream: IO[bytes], library: str, folder: Path | None = None) -> None:
         self._stream = stream
-        self._hash = hashlib.sha256()  # of the bytes after the last link, starting with that link
-        self._whole_hash = self._hash.copy()
-        self._whole_links = self.links = 0
-        self.first_link = self.last_link = ""  # SHA-256, hexadecimal
+        self.crc = self._whole_crc = 0  # of all bytes before the end of the data
         self._folder = folder
         self._index: IO[bytes] = BytesIO()
-        self._chunks = 0
+        self.chunks = 0
         self._unsure = 0
         self._compress = zstandard.ZstdCompressor(level=1).compress
         self.more: Callable[[bytes, dict[int, list[bytes]]], MessageRows | None] | None = None
@@ -90,24 +100,12 @@ class ChunkWriter:
         self._metadata_indexes: list[MetadataIndex] = []
         self._counts: dict[int, int] = {}
         self._first_ns, self._last_ns = 0, 0
-        self._chunk = _Open([], {})
-        self._offset = 0
-        self._chunk_first_ns, self._chunk_last_ns = 0, 0
+        self.open_chunk = OpenChunk()
         self._write(MAGIC + _encoded(Header(profile="", library=library)))
 
     def _write(self, data: bytes | bytearray) -> None:
-        self._hash.update(data)
+        self.crc = zlib.crc32(data, self.crc)
         self._stream.write(data)
-
-    def _link(self, data: bytes | bytearray, ended: bool = False) -> None:
-        """Write `data` and the link that covers all bytes since the link before."""
-        self._hash.update(data)
-        digest = self._hash.digest()
-        self._stream.write(data + link_record(self.links, digest, ended))
-        self.links += 1
-        self.last_link = digest.hex()
-        self.first_link = self.first_link or self.last_link
-        self._hash = hashlib.sha256(digest)
 
     def add_schema(self, name: str, encoding: str, data: bytes) -> int:
         """Define a schema, and return its id."""
@@ -141,64 +139,37 @@ class ChunkWriter:
         self, channel_id: int, log_time_ns: int, payload: bytes, publish_time_ns: int, sequence: int
     ) -> None:
         """Put a message into the open chunk."""
-        chunk = self._chunk
-        head = _MESSAGE.pack(
-            Opcode.MESSAGE,
-            _MESSAGE_FIELDS_BYTES + len(payload),
-            channel_id,
-            sequence,
-            log_time_ns,
-            publish_time_ns,
-        )
-        chunk.entries.setdefault(channel_id, []).append(_INDEX_ENTRY.pack(log_time_ns, self._offset))
-        chunk.parts.append(head)
-        chunk.parts.append(payload)
-        if self._offset == 0:
-            self._chunk_first_ns = self._chunk_last_ns = log_time_ns
-        elif log_time_ns > self._chunk_last_ns:
-            self._chunk_last_ns = log_time_ns
-        elif log_time_ns < self._chunk_first_ns:
-            self._chunk_first_ns = log_time_ns
-        self._offset += len(head) + len(payload)
+        chunk, length = self.open_chunk, FIELDS_BYTES + len(payload)
+        head = _MESSAGE.pack(Opcode.MESSAGE, length, channel_id, sequence, log_time_ns, publish_time_ns)
+        chunk.entries.setdefault(channel_id, []).append(_INDEX_ENTRY.pack(log_time_ns, chunk.size))
+        chunk.add((head, payload), len(head) + len(payload), log_time_ns, log_time_ns)
 
     def add_rows(self, rows: MessageRows) -> None:
         """Put the messages of many blocks into the open chunk."""
-        chunk = self._chunk
+        chunk = self.open_chunk
         for channel_id, entries in rows.entries.items():
-            entries["offset"] += np.uint64(self._offset)
+            entries["offset"] += np.uint64(chunk.size)
             chunk.entries.setdefault(channel_id, []).append(entries.tobytes())
-        chunk.parts.append(rows.data)
-        if self._offset == 0:
-            self._chunk_first_ns, self._chunk_last_ns = rows.first_ns, rows.last_ns
-        else:
-            self._chunk_first_ns = min(self._chunk_first_ns, rows.first_ns)
-            self._chunk_last_ns = max(self._chunk_last_ns, rows.last_ns)
-        self._offset += len(rows.data)
-
-    @property
-    def open_bytes(self) -> int:
-        """Size of the open chunk, uncompressed."""
-        return self._offset
+        chunk.add((rows.data,), len(rows.data), rows.first_ns, rows.last_ns)
 
     @property
     def unsure_messages(self) -> int:
         """Number of messages that have not reached the file, including the open chunk."""
-        opened = sum(sum(map(len, entries)) for entries in self._chunk.entries.values()) // _INDEX_ENTRY.size
-        return self._unsure + opened
+        return self._unsure + sum(self.open_chunk.counts().values())
 
     def flush(self) -> None:
         """Close the open chunk, write it with its index, and pass everything to the operating system."""
-        if self._offset:
-            data = b"".join(self._chunk.parts)
-            more = self.more and self.more(data, self._chunk.entries)
+        if (open_chunk := self.open_chunk).size:
+            data = b"".join(open_chunk.parts)
+            more = self.more and self.more(data, open_chunk.entries)
             if more is not None:
                 self.add_rows(more)
                 data += more.data
             chunk = Chunk(
                 compression="zstd",
                 data=self._compress(data),
-                message_start_time=self._chunk_first_ns,
-                message_end_time=self._chunk_last_ns,
+                message_start_time=open_chunk.first_ns,
+                message_end_time=open_chunk.last_ns,
                 uncompressed_crc=zlib.crc32(data),
                 uncompressed_size=len(data),
             )
@@ -206,11 +177,11 @@ class ChunkWriter:
             encoded = _encoded(chunk)
             offsets: dict[int, int] = {}
             indexes = bytearray()
-            for channel_id, entries in self._chunk.entries.items():
+            for channel_id, entries in open_chunk.entries.items():
                 offsets[channel_id] = start + len(encoded) + len(indexes)
                 body = b"".join(entries)
                 indexes += _INDEX_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(body), channel_id, len(body)) + body
-            self._link(encoded + indexes)
+            self._write(encoded + indexes)
             index = ChunkIndex(
                 message_start_time=chunk.message_start_time,
                 message_end_time=chunk.message_end_time,
@@ -226,98 +197,70 @@ class ChunkWriter:
         self._stream.flush()
 
     def _count(self, index: ChunkIndex) -> None:
-        self._first_ns = min(self._first_ns, index.message_start_time) if self._chunks else index.message_start_time
+        self._first_ns = min(self._first_ns, index.message_start_time) if self.chunks else index.message_start_time
         self._last_ns = max(self._last_ns, index.message_end_time)
-        for channel_id, entries in self._chunk.entries.items():
-            messages = sum(map(len, entries)) // _INDEX_ENTRY.size
+        for channel_id, messages in self.open_chunk.counts().items():
             self._counts[channel_id] += messages
             self._unsure += messages
-        self._chunk = _Open([], {})
-        self._offset = 0
-        self._chunks += 1
-        record = _encoded(index)
+        self.open_chunk = OpenChunk()
+        self.chunks += 1
         if isinstance(self._index, BytesIO) and self._index.tell() > _INDEX_IN_MEMORY_BYTES:
             in_memory = self._index.getvalue()
             self._index = tempfile.TemporaryFile(dir=self._folder)  # noqa: SIM115 (it ends with the log)
             self._index.write(in_memory)
-        self._index.write(record)
-
-    def take_open(self) -> tuple["_Open", int, int, int]:
-        """Remove the open chunk and return it, for `put_open` of the writer of another file with the same channels."""
-        taken = self._chunk, self._offset, self._chunk_first_ns, self._chunk_last_ns
-        self._chunk, self._offset = _Open([], {}), 0
-        return taken
-
-    def put_open(self, taken: tuple["_Open", int, int, int]) -> None:
-        """Continue with the open chunk of another writer; this writer must have no open chunk."""
-        self._chunk, self._offset, self._chunk_first_ns, self._chunk_last_ns = taken
+        self._index.write(_encoded(index))
 
     def note_whole(self) -> None:
         """Note that everything so far has reached the file: `give_up` continues from here."""
-        self._whole_hash = self._hash.copy()
-        self._whole_links = self.links
+        self._whole_crc = self.crc
         self._unsure = 0
 
     def give_up(self, stream: IO[bytes]) -> None:
         """Continue in `stream`, the same file cut back to the last `note_whole`; later messages are dropped."""
         self._stream = stream
-        self._hash = self._whole_hash.copy()
-        self.links = self._whole_links
-        self._chunk = _Open([], {})
-        self._offset = 0
+        self.crc = self._whole_crc
+        self.open_chunk = OpenChunk()
 
-    def finish_without_index(self) -> None:
-        """Write the open chunk, the last link and 50 bytes; readers then scan the file instead of seeking."""
+    def finish(self, index: bool = True) -> None:
+        """Write the open chunk, the index and the footer. Without `index` 50 bytes: readers scan the file instead of seeking."""
         self.flush()
-        self._link(b"", ended=True)
-        self._stream.write(ending_without_index())
+        self._stream.write(_encoded(DataEnd(data_section_crc=self.crc)))
+        footer = Footer(summary_start=0, summary_offset_start=0, summary_crc=0)
+        if index:
+            footer.summary_start = at = self._stream.tell()
+            crc = 0
+            offsets: list[SummaryOffset] = []
+            for opcode, parts in self._summary():
+                start = at
+                for part in parts:
+                    crc = zlib.crc32(part, crc)
+                    at += self._stream.write(part)
+                offsets.append(SummaryOffset(opcode, start, at - start))
+            last = _encoded(*offsets)
+            self._stream.write(last)
+            footer.summary_offset_start = at
+            head = struct.pack("<BQQQ", Opcode.FOOTER, 20, footer.summary_start, at)
+            footer.summary_crc = zlib.crc32(head, zlib.crc32(last, crc))
+        self._stream.write(_encoded(footer) + MAGIC)
         self._stream.flush()
         self._index.close()
 
-    def finish(self) -> None:
-        """Write the open chunk, the index and the footer. The stream stays open."""
-        self.flush()
-        self._link(b"", ended=True)
-        self._stream.write(_encoded(DataEnd(data_section_crc=0)))
-        start = at = self._stream.tell()
-        crc = 0
-        offsets: list[SummaryOffset] = []
-        for opcode, parts in self._summary():
-            group_start = at
-            for part in parts:
-                crc = zlib.crc32(part, crc)
-                at += self._stream.write(part)
-            offsets.append(SummaryOffset(opcode, group_start, at - group_start))
-        last = _encoded(*offsets)
-        head = struct.pack("<BQQQ", Opcode.FOOTER, 20, start, at)
-        summary_crc = zlib.crc32(head, zlib.crc32(last, crc))
-        footer = Footer(summary_start=start, summary_offset_start=at, summary_crc=summary_crc)
-        self._stream.write(last + _encoded(footer) + MAGIC)
-        self._stream.flush()
-        self._index.close()
-
-    def _summary(self) -> Iterator[tuple[Opcode, Iterator[bytes]]]:
+    def _summary(self) -> Iterator[tuple[Opcode, Iterable[bytes]]]:
         """The groups of the index, each with its bytes in pieces."""
         statistics = Statistics(
             attachment_count=0,
             channel_count=len(self._channels),
             channel_message_counts=self._counts,
-            chunk_count=self._chunks,
+            chunk_count=self.chunks,
             message_count=sum(self._counts.values()),
-            metadata_count=len(self._metadata_indexes) + self.links,
+            metadata_count=len(self._metadata_indexes),
             message_start_time=self._first_ns,
             message_end_time=self._last_ns,
             schema_count=len(self._schemas),
         )
-        yield Opcode.SCHEMA, iter([_encoded(*self._schemas)])
-        yield Opcode.CHANNEL, iter([_encoded(*self._channels)])
-        yield Opcode.STATISTICS, iter([_encoded(statistics)])
+        yield Opcode.SCHEMA, [_encoded(*self._schemas)]
+        yield Opcode.CHANNEL, [_encoded(*self._channels)]
+        yield Opcode.STATISTICS, [_encoded(statistics)]
         self._index.seek(0)
         yield Opcode.CHUNK_INDEX, iter(lambda: self._index.read(_COPIED_BYTES), b"")
-        yield Opcode.METADATA_INDEX, iter([_encoded(*self._metadata_indexes)])
-
-
-def ending_without_index() -> bytes:
-    """The 50 bytes that close a file after its last whole record; readers then scan the file instead of seeking."""
-    footer = Footer(summary_start=0, summary_offset_start=0, summary_crc=0)
-    return _encoded(DataEnd(data_section_crc=0), footer) + MAGIC
+        yield Opcode.METADATA_INDEX, [_encoded(*self._metadata_indexes)]

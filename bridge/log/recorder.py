@@ -12,7 +12,7 @@ from bridge.faults import Fault
 from bridge.log.pause_writer import PauseWriter
 from bridge.log.runlog import NO_ROTATION, Rotation, RunLog
 from bridge.log.screen import Screen
-from bridge.plain import Tell, untold
+from bridge.plain import StepReport, no_report
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.complaints import Complaints
@@ -45,7 +45,7 @@ def run(
     stop: threading.Event,
     ready: Callable[[], None] = lambda: None,
     rotation: Rotation = NO_ROTATION,
-    say: Tell = untold,
+    report: StepReport = no_report,
 ) -> None:
     """Record until the plant and the controller have ended, or `stop` is set.
 
@@ -58,22 +58,22 @@ def run(
         stop: ends the recording.
         ready: called when the roles have answered, before the log is begun.
         rotation: when the log goes on in a new file.
-        say: reports the state of this process to the operator.
+        report: reports the state of this process to the operator.
 
     Raises Fault NO_PEER, NOT_SECURE, PEER_DIED, BAD_MESSAGE for a header of an unknown schema version, LOG_WRITE, LOG_LOST. In
     real time the last two are raised at the end, as the run continues.
 
     """
     sys.setswitchinterval(_SWITCH_S)
-    say("waiting", f"for a rig at {bus_config.endpoint}, at most {bus_config.wait_s:g} s")
+    report("waiting", f"for a rig at {bus_config.endpoint}, at most {bus_config.wait_s:g} s")
     with Bus(bus_config, "recorder", lockstep, stop) as bus:
         inbox = Inbox(_INBOX_LIMIT, patient=lockstep)
         for topic in TOPICS:
             if topic.logged and topic.sender != "recorder":
                 bus.listen(topic, inbox.push)
-        say("waiting", f"for the headers of {' and '.join(roles)}, at most {bus_config.wait_s:g} s")
+        report("waiting", f"for the headers of {' and '.join(roles)}, at most {bus_config.wait_s:g} s")
         headers = bus.headers(roles, bus_config.wait_s, stop)
-        say("joined", " and ".join(headers) or "no process sent a header")
+        report("joined", " and ".join(headers) or "no process sent a header")
         for header in headers.values():
             refuse_other_schema(header)
         ready()
@@ -91,7 +91,6 @@ def run(
             log.add_header(headers[role])
         with contextlib.ExitStack() as ending:
             pauses = None
-            send = bus.publisher(RECORDER_EVENT)
             if lockstep:  # runs with plant and controller
                 realtime.claim(realtime.core(bus_config.port + 1), realtime.LOCKSTEP_PRIORITY)
             else:
@@ -99,14 +98,16 @@ def run(
                 watch = ending.enter_context(contextlib.closing(PauseWatch()))
                 pauses = PauseWriter(log, watch)
             bus.announce()
-            say("running", f"recording all messages into {path}")
+            report("running", f"recording all messages into {path}")
             complaints = Complaints(log.add_event)
-            lost_plant = _record(log, bus, inbox, stop, pauses, complaints)
+            dropped = _Dropped(log, inbox)
+            lost_plant = _record(log, bus, inbox, stop, pauses, dropped, complaints)
+            dropped.report(at_once=True)
             complaints.report_when_due(all_of_it=True)
             if pauses is not None:
                 pauses.finish()
         log.close()
-        say(
+        report(
             "ended", "stopped" if stop.is_set() else "with the rig" if not lost_plant else "the rig left without an END"
         )
     if lost_plant:
@@ -114,16 +115,6 @@ def run(
 
 
 def _record(
-    log: RunLog, bus: Bus, inbox: Inbox, stop: threading.Event, pauses: PauseWriter | None, complaints: Complaints
-) -> bool:
-    """Write until plant and controller have ended. Returns whether the plant left the bus without an END."""
-    dropped = _Dropped(log, inbox)
-    lost_plant = _until_the_end(log, bus, inbox, stop, pauses, dropped, complaints)
-    dropped.report(at_once=True)
-    return lost_plant
-
-
-def _until_the_end(
     log: RunLog,
     bus: Bus,
     inbox: Inbox,
@@ -132,6 +123,7 @@ def _until_the_end(
     dropped: "_Dropped",
     complaints: Complaints,
 ) -> bool:
+    """Write until plant and controller have ended. Returns whether the plant left the bus without an END."""
     screen = Screen(complaints)
     ended: set[str] = set()
     heard_s = time.monotonic()

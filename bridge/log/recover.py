@@ -1,26 +1,28 @@
 """Recovery of a cut or damaged log: every readable message, in a new file with an index."""
 
-import json
 from pathlib import Path
 from typing import NamedTuple
 
 from bridge.faults import Fault
 from bridge.files import LOG, Replacement, check_file, refuse_to_replace
 from bridge.log.chunk_messages import Messages
-from bridge.log.damage import Damage, also_before, lost_in_words
+from bridge.log.damage import Damage, also_before, lost_in_words, of_all_files
 from bridge.log.library import LIBRARY
 from bridge.log.live import refuse_a_live_log
 from bridge.log.log_reader import LogReader
 from bridge.log.mcap_chunks import ChunkWriter
 from bridge.log.storage.parts import LOST, PART, RECOVERED, part_of, parts_of
+from bridge.log.storage.verdict_file import remove_verdict
 
 
 class Recovered(NamedTuple):
     """The result of `recover`."""
 
+    out: Path
     messages: int
     damage: Damage
-    attachments: int = 0  # that were left out
+    attachments: int  # that were left out
+    JSON_MERGED = "damage"
 
 
 class _Copy:
@@ -31,12 +33,9 @@ class _Copy:
         self.reader = reader
         self.messages = 0
         self.nameless = 0
-        place = None if merged else part_of(reader.path)
-        begins = place.begins if place else ""
-        writer.add_metadata(RECOVERED, {"from": reader.path.name, "begins": begins})
-        if place and place.number:
-            fields = {"number": place.number, "begins": begins, "follows": place.follows}
-            writer.add_metadata(PART, {key: json.dumps(value) for key, value in fields.items()})
+        writer.add_metadata(RECOVERED, {"from": reader.path.name})
+        if not merged and (place := part_of(reader.path)) is not None:
+            writer.add_metadata(PART, place.as_texts())
         self._schema_ids: dict[tuple[str, str, bytes], int] = {}
         self._channel_ids: dict[tuple[str, str, int, tuple[tuple[str, str], ...]], int] = {}
         self._kept: set[str] = set()
@@ -48,23 +47,19 @@ class _Copy:
                 self.writer.add_metadata(name, fields)
                 self._kept.add(name)
 
-    def _take_schema(self, schema_id: int) -> int:
-        """Define a schema in the new log, and return its new number; 0, as in the old log, for no schema."""
-        schema = self.reader.schemas.get(schema_id)
-        if schema is None:
-            return 0
-        key = schema.name, schema.encoding, schema.data
-        if key not in self._schema_ids:
-            self._schema_ids[key] = self.writer.add_schema(*key)
-        return self._schema_ids[key]
-
-    def take_channel(self, channel_id: int) -> int | None:
+    def _new_id(self, channel_id: int) -> int | None:
         """Define a channel of the old log in the new log, and return its new number; None if its definition is lost."""
         self.reader.topic(channel_id)  # searches for a missing definition
-        channel = self.reader.channels.get(channel_id)
+        channel = self.reader.definitions.channels.get(channel_id)
         if channel is None:
             return None
-        schema_id = self._take_schema(channel.schema_id)
+        schema_id = 0  # as in the old log, for no schema
+        schema = self.reader.definitions.schemas.get(channel.schema_id)
+        if schema is not None:
+            known = schema.name, schema.encoding, schema.data
+            if known not in self._schema_ids:
+                self._schema_ids[known] = self.writer.add_schema(*known)
+            schema_id = self._schema_ids[known]
         key = channel.topic, channel.message_encoding, schema_id, tuple(sorted(channel.metadata.items()))
         if key not in self._channel_ids:
             self._channel_ids[key] = self.writer.add_channel(*key[:3], channel.metadata)
@@ -74,7 +69,8 @@ class _Copy:
         """Write messages and their definitions. Messages of a channel without a definition have no topic; they count as lost."""
         self.take_metadata()
         ids = {
-            channel_id: self.take_channel(channel_id) for channel_id in {*self.reader.channels, *messages.by_channel}
+            channel_id: self._new_id(channel_id)
+            for channel_id in {*self.reader.definitions.channels, *messages.by_channel}
         }
         columns = (messages.heads[name].tolist() for name in ("channel", "sequence", "log_ns", "publish_ns"))
         for channel, sequence, log_ns, publish_ns, payload in zip(*columns, messages.payloads(), strict=True):
@@ -107,26 +103,22 @@ def recover(path: Path, out: Path) -> Recovered:
     Raises Fault BAD_LOG when nothing can be read, LOG_WRITE when `out` cannot be written or is being recorded.
     """
     check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
-    if out.resolve() != path.resolve():
+    merged = out.resolve() != path.resolve()
+    if merged:
         refuse_to_replace(out, LOG, f"--out {out}")
-        return _saved(LogReader(path), out, merged=True)
-    parts = parts_of(path)
-    if len(parts) == 1:
-        return _saved(LogReader(path), out, merged=False)
-    saved = [_saved(LogReader(part, alone=True), part, merged=False, only_damaged=True) for part in parts]
-    damage = Damage(
-        sum(part.damage.cut_bytes for part in saved),
-        sum(part.damage.bad_chunks for part in saved),
-        all(part.damage.closed for part in saved),
-        sum(part.damage.bad_records for part in saved),
-        sum(part.damage.nameless for part in saved),
-        sum(part.damage.missing for part in saved),
-        "; ".join(part.damage.before for part in saved if part.damage.before),
-    )
-    return Recovered(sum(part.messages for part in saved), damage, sum(part.attachments for part in saved))
+    parts = [path] if merged else parts_of(path)
+    several = len(parts) > 1
+    saved = [
+        _saved(LogReader(part, alone=not merged), out if merged else part, merged, only_damaged=several)
+        for part in parts
+    ]
+    damage = of_all_files([part.damage for part in saved])
+    if not (several and damage.whole):
+        remove_verdict(out)
+    return Recovered(out, sum(part.messages for part in saved), damage, sum(part.attachments for part in saved))
 
 
-def _saved(reader: LogReader, out: Path, merged: bool, only_damaged: bool = False) -> Recovered:
+def _saved(reader: LogReader, out: Path, merged: bool, only_damaged: bool) -> Recovered:
     """Write every readable message to `out`; with `only_damaged` only if something cannot be read."""
     refuse_a_live_log(out, "--out")
     try:
@@ -147,4 +139,4 @@ def _saved(reader: LogReader, out: Path, merged: bool, only_damaged: bool = Fals
             new.discard()
     except OSError as error:
         raise Fault("LOG_WRITE", f"{out}: cannot be written: {error.strerror}; choose another --out") from None
-    return Recovered(copy.messages, copy.damage(), len(reader.attachments))
+    return Recovered(out, copy.messages, copy.damage(), reader.attachments)

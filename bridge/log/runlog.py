@@ -10,10 +10,9 @@ from typing import Any
 from bridge.faults import Fault
 from bridge.log.block_rows import rows
 from bridge.log.mcap_chunks import ChunkWriter
-from bridge.log.storage.afterwards import file_end
-from bridge.log.storage.chain import HashChain
 from bridge.log.storage.log_files import LogFiles, Rotation
-from bridge.log.storage.parts import PART, parts_of
+from bridge.log.storage.parts import PART, LogPart, parts_of
+from bridge.log.storage.verdict_file import remove_verdict
 from bridge.log.viewers import foxglove_log
 from bridge.log.viewers.scope import ScopeMaker
 from bridge.wire import stickslip_pb2 as wire
@@ -59,16 +58,17 @@ class RunLog:
         self._holding: dict[str, str] = {}  # texts of events that are valid for the whole log, by code
         self._due_s = time.monotonic() + FLUSH_PERIOD_S
         self._scope = ScopeMaker()
-        self._tables: dict[str, dict[str, str]] = {}  # metadata, repeated in every file
+        self.tables: dict[str, dict[str, str]] = {}  # metadata, repeated in every file
         self._channels: dict[str, int] = {}
         old = parts_of(path)[1:] if path.is_file() else []
         self._files = LogFiles(path, self, rotation, patient)
         for part in old:  # of the replaced log
             with contextlib.suppress(OSError):
                 part.unlink()
+        remove_verdict(path)
         self._files.begin()
 
-    def begin(self, writer: ChunkWriter, number: int, begins: str, follows: str) -> None:
+    def begin(self, writer: ChunkWriter, part: LogPart) -> None:
         """Write the beginning of a file of the log: schemas, channels, place in the log, tables."""
         schemas: dict[str, int] = {}
         for topic in (*TOPICS, SCOPE):
@@ -83,21 +83,10 @@ class RunLog:
         name = foxglove_log.TOPIC
         self._channels[name] = writer.add_channel("/" + name, "protobuf", schema_id, {"rate_Hz": "0"})
         writer.more = lambda data, entries: self._scope.of_chunk(data, entries, self._channels)
-        if number:
-            place = {"number": number, "begins": begins, "follows": follows}
-            writer.add_metadata(PART, {key: json.dumps(value) for key, value in place.items()})
-        for name, fields in self._tables.items():
+        if part.number:
+            writer.add_metadata(PART, part.as_texts())
+        for name, fields in self.tables.items():
             writer.add_metadata(name, fields)
-
-    @property
-    def tables(self) -> dict[str, dict[str, str]]:
-        """The metadata of the log so far, by name."""
-        return self._tables
-
-    def chain(self) -> HashChain:
-        """The hash chain of the closed log, known from writing; only the end of the file is read back."""
-        files = self._files
-        return HashChain(files.links, files.begins, files.last_link, [], 0, True, file_end(self.path), True)
 
     def add_header(self, header: wire.Header) -> None:
         """Write the configuration and versions of one process, so that a run can be repeated from its log alone."""
@@ -113,7 +102,7 @@ class RunLog:
         self._add_table(name, {key: json.dumps(value) for key, value in fields.items()})
 
     def _add_table(self, name: str, fields: dict[str, str]) -> None:
-        self._tables[name] = fields
+        self.tables[name] = fields
         self._files.guarded(lambda writer: writer.add_metadata(name, fields))
 
     def write(self, topic: Topic, payload: bytes) -> None:
@@ -134,7 +123,7 @@ class RunLog:
         self.t_ns = max(self.t_ns, t_ns)
         self._add(topic, payload, sequence, t_ns)
         if topic.message is wire.Event:
-            self._say(parsed(wire.Event, payload, topic.name))
+            self._repeat_event(parsed(wire.Event, payload, topic.name))
         self.flush_when_due()
 
     def write_blocks(self, each: Mapping[Topic, Records], after: Mapping[Topic, Records]) -> None:
@@ -159,7 +148,7 @@ class RunLog:
     def flush_when_due(self) -> None:
         """End the open chunk when it is old enough. Raises Fault LOG_WRITE."""
         if time.monotonic() > self._due_s or (
-            (writer := self._files.writer) is not None and writer.open_bytes > LARGEST_CHUNK_BYTES
+            (writer := self._files.writer) is not None and writer.open_chunk.size > LARGEST_CHUNK_BYTES
         ):
             self._due_s = time.monotonic() + FLUSH_PERIOD_S
             self.flush()
@@ -174,7 +163,7 @@ class RunLog:
         at_ns = self.t_ns if t_ns is None else t_ns
         event = wire.Event(sequence=self._events, t_ns=at_ns, source="recorder", code=code, text=text)
         self._add(RECORDER_EVENT, event.SerializeToString(), self._events, at_ns)
-        self._say(event)
+        self._repeat_event(event)
         self._events += 1
         if self._on_event is not None:
             self._on_event(event)
@@ -193,7 +182,7 @@ class RunLog:
         log_time_ns = t_ns if self._lockstep else time.time_ns()
         writer.add_message(self._channels[topic.name], log_time_ns, payload, t_ns, sequence & 0xFFFFFFFF)
 
-    def _say(self, event: wire.Event) -> None:
+    def _repeat_event(self, event: wire.Event) -> None:
         """Write an event for viewers."""
         writer = self._files.writer
         if writer is not None:
@@ -205,6 +194,6 @@ class RunLog:
         """Write the index and close the file. Raises Fault LOG_WRITE, LOG_LOST for failures during the run."""
         self._scope.ends = True
         writer = self._files.writer
-        if writer is not None and not writer.open_bytes and (rest := self._scope.rest(self._channels)) is not None:
+        if writer is not None and not writer.open_chunk.size and (rest := self._scope.rest(self._channels)) is not None:
             writer.add_rows(rest)
         self._files.close()

@@ -3,7 +3,7 @@
 import numpy as np
 
 from bridge.arrays import Indices
-from bridge.log.finding import Finding
+from bridge.log.finding import Finding, findings_at
 from bridge.log.watches.arrays import steps
 from bridge.units import counted
 from bridge.wire.messages import Records
@@ -130,40 +130,35 @@ class TopicWatch:
 
     def findings(self) -> list[Finding]:
         """A finding for each kind of fault of the topic."""
-        where = "/" + self.topic
-        findings: list[Finding] = []
-
-        def add(kind: str, text: str, times: int) -> None:
-            if times:
-                findings.append(Finding(kind, where, text, times))
-
-        if self.restarts:
-            ends = ", ".join(str(number) for number in self._restarted_at[:3])
-            add(
-                "two-runs",
-                f"numbers start again at 0 after {ends}: {self.restarts + 1} runs in one file",
-                self.restarts,
-            )
+        ends = ", ".join(str(number) for number in self._restarted_at[:3])
         gaps = [*self._gaps_for_good, *_ranges(self._missing_numbers)]
-        if gaps:
+        where_to = ""
+        if len(gaps) == 1:
+            where_to = f": {gaps[0][0]}" + (f" to {gaps[0][-1]}" if len(gaps[0]) > 1 else "")
+        elif gaps:
             where_to = f" in {len(gaps)} gaps, first {gaps[0][0]} to {gaps[0][-1]}"
-            if len(gaps) == 1:
-                where_to = f": {gaps[0][0]}" + (f" to {gaps[0][-1]}" if len(gaps[0]) > 1 else "")
-            add("gap", f"{counted(self.missing, 'message')} lost{where_to}", self.missing)
-        if self.topic == "sensors" and self.first_number > 0:
-            add("gap", f"begins with block {self.first_number}: earlier blocks were not recorded", self.first_number)
-        times = counted(self._duplicates, "place")
-        add("duplicate", f"repeated numbers at {times}, first {self._first_duplicate}", self._duplicates)
-        late = counted(self._late, "message")
-        add("order", f"{late} arrived after a later message, first {self._first_late}", self._late)
-        places, step = counted(self.jumps, "place"), f"a step of {self._first_step_ns / 1e6:g} ms"
-        text = f"t_ns does not follow the numbers at {places}, first {self.first_jump[0]}: {step}"
-        add("clock-jump", text, self.jumps)
-        number, step_ns = self._first_before
-        places = counted(self._arrived_before, "place")
-        text = f"log_time goes back at {places}, first {number}: by {-step_ns / 1e6:g} ms"
-        add("log-time-back", text, self._arrived_before)
-        return findings
+        begins = max(self.first_number, 0) if self.topic == "sensors" else 0
+        late, doubles = counted(self._late, "message"), counted(self._duplicates, "place")
+        jumps, step = counted(self.jumps, "place"), f"a step of {self._first_step_ns / 1e6:g} ms"
+        back, (back_at, back_ns) = counted(self._arrived_before, "place"), self._first_before
+        rows = (
+            ("two-runs", self.restarts, f"numbers start again at 0 after {ends}: {self.restarts + 1} runs in one file"),
+            ("gap", self.missing, f"{counted(self.missing, 'message')} lost{where_to}"),
+            ("gap", begins, f"begins with block {begins}: earlier blocks were not recorded"),
+            ("duplicate", self._duplicates, f"repeated numbers at {doubles}, first {self._first_duplicate}"),
+            ("order", self._late, f"{late} arrived after a later message, first {self._first_late}"),
+            (
+                "clock-jump",
+                self.jumps,
+                f"t_ns does not follow the numbers at {jumps}, first {self.first_jump[0]}: {step}",
+            ),
+            (
+                "log-time-back",
+                self._arrived_before,
+                f"log_time goes back at {back}, first {back_at}: by {-back_ns / 1e6:g} ms",
+            ),
+        )
+        return findings_at("/" + self.topic, rows)
 
 
 def _ranges(numbers: set[int]) -> list[range]:

@@ -6,6 +6,6 @@ sheet, mat, hdf5, tdms, ros_log   workbooks, MATLAB, HDF5, TDMS, messages of ROS
 cells, unit_words  cells as numbers or times; spellings of units
 one_clock          channels of several clocks, resampled to one clock
 own_times          channels with separate columns of times
-writers, matfile   writing CSV, Parquet and MATLAB, in batches of rows
+writers            writing CSV, Parquet and MATLAB, in batches of rows
 export             a run log as tables, a file for each topic
 """

@@ -14,7 +14,8 @@ from bridge.log.damage import Damage
 from bridge.log.log_reader import LogReader
 from bridge.log.logfile import STREAMING, block_period_ns, iter_pieces, sample_times_s
 from bridge.tables.writers import ArrowTable, Columns, MatFile, MatTable, TableWriter
-from bridge.wire.messages import CHANNELS, Records
+from bridge.wire.channels import CHANNELS
+from bridge.wire.messages import Records
 
 SUFFIXES = (".parquet", ".csv", ".mat")
 
@@ -53,7 +54,7 @@ def export(
     Only rows with from_s <= t_s < until_s are written. `progress` is called with the share of the log that was read, 0 to 1.
     An existing table is replaced only with `overwrite`.
 
-    Raises Fault BAD_LOG, BAD_MESSAGE, BAD_TABLE, CONFIG, LOG_WRITE; nothing unfinished is left behind.
+    Raises Fault BAD_LOG, BAD_MESSAGE, CONFIG, LOG_WRITE; nothing unfinished is left behind.
     """
     check_request(to, topics, from_s, until_s)
     check_file(path, "BAD_LOG", "give the path of a run log, .mcap")

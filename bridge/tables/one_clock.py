@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bridge.arrays import Floats
+from bridge.arrays import Floats, Indices
 from bridge.log.finding import Finding
 from bridge.units import counted
 
@@ -49,6 +49,16 @@ def own_rows(t_s: Floats, columns: dict[str, Floats]) -> dict[str, Sampled]:
         filled = np.isfinite(values) & np.isfinite(t_s) if _has_own_rows(t_s, values) else np.ones(len(t_s), np.bool_)
         channels[name] = Sampled(t_s[filled], values[filled])
     return channels
+
+
+def gaps_of(t_s: Floats) -> tuple[Indices, str]:
+    """The rows before a gap, and a text that counts the gaps; `t_s` rises."""
+    steps_s = np.diff(t_s)
+    gaps = np.flatnonzero(steps_s > _GAP_STEPS * _step_s(t_s))
+    if not len(gaps):
+        return gaps, ""
+    first = f"first at {t_s[gaps[0]]:.6g} s, the longest {steps_s.max():.3g} s"
+    return gaps, f"{counted(len(gaps), 'gap')} in time, {first}"
 
 
 def on_one_clock(channels: dict[str, Sampled], file: str) -> tuple[Floats, dict[str, Floats], list[Finding]]:

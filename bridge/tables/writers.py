@@ -1,8 +1,9 @@
-"""Tables written in batches of rows: Parquet, CSV and MATLAB v5. A file appears under its name only when complete."""
+"""Tables written in batches of rows: Parquet, CSV and MATLAB v7.3. A file appears under its name only when complete."""
 
 import contextlib
+import shutil
 from pathlib import Path
-from typing import IO, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -11,12 +12,14 @@ import pyarrow.csv as pa_csv
 import pyarrow.parquet as pq
 
 from bridge.files import Replacement, folder_beside, replacing
-from bridge.tables.matfile import ColumnStruct, file_head, text_struct
 from bridge.units import unit_of
 
 Columns = dict[str, npt.NDArray[Any]]  # by name, all of one length
 # Rows of a batch, 10 MB of sensors. Too small: compression and encoding are poor; too large: memory.
 BATCH_ROWS = 1 << 18
+# The 512 bytes with which MATLAB recognises its HDF5 files: text, place of subsystem data (none), version 2.0, byte order.
+_MATLAB_HEAD = b"MATLAB 7.3 MAT-file, stickslip, HDF5 schema 1.00 .".ljust(116) + bytes(8) + b"\x00\x02IM" + bytes(384)
+_MATLAB_CLASSES = {"f8": "double", "f4": "single", "u4": "uint32", "i8": "int64", "u8": "uint64"}
 
 
 class TableWriter(Protocol):
@@ -43,14 +46,10 @@ def _schema(columns: Columns) -> Any:
     return pa.schema(fields)
 
 
-class ArrowTable:
-    """A Parquet or CSV file. Parquet columns have their unit as metadata, CSV columns in their name."""
+class _Batches:
+    """Rows that are collected until they fill a batch."""
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self._new: Replacement | None = None
-        self._writer: Any = None
-        self._schema: Any = None
+    def __init__(self) -> None:
         self._waiting: list[Columns] = []
         self._waiting_rows = 0
 
@@ -62,11 +61,27 @@ class ArrowTable:
             self._flush()
 
     def _flush(self) -> None:
-        if not self._waiting:
-            return
-        names = self._waiting[0]
-        columns: Columns = {name: np.concatenate([piece[name] for piece in self._waiting]) for name in names}
-        self._waiting, self._waiting_rows = [], 0
+        if self._waiting:
+            names = self._waiting[0]
+            columns: Columns = {name: np.concatenate([piece[name] for piece in self._waiting]) for name in names}
+            self._waiting, self._waiting_rows = [], 0
+            self._write(columns)
+
+    def _write(self, columns: Columns) -> None:
+        raise NotImplementedError
+
+
+class ArrowTable(_Batches):
+    """A Parquet or CSV file. Parquet columns have their unit as metadata, CSV columns in their name."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.path = path
+        self._new: Replacement | None = None
+        self._writer: Any = None
+        self._schema: Any = None
+
+    def _write(self, columns: Columns) -> None:
         if self._writer is None:
             self._schema = _schema(columns)
             self._new = Replacement(self.path)
@@ -97,58 +112,74 @@ class ArrowTable:
 
 
 class MatFile:
-    """One MATLAB file with a struct of columns for each table, and the units of the columns in the struct `units`."""
+    """One MATLAB file with a struct of columns for each table, and the units of the columns in the struct `units`.
+
+    It is made in a temporary folder, because HDF5 also reads while it writes, which a pipe as the target does not allow.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self._ending = contextlib.ExitStack()
-        self._folder = self._ending.enter_context(folder_beside(path))
-        self._structs: dict[str, ColumnStruct] = {}
-        self._units: dict[str, dict[str, str]] = {}
+        self._part = self._ending.enter_context(folder_beside(path)) / "table.mat"
+        self._file: Any = None
 
-    def append(self, table: str, columns: Columns) -> None:
+    def add(self, table: str, columns: Columns) -> None:
         """Add rows to the table `table`."""
-        if table not in self._structs:
-            self._structs[table] = ColumnStruct(table, self._folder)
-            self._units[table] = {name: unit_of(name) for name in columns}
-        self._structs[table].append(columns)
+        import h5py
+
+        if self._file is None:
+            self._file = self._ending.enter_context(h5py.File(self._part, "w", userblock_size=len(_MATLAB_HEAD)))
+        for name, values in columns.items():
+            if f"{table}/{name}" not in self._file:
+                # HDF5 lists the dimensions of a MATLAB array in reverse: a column of n rows is [1, n]
+                made = self._dataset(table, name, values[None, :], (1, None))
+                made.attrs["MATLAB_class"] = np.bytes_(_MATLAB_CLASSES[values.dtype.str[1:]])
+                unit = np.frombuffer(unit_of(name).encode("utf-16-le"), np.uint16)
+                text = self._dataset(f"units/{table}", name, unit[:, None], None)
+                text.attrs["MATLAB_class"], text.attrs["MATLAB_int_decode"] = np.bytes_("char"), np.int32(2)
+            else:
+                column = self._file[table][name]
+                rows = column.shape[1]
+                column.resize(rows + len(values), axis=1)
+                column[0, rows:] = values
+
+    def _dataset(self, table: str, name: str, values: npt.NDArray[Any], most: tuple[int | None, ...] | None) -> Any:
+        for group in (table.partition("/")[0], table):
+            self._file.require_group(group).attrs["MATLAB_class"] = np.bytes_("struct")
+        return self._file[table].create_dataset(name, data=values, maxshape=most, chunks=values.shape if most else None)
 
     def finish(self) -> list[Path]:
-        """Join the columns, and return the path of the file. Raises Fault BAD_TABLE when a table is too large."""
-        if not self._structs:
+        """Close the file, move it to its place and return its path; an empty list without rows. Raises OSError."""
+        if self._file is None:
             self.discard()
             return []
-        with replacing(self.path) as out:
-            self._write(out)
+        self._file.close()
+        with replacing(self.path) as out, self._part.open("rb") as made:
+            out.write(_MATLAB_HEAD)
+            made.seek(len(_MATLAB_HEAD))
+            shutil.copyfileobj(made, out, 1 << 20)
         self._ending.close()
         return [self.path]
 
-    def _write(self, out: IO[bytes]) -> None:
-        out.write(file_head())
-        for struct in self._structs.values():
-            struct.write_to(out)
-        out.write(text_struct("units", self._units))
-
     def discard(self) -> None:
-        """Remove the unfinished file and its columns."""
-        for struct in self._structs.values():
-            struct.close()
+        """Remove the unfinished file."""
         self._ending.close()
 
 
-class MatTable:
+class MatTable(_Batches):
     """One of several tables of a MATLAB file; the owner of the file completes it."""
 
     def __init__(self, file: MatFile, table: str) -> None:
+        super().__init__()
         self.file = file
         self._table = table
 
-    def append(self, columns: Columns) -> None:
-        """Add rows."""
-        self.file.append(self._table, columns)
+    def _write(self, columns: Columns) -> None:
+        self.file.add(self._table, columns)
 
     def finish(self) -> list[Path]:
-        """Return an empty list: the owner of the file completes it."""
+        """Write the waiting rows; return an empty list, as the owner completes the file."""
+        self._flush()
         return []
 
     def discard(self) -> None:

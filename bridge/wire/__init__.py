@@ -1,6 +1,7 @@
 """The bus: messages, topics and transport. PROTOCOL.md describes it for clients in other languages.
 
 stickslip.proto, stickslip_pb2   the messages, and the module that `make proto` generates from them
+channels                         the table of sensor channels
 payloads, messages               messages from and to bytes; messages as NumPy records with the same bytes
 event_codes, words               events of the bus explained; modes, states, reasons and limits explained
 topics                           sender, rate and message of every topic

@@ -31,13 +31,13 @@ class Complaints:
     """Counts bad messages and reports them.
 
     Args:
-        tell: publishes an event with a code and a text.
+        publish: publishes an event with a code and a text.
         clock: the time [s]; by default the clock of the process.
 
     """
 
-    def __init__(self, tell: Callable[[str, str], object], clock: Callable[[], float] | None = None) -> None:
-        self._tell = tell
+    def __init__(self, publish: Callable[[str, str], object], clock: Callable[[], float] | None = None) -> None:
+        self._publish = publish
         self._clock = clock or time.monotonic
         self._kinds: dict[tuple[str, str], _Kind] = {}
         self._pending = False
@@ -78,4 +78,4 @@ class Complaints:
         )
         count = count if kind.times > 1 else ""
         kind.pending, kind.reported_s = 0, now_s
-        self._tell(code, f"{where}: {kind.text}{count}")
+        self._publish(code, f"{where}: {kind.text}{count}")

@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 # severity, in the letters of NAMUR NE 107
 FAILURE, CHECK, OUTSIDE, MAINTENANCE, NEWS = "F", "C", "S", "M", ""
-LETTERS = {
-    FAILURE: "failure: data were lost, or a part does not work",
-    CHECK: "function check: an operator's action, or a test",
+SEVERITIES = {
+    FAILURE: "failure",
+    CHECK: "check",
     OUTSIDE: "out of specification",
-    MAINTENANCE: "maintenance required",
+    MAINTENANCE: "maintenance",
     NEWS: "news",
 }
 # of letter C, and yet shown in a verdict: a run with an injected fault is not one of a healthy rig
@@ -28,7 +28,7 @@ class EventCode(NamedTuple):
 
     code: str
     sources: str  # senders: plant, controller, recorder
-    letter: str  # of LETTERS
+    letter: str  # of SEVERITIES
     help: str
 
 
@@ -177,6 +177,11 @@ EVENTS = {
     )
 }
 # fmt: on
+
+
+def event_code(code: str) -> EventCode:
+    """The row of a code; news without a meaning for a code of another version."""
+    return EVENTS.get(code) or EventCode(code, "", NEWS, "not known to this version")
 
 
 def harms(code: str) -> bool:

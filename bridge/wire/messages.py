@@ -19,8 +19,8 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.payloads import refuse_oversized
 
 NO_BLOCK = 2**64 - 1
-# the sensors of a rig, in the order of the wire
-CHANNELS = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m")
+
+BLOCK, GAP, STALE, STOP, RESET, ANNOUNCED, LATE = (1 << bit for bit in range(7))  # bits of `Trace.events`
 
 Records = npt.NDArray[Any]
 

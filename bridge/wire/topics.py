@@ -14,7 +14,7 @@ class Topic(NamedTuple):
     message: type[Message]
     sender: str
     rate_Hz: float  # expected; 0: irregular
-    stale_after_s: float  # age from which the value of a message is no longer used; 0: never
+    stale_after_s: float  # age from which the value of a message is dropped; 0: never
     logged: bool
 
 

@@ -5,10 +5,12 @@ from typing import Annotated
 
 import typer
 
-from cockpit.commands.as_json.option import Json, carry_out, tell
+from cockpit.commands.as_json.option import Json, print_result
+from cockpit.commands.options import command
 from cockpit.run.writable import check_output_folder
 
 
+@command()
 def certs(
     folder: Annotated[Path, typer.Argument(help="Folder for the certificates; created if missing.")],
     hosts: Annotated[
@@ -20,18 +22,14 @@ def certs(
 
     An authority that is already in the folder signs them; an existing certificate is never replaced.
     """
+    from cockpit.run.authority import make_certificates
 
-    def work() -> None:
-        from cockpit.run.authority import make_certificates
-
-        check_output_folder("FOLDER", folder)
-        made = make_certificates(folder, hosts)
-        lines = [
-            f"made     {', '.join(name for name in made.files if name.endswith('.pem'))} and their keys in {made.folder}",
-            f"rig at   {', '.join(made.hosts)}",
-            f"until    {made.until}",
-            "next     give each computer authority.pem and the two files of its role; keep authority.key secret",
-        ]
-        tell(as_json, made, lines)
-
-    carry_out(work, as_json)
+    check_output_folder("FOLDER", folder)
+    made = make_certificates(folder, hosts)
+    lines = [
+        f"made     {', '.join(name for name in made.files if name.endswith('.pem'))} and their keys in {made.folder}",
+        f"rig at   {', '.join(made.hosts)}",
+        f"until    {made.until}",
+        "next     give each computer authority.pem and the two files of its role; keep authority.key secret",
+    ]
+    print_result(as_json, made, lines)

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 import typer
 
 from bridge.faults import FAULTS, Fault
-from bridge.files import refuse_to_replace_text, write_json
-from bridge.plain import plain, say
-from cockpit.commands.as_json.option import STDOUT, Json, carry_out, tell
-from cockpit.commands.options import Certs
+from bridge.files import refuse_to_replace_text
+from bridge.plain import plain, print_line
+from bridge.results import write_json
+from cockpit.commands.as_json.option import STDOUT, Json, print_result
+from cockpit.commands.options import Certs, command
 from cockpit.run.child_process import end_like_ctrl_c, report
-from cockpit.run.writable import JSON, PAGE, RIG, check_output, check_output_folder, writing
+from cockpit.run.writable import JSON, PAGE, RIG, check_output, check_output_folder, written
 
 if TYPE_CHECKING:
     from diagnosis.diagnose_many import EvidenceFolder
@@ -52,6 +53,7 @@ class _Options(NamedTuple):
         return STDOUT if self.as_json == STDOUT else None
 
 
+@command()
 def diagnose(
     evidence: Annotated[
         list[Path],
@@ -86,29 +88,25 @@ def diagnose(
         Path | None, typer.Option("--map", help="Channel map, .toml, for a single measured file.")
     ] = None,
     as_json: Json = None,
-) -> None:
+) -> int:
     """Find the effect that makes a rig differ from its description: its probability, and how much of the gap it closes."""
+    from joblib import cpu_count
 
-    def work() -> int:
-        from joblib import cpu_count
+    from cockpit.look.quantity import quantity
+    from diagnosis.diagnose_many import find_sources
+    from diagnosis.evidence.manifest import check_folder
 
-        from cockpit.look.quantity import quantity
-        from diagnosis.diagnose_many import find_sources
-        from diagnosis.evidence.manifest import check_folder
-
-        end_like_ctrl_c()
-        budget_s = quantity("--budget", budget, "time")
-        options = _Options(as_json, report, apply, jobs or cpu_count(), cluster, str(certs or ""), budget_s)
-        if len(evidence) == 1 and evidence[0].is_file():
-            return _diagnose_file(evidence[0], options, speed, mass, channel_map)
-        sources = find_sources(evidence)
-        is_single = all(path.resolve() == sources[0].folder for path in evidence)
-        _check_destinations(options, is_single, sources)
-        for path in evidence:  # before minutes of work on the others
-            check_folder(path)
-        return _diagnose_one(sources[0], options) if is_single else _diagnose_many(sources, options)
-
-    carry_out(work, as_json)
+    end_like_ctrl_c()
+    budget_s = quantity("--budget", budget, "time")
+    options = _Options(as_json, report, apply, jobs or cpu_count(), cluster, str(certs or ""), budget_s)
+    if len(evidence) == 1 and evidence[0].is_file():
+        return _diagnose_file(evidence[0], options, speed, mass, channel_map)
+    sources = find_sources(evidence)
+    is_single = all(path.resolve() == sources[0].folder for path in evidence)
+    _check_destinations(options, is_single, sources)
+    for path in evidence:  # before minutes of work on the others
+        check_folder(path)
+    return _diagnose_one(sources[0], options) if is_single else _diagnose_many(sources, options)
 
 
 def _check_destinations(options: _Options, is_single: bool, sources: list["EvidenceFolder"]) -> None:
@@ -150,9 +148,8 @@ def _diagnose_file(path: Path, options: _Options, speed: str, mass: str, channel
 
     from cockpit.look.evidence import write_evidence
     from cockpit.look.quantity import quantity
-    from cockpit.look.source import LookOptions, read_record
+    from cockpit.look.source import LookOptions, looked_at, read_record
     from diagnosis.diagnose_many import EvidenceFolder
-    from diagnosis.look.look import look
     from diagnosis.look.words import headline
 
     if options.cluster:
@@ -160,9 +157,7 @@ def _diagnose_file(path: Path, options: _Options, speed: str, mass: str, channel
     _check_destinations(options, is_single=True, sources=[])
     asked = LookOptions(quantity("--speed", speed, "velocity"), None, quantity("--mass", mass, "mass"), map=channel_map)
     record = read_record(path, asked)
-    seen = look(record.t_s, record.force_N, record.position_m, record.known)
-    if seen is None:
-        raise Fault("BAD_TABLE", f"{path.name}: fewer than 16 samples of a force with a time; give a longer record")
+    seen = looked_at(record)
     with TemporaryDirectory(prefix="stickslip-") as folder:
         rig, assumed = write_evidence(record, seen, Path(folder))
         _print_line(options, headline(seen))
@@ -180,19 +175,19 @@ def _diagnose_file(path: Path, options: _Options, speed: str, mass: str, channel
 
 def _diagnose_one(source: "EvidenceFolder", options: _Options) -> int:
     from cockpit.commands.diagnose_output import in_words, watched
+    from cockpit.fleet.work import write_source_report
     from diagnosis.evidence.folder import load_evidence
     from diagnosis.report.rig_file import refuse_force_drive, write_rig
-    from diagnosis.result import to_json
 
     evidence = load_evidence(source.folder)
     if options.apply is not None:
         refuse_force_drive(evidence)
     with watched() as progress:
         diagnosis = _result(source, evidence, options, progress)
-    tell(options.only_json, to_json(diagnosis), in_words(diagnosis), indent=1)
+    print_result(options.only_json, diagnosis, in_words(diagnosis), indent=1)
     wanted: list[tuple[str, Path | None, Callable[[Path], None]]] = [
-        ("", options.json_file, lambda path: write_json(path, to_json(diagnosis))),
-        ("report     ", options.report, partial(_write_report, source, diagnosis)),
+        ("", options.json_file, lambda path: write_json(path, diagnosis)),
+        ("report     ", options.report, partial(write_source_report, source, diagnosis)),
     ]
     if options.apply is not None and diagnosis.verdict in ("unexplained", "partly"):
         why = (
@@ -203,20 +198,9 @@ def _diagnose_one(source: "EvidenceFolder", options: _Options) -> int:
         wanted.append(("rig file   ", options.apply, lambda path: write_rig(diagnosis, evidence, path)))
     refused: list[Fault] = []
     for word, path, write in wanted:
-        if path is not None and _written(path, write, refused) and word:
+        if path is not None and written(partial(write, path), refused) and word:
             _print_line(options, f"{word}{path}")
     return _report_refused(refused)
-
-
-def _written(path: Path, write: Callable[[Path], None], refused: list[Fault]) -> bool:
-    """Write a file; True if it was written. A fault is added to `refused`, so that the other files are still written."""
-    try:
-        with writing():
-            write(path)
-    except Fault as fault:
-        refused.append(fault)
-        return False
-    return True
 
 
 def _report_refused(refused: list[Fault]) -> int:
@@ -245,17 +229,9 @@ def _result(
     return outcome.diagnosis
 
 
-def _write_report(source: "EvidenceFolder", diagnosis: "Diagnosis", path: Path) -> None:
-    """Write the report, with the files of the evidence listed at its end. Raises Fault BAD_EVIDENCE, OSError."""
-    from cockpit.fleet.kept import evidence_files
-    from diagnosis.report.page import write_report
-
-    write_report(diagnosis, source.name, path, evidence_files(source.folder))
-
-
 def _diagnose_many(sources: list["EvidenceFolder"], options: _Options) -> int:
     """Diagnose all folders; with --report the results already in its folder are reused."""
-    from cockpit.commands.diagnose_output import in_a_line, many_as_json, watched
+    from cockpit.commands.diagnose_output import Diagnoses, in_a_line, watched
     from cockpit.fleet.work import INDEX, FleetFolder, with_estimate, without_pictures
     from diagnosis import diagnose_many as many
 
@@ -263,7 +239,9 @@ def _diagnose_many(sources: list["EvidenceFolder"], options: _Options) -> int:
     outcomes_by_name = {outcome.source.name: outcome for outcome in (fleet.kept() if fleet else [])}
     missing = [source for source in sources if source.name not in outcomes_by_name]
     if outcomes_by_name:
-        say(f"{len(outcomes_by_name)} of {len(sources)} reused from {options.report}: the same files, the same version")
+        print_line(
+            f"{len(outcomes_by_name)} of {len(sources)} reused from {options.report}: the same files, the same version"
+        )
     try:
         with (
             watched() as progress,
@@ -277,19 +255,19 @@ def _diagnose_many(sources: list["EvidenceFolder"], options: _Options) -> int:
                 progress(line, len(outcomes_by_name) / len(sources))
     except KeyboardInterrupt:
         if fleet is not None:
-            say(
+            print_line(
                 f"{len(outcomes_by_name)} of {len(sources)} are in {options.report}; run the same command again to continue"
             )
         raise
     results = [outcomes_by_name[source.name] for source in sources]
     refused = [] if fleet is None else fleet.refused
-    table = many_as_json(results)
+    table = Diagnoses(results)
     if options.json_file is not None:
-        _written(options.json_file, lambda path: write_json(path, table), refused)
+        written(partial(write_json, options.json_file, table), refused)
     words = [in_a_line(outcome) for outcome in results]
     if options.report is not None:
         words.append(f"reports    {options.report / INDEX}")
-    tell(options.only_json, table, words, indent=1)
-    statuses = [FAULTS[outcome.fault[0]].exit_status for outcome in results if outcome.fault is not None]
+    print_result(options.only_json, table, words, indent=1)
+    statuses = [FAULTS[outcome.fault.fault].exit_status for outcome in results if outcome.fault is not None]
     # the lowest status first: bad evidence, which the caller can mend
     return min((status for status in (*statuses, _report_refused(refused)) if status), default=0)

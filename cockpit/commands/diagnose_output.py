@@ -1,32 +1,35 @@
-"""Output of `stickslip diagnose`: progress, the answer in words, one line per folder, strict JSON."""
+"""Output of `stickslip diagnose`: progress, the answer in words, one line per folder."""
 
 import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Literal, NamedTuple
 
 from bridge import units
-from bridge.plain import plain, say
+from bridge.plain import plain, print_line
+from diagnosis.diagnose_many import FolderResult
 from diagnosis.report import words
 from diagnosis.report.relation_words import number_lines, relation_lines
-from diagnosis.result import to_json
+from diagnosis.result import Diagnosis
 
-if TYPE_CHECKING:
-    from diagnosis.diagnose_many import FolderResult
-    from diagnosis.result import Diagnosis
-
-MANY_FORMAT = "diagnoses/2"
 _SHOWN_CANDIDATES = 3
 
 
-def in_words(diagnosis: "Diagnosis") -> list[str]:
+class Diagnoses(NamedTuple):
+    """Results of many folders, in the order given."""
+
+    results: list[FolderResult]
+    format: Literal["diagnoses/2"] = "diagnoses/2"
+
+
+def in_words(diagnosis: Diagnosis) -> list[str]:
     """Lines for the terminal: verdict, leading candidates, gap, next experiment, findings about the data."""
     gap, after = diagnosis.gap, diagnosis.next_experiment
     lines = [words.headline(diagnosis), *diagnosis.summary]
     for label, row in zip(("candidates", "", ""), diagnosis.candidates[:_SHOWN_CANDIDATES], strict=False):
         sizes = "; ".join(words.estimate_in_words(row.effect, *item) for item in row.parameters.items())
         lines.append(f"{label:<10} {row.effect:<28} {units.percent(row.probability):>8}   {sizes}".rstrip())
-    if gap.runs:
+    if gap.files:
         numbers = [f"{units.times(gap.nominal)} as described", f"{units.times(gap.retuned)} baseline"]
         if diagnosis.effects:
             numbers.append(f"{units.times(gap.with_effect)} with {' and '.join(diagnosis.effects)}")
@@ -45,7 +48,7 @@ def in_words(diagnosis: "Diagnosis") -> list[str]:
     return [*lines, *(f"{'' if i else 'data':<10} {line}" for i, line in enumerate(data))]
 
 
-def in_a_line(outcome: "FolderResult") -> str:
+def in_a_line(outcome: FolderResult) -> str:
     """Result of one folder among many, in one line."""
     if outcome.diagnosis is not None:
         # "holdout" reports a run held out by default, which is not a defect of the data
@@ -54,18 +57,6 @@ def in_a_line(outcome: "FolderResult") -> str:
         return f"{outcome.source.name}: {words.headline(outcome.diagnosis)}{data}"
     code, line = outcome.fault or ("", "")
     return f"{outcome.source.name}: {code}: {line}"
-
-
-def many_as_json(outcomes: "list[FolderResult]") -> dict[str, Any]:
-    """The JSON object for many folders, in the order given."""
-    return {"format": MANY_FORMAT, "results": [_as_json(outcome) for outcome in outcomes]}
-
-
-def _as_json(outcome: "FolderResult") -> dict[str, Any]:
-    if outcome.diagnosis is not None:
-        return {"evidence": outcome.source.name, "diagnosis": to_json(outcome.diagnosis)}
-    code, line = outcome.fault or ("", "")
-    return {"evidence": outcome.source.name, "fault": {"fault": code, "line": line}}
 
 
 @contextmanager
@@ -77,7 +68,7 @@ def watched() -> Generator[Callable[[str, float], None]]:
         def to_file(text: str, _share: float) -> None:
             nonlocal last
             if text != last:
-                say(text)
+                print_line(text)
             last = text
 
         yield to_file

@@ -6,19 +6,14 @@ from typing import Annotated, NamedTuple
 import typer
 
 from bridge.faults import FAULTS, Fault
-from bridge.wire.event_codes import CHECK, EVENTS, FAILURE, MAINTENANCE, OUTSIDE, EventCode
+from bridge.wire.event_codes import EVENTS, SEVERITIES, EventCode
 from bridge.wire.words import ColumnWord, words
-from cockpit.commands.as_json.option import Json, carry_out, tell
+from cockpit.commands.as_json.option import Json, print_result
+from cockpit.commands.options import command
 
 # Least similarity of a suggestion, by `difflib`; FORCE_FROZEN and FROZEN have 0.67. Larger: fewer typing errors get a
 # suggestion. Smaller: unrelated codes are suggested.
 _ALIKE = 0.5
-_SEVERITIES = {
-    FAILURE: "failure",
-    OUTSIDE: "out of specification",
-    CHECK: "check",
-    MAINTENANCE: "maintenance",
-}
 _NO_FAULTS = {
     0: "success; a completed diagnosis is a success, whatever its verdict",
     1: "the command completed, but the run, the log or the comparison failed; or, with a traceback, an error of the "
@@ -41,8 +36,11 @@ class Meaning(NamedTuple):
         return f"{self.fault} (exit status {self.exit_status})\n{self.help}"
 
 
+Explained = list[Meaning | ColumnWord | EventCode]
+
+
 def _event_in_words(event: EventCode) -> str:
-    severity = f"; {_SEVERITIES[event.letter]}" if event.letter else ""
+    severity = f"; {SEVERITIES[event.letter]}" if event.letter else ""
     return f"event  {event.code:<14}  from the {event.sources}{severity}: {event.help}"
 
 
@@ -55,6 +53,7 @@ def _codes(incomplete: str) -> list[str]:
     return [code for code in known if code.startswith(incomplete.upper())]
 
 
+@command()
 def explain(
     code: Annotated[
         str,
@@ -67,30 +66,24 @@ def explain(
     as_json: Json = None,
 ) -> None:
     """Explain a fault code, exit status or event and its remedy, or a mode, state, reason or limit in a log."""
-
-    def work() -> None:
-        meanings = [Meaning(status, None, meaning) for status, meaning in _NO_FAULTS.items()]
-        meanings += [Meaning(kind.exit_status, kind.code, kind.help) for kind in FAULTS.values()]
-        logged = words()
-        if not code:
-            meanings.sort(key=lambda row: (row.exit_status, row.fault or ""))
-            lines = [f"{row.exit_status:>3}  {row.fault or row.help}" for row in meanings]
-            log_lines = [*map(_in_words, logged), "", *map(_event_in_words, EVENTS.values())]
-            tell(as_json, [*meanings, *logged, *EVENTS.values()], [*lines, "", *log_lines])
-            return
-        wanted = [row for row in meanings if code.upper() in {row.fault, str(row.exit_status)}]
-        of_a_log = [word for word in logged if code.upper() in {word.word, word.column.upper()}]
-        events = [event for event in EVENTS.values() if code.upper() in {event.code, "EVENT"}]
-        if not (wanted or of_a_log or events):
-            known = [*FAULTS, *(word.word for word in logged), *(word.column.upper() for word in logged), *EVENTS]
-            near = get_close_matches(code.upper(), dict.fromkeys(known), 3, _ALIKE)
-            meant = f"did you mean {' or '.join(near)}? " if near else ""
-            line = (
-                f"{code}: not a fault code, exit status, event or word of a log; {meant}`stickslip explain` lists all"
-            )
-            raise Fault("CONFIG", line)
-        paragraphs = ["\n\n".join(row.in_words() for row in wanted)] if wanted else []
-        lines = [*paragraphs, *map(_in_words, of_a_log), *map(_event_in_words, events)]
-        tell(as_json, [*wanted, *of_a_log, *events], lines)
-
-    carry_out(work, as_json)
+    meanings = [Meaning(status, None, meaning) for status, meaning in _NO_FAULTS.items()]
+    meanings += [Meaning(kind.exit_status, kind.code, kind.help) for kind in FAULTS.values()]
+    logged = words()
+    if not code:
+        meanings.sort(key=lambda row: (row.exit_status, row.fault or ""))
+        lines = [f"{row.exit_status:>3}  {row.fault or row.help}" for row in meanings]
+        log_lines = [*map(_in_words, logged), "", *map(_event_in_words, EVENTS.values())]
+        print_result(as_json, [*meanings, *logged, *EVENTS.values()], [*lines, "", *log_lines])
+        return
+    wanted = [row for row in meanings if code.upper() in {row.fault, str(row.exit_status)}]
+    of_a_log = [word for word in logged if code.upper() in {word.word, word.column.upper()}]
+    events = [event for event in EVENTS.values() if code.upper() in {event.code, "EVENT"}]
+    if not (wanted or of_a_log or events):
+        known = [*FAULTS, *(word.word for word in logged), *(word.column.upper() for word in logged), *EVENTS]
+        near = get_close_matches(code.upper(), dict.fromkeys(known), 3, _ALIKE)
+        meant = f"did you mean {' or '.join(near)}? " if near else ""
+        line = f"{code}: not a fault code, exit status, event or word of a log; {meant}`stickslip explain` lists all"
+        raise Fault("CONFIG", line)
+    paragraphs = ["\n\n".join(row.in_words() for row in wanted)] if wanted else []
+    lines = [*paragraphs, *map(_in_words, of_a_log), *map(_event_in_words, events)]
+    print_result(as_json, [*wanted, *of_a_log, *events], lines)

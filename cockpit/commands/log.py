@@ -8,7 +8,7 @@ import typer
 
 from bridge.faults import Fault
 from bridge.units import counted
-from cockpit.commands.as_json.option import STDOUT, Json, JsonGroup, carry_out, tell
+from cockpit.commands.as_json.option import STDOUT, Json, JsonGroup, carry_out, print_result
 from cockpit.commands.log_info import log_info
 from cockpit.commands.options import watched_share
 from cockpit.run.writable import LOG, TABLE, check_output, check_output_folder
@@ -55,21 +55,13 @@ def log_recover(
             raise Fault("CONFIG", line)
         check_output("--in-place" if in_place else "--out", new, LOG)
         saved = recover(path, new)
-        left_out = (
-            [counted(saved.attachments, "attachment left out", "attachments left out")] if saved.attachments else []
-        )
-        words = "; ".join(
-            (
-                f"{new}: {counted(saved.messages, 'message')}, {'in place' if in_place else 'in a new file'} with an index",
-                *(left_out or ()),
-                f"lost: {lost}" if (lost := lost_in_words(saved.damage)) else "every message of the log is in it",
-            )
-        )
-        tell(
-            as_json,
-            {"messages": saved.messages, "attachments": saved.attachments, "out": new} | saved.damage._asdict(),
-            [words],
-        )
+        how = "in place" if in_place else "in a new file"
+        parts = [f"{new}: {counted(saved.messages, 'message')}, {how} with an index"]
+        if saved.attachments:
+            parts.append(counted(saved.attachments, "attachment left out", "attachments left out"))
+        lost = lost_in_words(saved.damage)
+        parts.append(f"lost: {lost}" if lost else "every message of the log is in it")
+        print_result(as_json, saved, ["; ".join(parts)])
 
     carry_out(work, as_json)
 
@@ -111,7 +103,7 @@ def log_export(
         words += [f"warning  the log is damaged; lost: {lost}"] if lost else []
         before = written.damage.before
         words += [f"warning  the log was recovered from a damaged log: {before}"] if before else []
-        tell(as_json, written, words)
+        print_result(as_json, written, words)
         return 0 if written.files and not lost else 1
 
     carry_out(work, as_json)
@@ -160,7 +152,7 @@ def log_import(
         words += [finding.in_words() for finding in done.findings]
         if kept is not None:
             words.append(f"map        {kept} holds the assumptions; correct it and import again with --map")
-        tell(as_json, done, words)
+        print_result(as_json, done, words)
 
     carry_out(work, as_json)
 
@@ -204,7 +196,7 @@ def log_check(path: LogArgument, as_json: Json = None) -> None:
     def work() -> int:
         from bridge.log.check.log_check import check_log
         from bridge.log.damage import foreign_in_words
-        from bridge.log.storage.chain import chain_in_words
+        from bridge.log.storage.checksums import checksums_in_words
         from bridge.wire.topics import BY_NAME
 
         with watched_share(f"checking {path.name}", quiet=as_json == STDOUT) as progress:
@@ -216,7 +208,7 @@ def log_check(path: LogArgument, as_json: Json = None) -> None:
         words = f"{path}: {counted(len(check.findings), 'finding')}; {check.seconds:.2f} s; {counts}; later than 1 ms: {late}"
         findings = [finding.in_words() for finding in check.findings]
         others = [f"others   {line}" for line in foreign_in_words(check.foreign)]
-        tell(as_json, check, [*findings, chain_in_words(check.chain), *others, words])
+        print_result(as_json, check, [*findings, checksums_in_words(check.checksums), *others, words])
         return 1 if check.findings else 0
 
     carry_out(work, as_json)

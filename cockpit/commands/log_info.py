@@ -1,17 +1,17 @@
 """`stickslip log info`: the verdict on the run in a log and the findings of its check; a line a log for several."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from bridge.faults import Fault
-from cockpit.commands.as_json.option import STDOUT, Json, carry_out, tell
+from cockpit.commands.as_json.option import STDOUT, Json, carry_out, print_result
 from cockpit.commands.options import Strict, Verbose, watched_share
+from cockpit.run.child_process import ReportedFault
 
 if TYPE_CHECKING:
-    from bridge.log.check.log_check import LogCheck
-    from cockpit.judge.verdict import RunVerdict
+    from cockpit.judge.judged import Judged
 
 _WORST_FIRST = (7, 1, 14, 0)  # exit statuses: no log, not ok, not judged, ok
 
@@ -27,46 +27,41 @@ def log_info(
     def work() -> int:
         quiet = as_json == STDOUT
         if len(logs) == 1:
-            verdict, check = _judged(logs[0], quiet)
-            tell(as_json, _as_json(verdict, check), _in_words(verdict, check, verbose, strict))
-            return verdict.exit_status(strict)
+            judged = _judged(logs[0], quiet)
+            print_result(as_json, judged, _in_words(judged, verbose, strict))
+            return judged.verdict.exit_status(strict)
         rows = [_row(path, quiet, strict) for path in logs]
-        tell(as_json, [result for _, _, result in rows], [line for _, line, _ in rows])
+        print_result(as_json, [result for _, _, result in rows], [line for _, line, _ in rows])
         return min((status for status, _, _ in rows), key=_WORST_FIRST.index)
 
     carry_out(work, as_json)
 
 
-def _judged(path: Path, quiet: bool) -> "tuple[RunVerdict, LogCheck]":
+def _judged(path: Path, quiet: bool) -> "Judged":
     from cockpit.judge.judged import judge_log
 
     with watched_share(f"judging {path.name}", quiet=quiet) as progress:
-        verdict, check, _ = judge_log(path, progress)
-    return verdict, check
+        return judge_log(path, progress)
 
 
-def _row(path: Path, quiet: bool, strict: bool) -> tuple[int, str, dict[str, Any]]:
-    """Exit status, line and JSON of one log of several; a file that is no log does not end the others."""
-    from cockpit.judge.verdict_words import headline
-
+def _row(path: Path, quiet: bool, strict: bool) -> "tuple[int, str, Judged | ReportedFault]":
+    """Exit status, line and result of one log of several; a file that is no log does not end the others."""
     try:
-        verdict, check = _judged(path, quiet)
+        judged = _judged(path, quiet)
     except Fault as fault:
         if fault.kind.code != "BAD_LOG":
             raise
-        result = {"fault": fault.kind.code, "line": fault.line, "exit_status": fault.kind.exit_status}
-        return fault.kind.exit_status, f"{'no log':<10} {fault.line}", result
-    line = f"{verdict.control:<10} {path}: {headline(verdict).removeprefix(f'{verdict.control}: ')}"
-    return verdict.exit_status(strict), line, _as_json(verdict, check)
+        status = fault.kind.exit_status
+        return status, f"{'no log':<10} {fault.line}", ReportedFault(fault.kind.code, fault.line, status)
+    verdict = judged.verdict
+    line = f"{verdict.control:<10} {path}: {verdict.headline.removeprefix(f'{verdict.control}: ')}"
+    return verdict.exit_status(strict), line, judged
 
 
-def _as_json(verdict: "RunVerdict", check: "LogCheck") -> dict[str, Any]:
-    return verdict.as_dict() | {"findings": check.as_dict()["findings"]}
-
-
-def _in_words(verdict: "RunVerdict", check: "LogCheck", verbose: bool, strict: bool) -> list[str]:
+def _in_words(judged: "Judged", verbose: bool, strict: bool) -> list[str]:
     from cockpit.judge.verdict_words import in_words, shortened, strictly
 
+    verdict = judged.verdict
     known = {line.partition(":")[0].lower().replace("_", "-") for line in (*verdict.faults, *verdict.told)}
-    findings = [f"finding  {finding.in_words()}" for finding in check.findings if finding.kind not in known]
+    findings = [f"finding  {finding.in_words()}" for finding in judged.findings if finding.kind not in known]
     return [*in_words(verdict, verbose), *shortened(findings, verbose), *strictly(verdict, strict)]

@@ -7,13 +7,15 @@ import typer
 
 from bridge.faults import Fault
 from bridge.files import check_file, refuse_to_lose, refuse_to_replace_corrected
-from cockpit.commands.as_json.option import Json, carry_out, tell
+from cockpit.commands.as_json.option import Json, print_result
+from cockpit.commands.options import command
 from cockpit.look.quantity import quantity, turns
 from cockpit.run.writable import PAGE, PICTURE, RIG, SHEETS, check_output, writing
 
 _OUTPUTS = (*PAGE, *SHEETS, *PICTURE, *RIG)
 
 
+@command()
 def look(
     path: Annotated[
         Path, typer.Argument(metavar="FILE", help="Measured data in any format of `log import`, or a run log.")
@@ -34,65 +36,54 @@ def look(
     as_json: Json = None,
 ) -> None:
     """Estimate slips, period, F_s, F_k, mu, stiffness and mass from a measured file, each with its 90 % interval."""
-
-    def work() -> None:
-        from cockpit.look.cycles import refuse_to_replace_sheet
-        from cockpit.look.source import LookOptions, read_record
-        from diagnosis.look.look import look as look_at
-        from diagnosis.look.words import headline, sentences
-
-        check_file(path, "BAD_TABLE", "give the path of a file of measured data")
-        for target in out:
-            check_output("--out", target, _OUTPUTS)
-            refuse_to_lose([path], "the measured file", "--out", target)
-            if target.suffix.lower() in SHEETS:
-                refuse_to_replace_sheet(target, f"--out {target}")
-        asked = LookOptions(
-            quantity("--speed", speed, "velocity"),
-            quantity("--load", load, "force"),
-            quantity("--mass", mass, "mass"),
-            quantity("--rate", rate, "frequency"),
-            time,
-            force,
-            channel_map,
-            turns(speed) if speed else None,
-        )
-        record = read_record(path, asked)
-        for target in (target for target in out if target.suffix.lower() in RIG):
-            if not record.map_text:
-                raise Fault(
-                    "CONFIG",
-                    f"--out {target}: no map to write: --map was given, or the file is a run log; leave it out",
-                )
-            refuse_to_replace_corrected(target, record.map_text, f"--out {target}")
-        seen = look_at(record.t_s, record.force_N, record.position_m, record.known)
-        if seen is None:
-            raise Fault("BAD_TABLE", f"{path.name}: fewer than 16 samples of a force with a time; give a longer record")
-        findings = [*record.findings, *_hints(seen, asked.mass_kg)]
-        written = [str(target) for target in out if _write(target, seen, record, findings)]
-        lines = [
-            headline(seen),
-            *sentences(seen),
-            *(finding.in_words() for finding in findings),
-            *(f"written    {name}" for name in written),
-        ]
-        if record.map_text and not any(target.suffix == ".toml" for target in out):
-            lines.append(
-                "map        --out map.toml saves how the columns were read; correct that file and pass it with --map"
-            )
-        table: dict[str, Any] = {"headline": headline(seen)} | seen.as_dict()
-        tell(as_json, table | {"findings": [finding.as_dict() for finding in findings], "written": written}, lines)
-
-    carry_out(work, as_json)
-
-
-def _hints(seen: Any, mass_kg: float | None) -> list[Any]:
+    from cockpit.look.cycles import refuse_to_replace_sheet
     from cockpit.look.hints import hints
+    from cockpit.look.result import Looked
+    from cockpit.look.source import LookOptions, looked_at, read_record
+    from diagnosis.look.words import headline, sentences
 
-    return hints(seen, {} if mass_kg is None else {"mass_kg": mass_kg})
+    check_file(path, "BAD_TABLE", "give the path of a file of measured data")
+    for target in out:
+        check_output("--out", target, _OUTPUTS)
+        refuse_to_lose([path], "the measured file", "--out", target)
+        if target.suffix.lower() in SHEETS:
+            refuse_to_replace_sheet(target, f"--out {target}")
+    asked = LookOptions(
+        quantity("--speed", speed, "velocity"),
+        quantity("--load", load, "force"),
+        quantity("--mass", mass, "mass"),
+        quantity("--rate", rate, "frequency"),
+        time,
+        force,
+        channel_map,
+        turns(speed) if speed else None,
+    )
+    record = read_record(path, asked)
+    for target in (target for target in out if target.suffix.lower() in RIG):
+        if not record.map_text:
+            raise Fault(
+                "CONFIG",
+                f"--out {target}: no map to write: --map was given, or the file is a run log; leave it out",
+            )
+        refuse_to_replace_corrected(target, record.map_text, f"--out {target}")
+    seen = looked_at(record)
+    findings = [*record.findings, *hints(seen, {} if asked.mass_kg is None else {"mass_kg": asked.mass_kg})]
+    for target in out:
+        _write(target, seen, record, findings)
+    lines = [
+        headline(seen),
+        *sentences(seen),
+        *(finding.in_words() for finding in findings),
+        *(f"written    {target}" for target in out),
+    ]
+    if record.map_text and not any(target.suffix == ".toml" for target in out):
+        lines.append(
+            "map        --out map.toml saves how the columns were read; correct that file and pass it with --map"
+        )
+    print_result(as_json, Looked(seen, findings, out), lines)
 
 
-def _write(target: Path, seen: Any, record: Any, findings: list[Any]) -> bool:
+def _write(target: Path, seen: Any, record: Any, findings: list[Any]) -> None:
     suffix = target.suffix.lower()
     with writing(target):
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -115,4 +106,3 @@ def _write(target: Path, seen: Any, record: Any, findings: list[Any]) -> bool:
             from cockpit.look.cycles import write_cycles
 
             write_cycles(seen, target, record.path)
-    return True

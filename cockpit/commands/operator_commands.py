@@ -1,36 +1,27 @@
 """`stickslip arm`, `disarm`, `stop`, `reset` and `status`: operator commands to a rig, and its state."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cockpit.commands.as_json.option import Json, carry_out, tell
-from cockpit.commands.options import DEFAULT_SCENARIO, Certs, Endpoint, Prefix, ScenarioName, as_settings
+from cockpit.commands.as_json.option import Json, print_result
+from cockpit.commands.options import BUS, SharedOptions, command
 
 
-def _send(
-    command: str, scenario: str, endpoint: str | None, prefix: str | None, certs: Path | None, as_json: Json
-) -> None:
-    def work() -> int:
-        from bridge.wire import realtime
-        from cockpit.run.operator import tell as send
-        from cockpit.run.scenario_file import load_bus
+def _send(command: str, shared: SharedOptions, as_json: Json) -> int:
+    from bridge.wire import realtime
+    from cockpit.live.operator import send_command
 
-        bus = load_bus(scenario, as_settings([], None, endpoint, prefix, certs))
-        realtime.raise_priority()  # a stop must not wait for a core
-        answer = send(bus, command)
-        tell(as_json, answer, answer.in_words())
-        return 0 if answer.done else 1
-
-    carry_out(work, as_json)
+    bus = shared.bus()
+    realtime.raise_priority()  # a stop must not wait for a core
+    answer = send_command(bus, command)
+    print_result(as_json, answer, answer.in_words())
+    return 0 if answer.done else 1
 
 
+@command(*BUS)
 def arm(
-    scenario: ScenarioName = DEFAULT_SCENARIO,
-    endpoint: Endpoint = None,
-    prefix: Prefix = None,
-    certs: Certs = None,
+    shared: SharedOptions,
     accept_gain: Annotated[
         bool,
         typer.Option(
@@ -38,71 +29,49 @@ def arm(
         ),
     ] = False,
     as_json: Json = None,
-) -> None:
+) -> int:
     """Check a rig's sensors and exciter, then allow its controller to vibrate it.
 
     Exit status 1: the check failed, it measured another gain than the check before, or a fault is active.
     """
-    _send("ACCEPT_GAIN" if accept_gain else "ARM", scenario, endpoint, prefix, certs, as_json)
+    return _send("ACCEPT_GAIN" if accept_gain else "ARM", shared, as_json)
 
 
-def disarm(
-    scenario: ScenarioName = DEFAULT_SCENARIO,
-    endpoint: Endpoint = None,
-    prefix: Prefix = None,
-    certs: Certs = None,
-    as_json: Json = None,
-) -> None:
+@command(*BUS)
+def disarm(shared: SharedOptions, as_json: Json = None) -> int:
     """Ramp a rig's vibration down until it is armed again; exit status 1: the rig was stopped, or did not ramp down."""
-    _send("DISARM", scenario, endpoint, prefix, certs, as_json)
+    return _send("DISARM", shared, as_json)
 
 
+@command(*BUS)
 def stop(
+    shared: SharedOptions,
     reset_too: Annotated[bool, typer.Option("--reset", hidden=True)] = False,
-    scenario: ScenarioName = DEFAULT_SCENARIO,
-    endpoint: Endpoint = None,
-    prefix: Prefix = None,
-    certs: Certs = None,
     as_json: Json = None,
-) -> None:
+) -> int:
     """Ramp a rig's vibration down until `stickslip reset`, over restarts too; exit status 4: no rig confirmed the stop.
 
     This is a process stop, not an emergency stop: an emergency stop cuts the supply of the amplifier.
     """
     if reset_too:
         typer.echo("stickslip: --reset is now a command: `stickslip reset`, followed by `stickslip arm`", err=True)
-    _send("RESET" if reset_too else "STOP", scenario, endpoint, prefix, certs, as_json)
+    return _send("RESET" if reset_too else "STOP", shared, as_json)
 
 
-def reset(
-    scenario: ScenarioName = DEFAULT_SCENARIO,
-    endpoint: Endpoint = None,
-    prefix: Prefix = None,
-    certs: Certs = None,
-    as_json: Json = None,
-) -> None:
+@command(*BUS)
+def reset(shared: SharedOptions, as_json: Json = None) -> int:
     """Clear a stop, or a fault whose cause is gone: a rig in FAULT is then DISARMED, until `stickslip arm`.
 
     Also ends trips of the controller; a rig that is still armed then vibrates again.
     """
-    _send("RESET", scenario, endpoint, prefix, certs, as_json)
+    return _send("RESET", shared, as_json)
 
 
-def status(
-    scenario: ScenarioName = DEFAULT_SCENARIO,
-    endpoint: Endpoint = None,
-    prefix: Prefix = None,
-    certs: Certs = None,
-    as_json: Json = None,
-) -> None:
+@command(*BUS)
+def status(shared: SharedOptions, as_json: Json = None) -> int:
     """Print the state of a rig, within a second; exit status 1: no controller is in charge, 4: no rig answers."""
+    from cockpit.live.status import look
 
-    def work() -> int:
-        from cockpit.run.scenario_file import load_bus
-        from cockpit.run.status import look
-
-        seen = look(load_bus(scenario, as_settings([], None, endpoint, prefix, certs)))
-        tell(as_json, seen, seen.in_words())
-        return 0 if seen.controlled else 1
-
-    carry_out(work, as_json)
+    seen, lines = look(shared.bus())
+    print_result(as_json, seen, lines)
+    return 0 if seen.controlled else 1

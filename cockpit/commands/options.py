@@ -4,10 +4,17 @@ import json
 import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+from functools import wraps
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, NoReturn, get_type_hints
 
 import typer
+
+from cockpit.commands.as_json.option import carry_out
+
+if TYPE_CHECKING:
+    from bridge.wire.zenoh_link import BusConfig
 
 
 def scenario_names(incomplete: str) -> list[str]:
@@ -17,30 +24,7 @@ def scenario_names(incomplete: str) -> list[str]:
     return [path.stem for path in sorted(deploy_folder().glob(f"scenarios/{incomplete}*.toml"))]
 
 
-ScenarioName = Annotated[
-    str,
-    typer.Option(
-        "--scenario",
-        metavar="NAME",
-        help="Name of a scenario (`stickslip scenarios` lists them), or a .toml file.",
-        autocompletion=scenario_names,
-    ),
-]
-Settings = Annotated[
-    list[str],
-    typer.Option(
-        "--set",
-        metavar="KEY=VALUE",
-        help="Change one value of the scenario, e.g. controller.limits.v_ratio=1.3. Repeatable.",
-    ),
-]
-Seed = Annotated[
-    int | None, typer.Option(metavar="NUMBER", help="Seed of the sensor noise; the same seed gives the same run.")
-]
-Endpoint = Annotated[
-    str | None,
-    typer.Option(metavar="ADDRESS", help="Address of the bus, e.g. tcp/127.0.0.1:7447; the scenario's if not given."),
-]
+DEFAULT_SCENARIO = "paper-c45-c45"
 Certs = Annotated[
     Path | None,
     typer.Option(
@@ -49,57 +33,110 @@ Certs = Annotated[
         help="Folder made by `stickslip certs`, for a tls/ address; ~/.config/stickslip/certificates if not given.",
     ),
 ]
-Insecure = Annotated[
-    bool,
-    typer.Option("--insecure", help="Accept unauthenticated clients at a tcp/ address that other computers reach."),
-]
-Wait = Annotated[
-    float | None,
-    typer.Option(
-        "--wait", min=0.1, max=1e6, metavar="S", help="Longest wait for the other processes at the start, in seconds."
-    ),
-]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print all figures, warnings and findings.")]
 Strict = Annotated[
     bool,
     typer.Option("--strict", help="For acceptance tests: exit status 1 also for any lost message or late command."),
 ]
-Prefix = Annotated[str | None, typer.Option(metavar="WORD", help="First part of every key on the bus.")]
-Lockstep = Annotated[
-    bool,
-    typer.Option("--lockstep", help="Not in real time: each block waits for its command. Repeatable to the bit."),
-]
-ChildOf = Annotated[int, typer.Option("--child", hidden=True)]  # process id of the parent; 0: started by an operator
-LogFile = Annotated[
-    Path | None, typer.Option("--log", metavar="FILE", help="Log to write; runs/NAME.mcap if not given.")
-]
-DEFAULT_SCENARIO = "paper-c45-c45"
 
 
-def as_settings(
-    settings: list[str],
-    seed: int | None,
-    endpoint: str | None,
-    prefix: str | None,
-    certs: Path | None = None,
-    insecure: bool = False,
-    wait_s: float | None = None,
-) -> list[str]:
-    """The options as `key=value` settings of a scenario."""
-    result = list(settings)
-    if seed is not None:
-        result.append(f"seed={seed}")
-    if endpoint is not None:
-        result.append(f'bus.endpoint="{endpoint}"')
-    if prefix is not None:
-        result.append(f'bus.prefix="{prefix}"')
-    if certs is not None:
-        result.append(f"bus.certificates={json.dumps(str(certs.absolute()), ensure_ascii=False)}")
-    if insecure:
-        result.append("bus.insecure=true")
-    if wait_s is not None:
-        result.append(f"bus.wait_s={wait_s}")
-    return result
+class SharedOptions(NamedTuple):
+    """Values of the options that several commands share."""
+
+    scenario: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="Name of a scenario (`stickslip scenarios` lists them), or a .toml file.",
+            autocompletion=scenario_names,
+        ),
+    ] = DEFAULT_SCENARIO
+    settings: Annotated[
+        list[str],
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="Change one value of the scenario, e.g. controller.limits.v_ratio=1.3. Repeatable.",
+        ),
+    ] = []
+    seed: Annotated[
+        int | None, typer.Option(metavar="NUMBER", help="Seed of the sensor noise; the same seed gives the same run.")
+    ] = None
+    endpoint: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="Address of the bus, e.g. tcp/127.0.0.1:7447; the scenario's if not given."
+        ),
+    ] = None
+    prefix: Annotated[str | None, typer.Option(metavar="WORD", help="First part of every key on the bus.")] = None
+    certs: Certs = None
+    insecure: Annotated[
+        bool,
+        typer.Option("--insecure", help="Accept unauthenticated clients at a tcp/ address that other computers reach."),
+    ] = False
+    lockstep: Annotated[
+        bool,
+        typer.Option("--lockstep", help="Not in real time: each block waits for its command. Repeatable to the bit."),
+    ] = False
+    log: Annotated[Path | None, typer.Option(metavar="FILE", help="Log to write; runs/NAME.mcap if not given.")] = None
+    wait: Annotated[
+        float | None,
+        typer.Option(
+            min=0.1, max=1e6, metavar="S", help="Longest wait for the other processes at the start, in seconds."
+        ),
+    ] = None
+    child: Annotated[int, typer.Option(hidden=True)] = 0  # process id of the parent; 0: started by an operator
+
+    def as_settings(self) -> list[str]:
+        """The options as `key=value` settings of a scenario."""
+        values = {
+            "seed": self.seed,
+            "bus.endpoint": self.endpoint,
+            "bus.prefix": self.prefix,
+            "bus.certificates": self.certs and str(self.certs.absolute()),
+            "bus.insecure": self.insecure or None,
+            "bus.wait_s": self.wait,
+        }
+        given = [f"{key}={json.dumps(value, ensure_ascii=False)}" for key, value in values.items() if value is not None]
+        return [*self.settings, *given]
+
+    def bus(self) -> "BusConfig":
+        """The bus of the scenario. Raises Fault CONFIG."""
+        from cockpit.run.scenario_file import load_bus
+
+        return load_bus(self.scenario, self.as_settings())
+
+
+BUS = ("scenario", "endpoint", "prefix", "certs")  # choose the bus of a running rig
+
+
+def command(*names: str, **defaults: Any) -> Callable[[Callable[..., int | None]], Callable[..., NoReturn]]:
+    """Make a command of a function with the option `as_json`; it ends with the exit status that the function returns.
+
+    Args:
+        names: fields of `SharedOptions`; with any, the function receives their values as its first argument.
+        defaults: fields with another default value.
+
+    """
+    kinds, values = get_type_hints(SharedOptions, include_extras=True), SharedOptions._field_defaults | defaults
+    options = [
+        Parameter(name, Parameter.KEYWORD_ONLY, default=values[name], annotation=kinds[name])
+        for name in (*defaults, *names)
+    ]
+
+    def decorated(function: Callable[..., int | None]) -> Callable[..., NoReturn]:
+        @wraps(function)
+        def called(**given: Any) -> NoReturn:
+            shared = {option.name: given.pop(option.name) for option in options}
+            first = [SharedOptions(**shared)] if options else []
+            carry_out(lambda: function(*first, **given), given["as_json"])
+
+        others = list(signature(function).parameters.values())[bool(options) :]
+        made: Any = called
+        made.__signature__ = Signature([*options, *(other.replace(kind=Parameter.KEYWORD_ONLY) for other in others)])
+        return made
+
+    return decorated
 
 
 @contextmanager

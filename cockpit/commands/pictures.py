@@ -10,8 +10,8 @@ import typer
 
 from bridge.faults import Fault
 from bridge.files import check_file, refuse_to_lose, refuse_to_replace_text
-from cockpit.commands.as_json.option import Json, carry_out, tell
-from cockpit.commands.options import DEFAULT_SCENARIO
+from cockpit.commands.as_json.option import Json, print_result
+from cockpit.commands.options import DEFAULT_SCENARIO, command
 from cockpit.run.writable import CSV, PAGE, PICTURE, check_output, writing
 
 
@@ -24,6 +24,7 @@ def _written(out: Path, suffixes: tuple[str, ...]) -> Generator[None]:
         yield
 
 
+@command()
 def plot(
     log: Annotated[Path, typer.Argument(help="A log, .mcap, of a run or made by `log import`.")],
     out: Annotated[
@@ -56,33 +57,30 @@ def plot(
     as_json: Json = None,
 ) -> None:
     """Draw the run in a log: drive force, v_a against v_d, and the controller's actions; or any of its signals."""
+    from cockpit.figures.curves import FIRST_LINE
+    from cockpit.figures.request import request_of
+    from cockpit.figures.run_figure import Plotted, draw_logs
+    from cockpit.run.replay import time_s
 
-    def work() -> None:
-        from cockpit.figures.curves import FIRST_LINE
-        from cockpit.figures.request import request_of
-        from cockpit.figures.run_figure import draw_logs
-        from cockpit.run.replay import time_s
-
-        from_s = time_s(f"--from {start}", start, "12.5s") if start else -math.inf
-        to_s = time_s(f"--to {end}", end, "20s") if end else math.inf
-        request = request_of(from_s, to_s, signals, style, width, dpi)
-        logs = [log] if versus is None else [log, versus]
-        for path in logs:
-            check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
-        picture = out or log.parent / f"{log.stem}.png"
-        refuse_to_lose(logs, "the log", "--out", picture)
-        refuse_to_lose(logs, "the log", "--data", data)
-        if data is not None:
-            check_output("--data", data, CSV)
-            refuse_to_replace_text(data, FIRST_LINE, f"--data {data}")
-        with _written(picture, PICTURE):
-            verdict = draw_logs(logs, picture, request, data)[0]
-        words = [f"picture  {picture}", *([f"data     {data}"] if data is not None else [])]
-        tell(as_json, verdict.as_dict() | {"picture": picture, "data": data}, words)
-
-    carry_out(work, as_json)
+    from_s = time_s(f"--from {start}", start, "12.5s") if start else -math.inf
+    to_s = time_s(f"--to {end}", end, "20s") if end else math.inf
+    request = request_of(from_s, to_s, signals, style, width, dpi)
+    logs = [log] if versus is None else [log, versus]
+    for path in logs:
+        check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
+    picture = out or log.parent / f"{log.stem}.png"
+    refuse_to_lose(logs, "the log", "--out", picture)
+    refuse_to_lose(logs, "the log", "--data", data)
+    if data is not None:
+        check_output("--data", data, CSV)
+        refuse_to_replace_text(data, FIRST_LINE, f"--data {data}")
+    with _written(picture, PICTURE):
+        verdict = draw_logs(logs, picture, request, data)[0]
+    words = [f"picture  {picture}", *([f"data     {data}"] if data is not None else [])]
+    print_result(as_json, Plotted(verdict, picture, data), words)
 
 
+@command()
 def review(
     logs: Annotated[
         list[Path], typer.Argument(metavar="LOG...", help="One log, .mcap, or two; the second is drawn over the first.")
@@ -93,25 +91,21 @@ def review(
     as_json: Json = None,
 ) -> None:
     """Make a page of a log: verdict, curves to zoom into, decisions with reasons, events; two logs are compared."""
+    from cockpit.review.page import Reviewed, write_review
 
-    def work() -> None:
-        from cockpit.judge.verdict_words import headline
-        from cockpit.review.page import write_review
-
-        if len(logs) > 2:
-            raise Fault("CONFIG", f"{logs[2]}: is the third log: a page shows one or two; leave it out")
-        for path in logs:
-            check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
-        page = out or logs[0].parent / f"{logs[0].stem}.html"
-        refuse_to_lose(logs, "the log", "--out", page)
-        with _written(page, PAGE):
-            verdicts = write_review(logs, page)
-        result = {"page": page, "logs": [verdict.as_dict() for verdict in verdicts]}
-        tell(as_json, result, [*(f"{verdict.log}: {headline(verdict)}" for verdict in verdicts), f"page     {page}"])
-
-    carry_out(work, as_json)
+    if len(logs) > 2:
+        raise Fault("CONFIG", f"{logs[2]}: is the third log: a page shows one or two; leave it out")
+    for path in logs:
+        check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
+    page = out or logs[0].parent / f"{logs[0].stem}.html"
+    refuse_to_lose(logs, "the log", "--out", page)
+    with _written(page, PAGE):
+        verdicts = write_review(logs, page)
+    words = [*(f"{verdict.log}: {verdict.headline}" for verdict in verdicts), f"page     {page}"]
+    print_result(as_json, Reviewed(page, verdicts), words)
 
 
+@command()
 def stability(
     rig: Annotated[str, typer.Option(help="Name of a rig in deploy/rigs, or a .toml file.")] = DEFAULT_SCENARIO,
     settings: Annotated[
@@ -124,31 +118,24 @@ def stability(
     as_json: Json = None,
 ) -> None:
     """Draw where a rig sticks and slips, over drive velocity, stiffness and vibration."""
+    from cockpit.figures.stability_map import stability_map
+    from cockpit.run.scenario import load_rig
 
-    def work() -> None:
-        from cockpit.judge.stability_map import stability_map
-        from cockpit.run.scenario import load_rig
-
-        made = load_rig(rig, settings)
-        with _written(out, PICTURE):
-            result = stability_map(made, out, [path for path in [Path(rig)] if path.is_file()])
-        tell(as_json, result, [result.answer, f"picture  {out}"])
-
-    carry_out(work, as_json)
+    made = load_rig(rig, settings)
+    with _written(out, PICTURE):
+        result = stability_map(made, out, [path for path in [Path(rig)] if path.is_file()])
+    print_result(as_json, result, [result.answer, f"picture  {out}"])
 
 
+@command()
 def reproduce(
     out: Annotated[Path, typer.Option(help="Report to write, one .html file.")] = Path("runs/reproduce.html"),
     as_json: Json = None,
-) -> None:
+) -> int:
     """Recompute the paper: its figures, tables and claims, each with its number and whether it holds."""
+    from cockpit.paper.page import reproduce as redo
 
-    def work() -> int:
-        from cockpit.paper.page import reproduce as redo
-
-        with _written(out, PAGE):
-            result = redo(out, progress=True)
-        tell(as_json, result.as_json(), [result.verdict, f"report   {out}"])
-        return 0 if result.passed else 1
-
-    carry_out(work, as_json)
+    with _written(out, PAGE):
+        result = redo(out, progress=True)
+    print_result(as_json, result, [result.verdict, f"report   {out}"])
+    return 0 if result.passed else 1

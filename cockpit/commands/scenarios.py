@@ -6,8 +6,8 @@ from typing import Annotated, NamedTuple
 import typer
 
 from bridge.faults import Fault
-from cockpit.commands.as_json.option import Json, carry_out, tell
-from cockpit.commands.options import scenario_names
+from cockpit.commands.as_json.option import Json, print_result
+from cockpit.commands.options import command, scenario_names
 
 
 class Shipped(NamedTuple):
@@ -17,6 +17,7 @@ class Shipped(NamedTuple):
     rigs: list[str]
 
 
+@command()
 def scenarios(
     copy: Annotated[
         str,
@@ -30,29 +31,25 @@ def scenarios(
     as_json: Json = None,
 ) -> None:
     """List the scenarios and rigs that come with the project, or copy one scenario."""
+    from bridge.config import read_toml
+    from bridge.files import write_whole
+    from cockpit.run.scenario_file import deploy_folder, find
+    from cockpit.run.writable import RIG, check_output, writing
 
-    def work() -> None:
-        from bridge.config import read_toml
-        from bridge.files import write_whole
-        from cockpit.run.scenario_file import deploy_folder, find
-        from cockpit.run.writable import RIG, check_output, writing
-
-        if copy:
-            source, target = find(copy, "scenarios"), Path(f"{Path(copy).stem}.toml")
-            if target.exists():
-                raise Fault("CONFIG", f"--copy {copy}: {target} exists and is not replaced; rename or delete it first")
-            check_output("--copy", target, RIG)
-            lines = source.read_text(encoding="utf-8").splitlines(keepends=True)
-            with writing(target):  # without the line `#:schema`, a path relative to the folder of the source
-                write_whole(target, "".join(line for line in lines if not line.startswith("#:schema")))
-            tell(as_json, {"file": str(target)}, [str(target), f"next     stickslip run --scenario {target}"])
-            return
-        known = {
-            path.stem: str(read_toml(path).get("description", ""))
-            for path in sorted(deploy_folder().glob("scenarios/*.toml"))
-        }
-        rigs = [path.stem for path in sorted(deploy_folder().glob("rigs/*.toml"))]
-        words = [f"{name:<24} {description}" for name, description in known.items()]
-        tell(as_json, Shipped(known, rigs), [*words, f"rigs: {', '.join(rigs)}"])
-
-    carry_out(work, as_json)
+    if copy:
+        source, target = find(copy, "scenarios"), Path(f"{Path(copy).stem}.toml")
+        if target.exists():
+            raise Fault("CONFIG", f"--copy {copy}: {target} exists and is not replaced; rename or delete it first")
+        check_output("--copy", target, RIG)
+        lines = source.read_text(encoding="utf-8").splitlines(keepends=True)
+        with writing(target):  # without the line `#:schema`, a path relative to the folder of the source
+            write_whole(target, "".join(line for line in lines if not line.startswith("#:schema")))
+        print_result(as_json, {"file": str(target)}, [str(target), f"next     stickslip run --scenario {target}"])
+        return
+    known = {
+        path.stem: str(read_toml(path).get("description", ""))
+        for path in sorted(deploy_folder().glob("scenarios/*.toml"))
+    }
+    rigs = [path.stem for path in sorted(deploy_folder().glob("rigs/*.toml"))]
+    words = [f"{name:<24} {description}" for name, description in known.items()]
+    print_result(as_json, Shipped(known, rigs), [*words, f"rigs: {', '.join(rigs)}"])

@@ -1,6 +1,5 @@
 """Entries of deploy/faults/*.toml: each file is a group, with common settings and its entries."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
@@ -96,20 +95,6 @@ def load_catalogue(folder: Path | None = None) -> list[CatalogueEntry]:
     return catalogue
 
 
-def chosen(catalogue: Sequence[CatalogueEntry], only: Sequence[str]) -> list[CatalogueEntry]:
-    """Entries by group or by start of the name; all without a selection. Raises Fault CONFIG."""
-    if not only:
-        return list(catalogue)
-    selected = [
-        named for named in catalogue if any(named.group == word or named.entry.name.startswith(word) for word in only)
-    ]
-    for word in only:
-        if not any(named.group == word or named.entry.name.startswith(word) for named in catalogue):
-            groups = ", ".join(dict.fromkeys(named.group for named in catalogue))
-            raise Fault("CONFIG", f"--only {word}: no such group or entry; groups: {groups}")
-    return selected
-
-
 def entry_names(incomplete: str) -> list[str]:
     """Entries for shell completion."""
     return [named.entry.name for named in load_catalogue() if named.entry.name.startswith(incomplete)]
@@ -117,15 +102,12 @@ def entry_names(incomplete: str) -> list[str]:
 
 def find_entry(name: str) -> CatalogueEntry:
     """Entry by name. Raises Fault CONFIG."""
-    catalogue = load_catalogue()
-    match = next((named for named in catalogue if named.entry.name == name), None)
-    if match is None:
-        names = [named.entry.name for named in catalogue]
-        near = ", ".join(known for known in names if known.startswith(name.partition("-")[0]))
-        raise Fault(
-            "CONFIG", f"{name}: no such fault; {f'perhaps {near}; ' if near else ''}see `stickslip fault --list`"
-        )
-    return match
+    catalogue = {named.entry.name: named for named in load_catalogue()}
+    if name not in catalogue:
+        near = ", ".join(known for known in catalogue if known.startswith(name.partition("-")[0]))
+        perhaps = f"perhaps {near}; " if near else ""
+        raise Fault("CONFIG", f"{name}: no such fault; {perhaps}see `stickslip fault --list`")
+    return catalogue[name]
 
 
 class KnownFault(NamedTuple):

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bridge.arrays import Floats
+from bridge.log.viewers.stretches import Envelope, envelope_of
 
 
 class Grid(NamedTuple):
@@ -20,14 +21,6 @@ class Grid(NamedTuple):
         return np.arange(self.bins, dtype=np.float64) * self.step_s + self.start_s
 
 
-class Envelope(NamedTuple):
-    """Values per bin, each [bins]; nan in empty bins."""
-
-    least: Floats
-    mean: Floats
-    most: Floats
-
-
 def on_grid(t_s: Floats, values: Floats, grid: Grid) -> Envelope:
     """Sort values, [samples] in any order, into bins; omits values that are not finite or outside the grid."""
     bins = np.rint((t_s - grid.start_s) / grid.step_s)
@@ -39,8 +32,6 @@ def on_grid(t_s: Floats, values: Floats, grid: Grid) -> Envelope:
     starts = np.flatnonzero(np.diff(at, prepend=-1))
     made = Envelope(*(np.full(grid.bins, np.nan) for _ in range(3)))
     if len(starts):
-        filled = at[starts]
-        made.least[filled] = np.minimum.reduceat(values, starts)
-        made.most[filled] = np.maximum.reduceat(values, starts)
-        made.mean[filled] = np.add.reduceat(values, starts) / np.diff(starts, append=len(values))
+        for each, filled in zip(made, envelope_of(values, starts), strict=True):
+            each[at[starts]] = filled
     return made

@@ -16,19 +16,18 @@ from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.figures.curves import LogCurve, as_table, curve_of, window_of
 from cockpit.figures.request import PAPER, SCREEN, FigureRequest
-from cockpit.figures.signals import PlottedSignal, limits_of, named
+from cockpit.figures.signals import limits_of, named
 from cockpit.judge.judged import judge_tables
 from cockpit.judge.verdict import RunVerdict
 from cockpit.judge.verdict_words import headline
-from diagnosis.features.cycles import Cycles
+from diagnosis.slips import Cycles
 
-_SHADES: dict[int, str] = {wire.EXCITE: "#dcebd8", wire.WAIT: "#f2d694", wire.PROBE: "#d5e3f0", wire.STOPPED: "#f0d5d5"}
-_NAMES: dict[int, str] = {
-    wire.EXCITE: "vibrating",
-    wire.WAIT: "waiting for re-stick",
-    wire.PROBE: "probing",
-    wire.STOPPED: "stopped",
-}
+_SHADES: dict[int, tuple[str, str]] = {
+    wire.EXCITE: ("#dcebd8", "vibrating"),
+    wire.WAIT: ("#f2d694", "waiting for re-stick"),
+    wire.PROBE: ("#d5e3f0", "probing"),
+    wire.STOPPED: ("#f0d5d5", "stopped"),
+}  # colour and label by mode
 _INK, _SLIP = "#1f2d3a", "#b5402a"
 _MM = 1.0 / 25.4  # inch
 _FIRST_MM = {SCREEN: 90.0, PAPER: 42.0}  # height of the first panel, and of each that follows
@@ -48,6 +47,15 @@ class _Shown(NamedTuple):
     cycles: Cycles | None
 
 
+class Plotted(NamedTuple):
+    """A picture with the verdict on its first log."""
+
+    verdict: RunVerdict
+    picture: Path
+    data: Path | None  # of the numbers
+    JSON_MERGED = "verdict"
+
+
 def draw_logs(
     logs: Sequence[Path], out: Path, request: FigureRequest | None = None, data: Path | None = None
 ) -> list[RunVerdict]:
@@ -61,11 +69,18 @@ def draw_logs(
     shown = [_shown(path, name) for path, name in zip(logs, _names(logs), strict=True)]
     from_s, to_s = window_of([log.run for log in shown], wanted)
     signals = [named(wanted.signals, log.run) for log in shown]
-    panels = [list(group) for _, group in groupby(signals[0], lambda signal: (signal.axis, signal.unit))]
-    curves = [[_curves(shown, signal, signals, from_s, to_s) for signal in panel] for panel in panels]
-    _save(_figure(shown, panels, curves, wanted, (from_s, to_s), made), shown, out, wanted, made)
+    panels = [
+        [
+            curve_of(log.run, log.name, signal, from_s, to_s)
+            for signal in group
+            for log, of_log in zip(shown, signals, strict=True)
+            if signal in of_log
+        ]
+        for _, group in groupby(signals[0], lambda signal: (signal.axis, signal.unit))
+    ]
+    _save(_figure(shown, panels, wanted, (from_s, to_s), made), shown, out, wanted, made)
     if data is not None:
-        write_whole(data, as_table([curve for panel in curves for of_signal in panel for curve in of_signal]))
+        write_whole(data, as_table([curve for panel in panels for curve in panel]))
     return [log.verdict for log in shown]
 
 
@@ -88,25 +103,9 @@ def _literal(name: str) -> str:
     return name.replace("$", r"\$")
 
 
-def _curves(
-    shown: Sequence[_Shown],
-    signal: PlottedSignal,
-    signals: Sequence[Sequence[PlottedSignal]],
-    from_s: float,
-    to_s: float,
-) -> list[LogCurve]:
-    """One signal of every log that holds it."""
-    return [
-        curve_of(log.run, log.name, signal, from_s, to_s)
-        for log, of_log in zip(shown, signals, strict=True)
-        if signal in of_log
-    ]
-
-
 def _figure(
     shown: Sequence[_Shown],
-    panels: Sequence[Sequence[PlottedSignal]],
-    curves: Sequence[Sequence[Sequence[LogCurve]]],
+    panels: Sequence[Sequence[LogCurve]],
     request: FigureRequest,
     window_s: tuple[float, float],
     made: Provenance,
@@ -125,8 +124,8 @@ def _figure(
             figure.suptitle(_title(shown, request, window_s), color=_INK, parse_math=False)
             foot = textwrap.fill(made.in_words(), int(request.width_mm / _FOOT_MM))
             figure.supxlabel(foot, fontsize=6, color="#808b96", x=0.01, ha="left", parse_math=False)
-        for number, (axes, panel, drawn) in enumerate(zip(every, panels, curves, strict=True)):
-            _panel(axes, shown, panel, drawn, window_s)
+        for number, (axes, curves) in enumerate(zip(every, panels, strict=True)):
+            _panel(axes, shown, curves, window_s)
             if len(shown) == 1:
                 _shade(axes, shown[0], window_s, named=number == 0)
             _legend(axes, request)
@@ -165,34 +164,25 @@ def _title(shown: Sequence[_Shown], request: FigureRequest, window_s: tuple[floa
     return "\n".join(lines)
 
 
-def _panel(
-    axes: Any,
-    shown: Sequence[_Shown],
-    panel: Sequence[PlottedSignal],
-    curves: Sequence[Sequence[LogCurve]],
-    window_s: tuple[float, float],
-) -> None:
-    names = {log.name: number for number, log in enumerate(shown)}
+def _panel(axes: Any, shown: Sequence[_Shown], curves: Sequence[LogCurve], window_s: tuple[float, float]) -> None:
+    names = [log.name for log in shown]
+    signals = list(dict.fromkeys(curve.signal for curve in curves))
+    first = signals[0]
     axes.margins(x=0)
     axes.spines[["top", "right"]].set_visible(False)
-    for number, same in enumerate(curves):
-        for curve in same:
-            whose = f", {_literal(curve.log)}" if len(shown) > 1 else ""
-            _draw(axes, curve, curve.signal.title + whose, names[curve.log] > 0, _ON_TOP - 0.1 * number)
-    for words, value in limits_of(shown[0].run, panel[0].axis):
-        axes.axhline(value * panel[0].factor, color=_SLIP, linewidth=0.6, linestyle="--", label=words)
-    if panel[0].name == "drive_force_N":
-        for log in shown:
-            _mark_slips(axes, log, window_s, second=names[log.name] > 0, several=len(shown) > 1)
-    axes.set_ylabel(panel[0].axis_title)
-    if panel[0].axis in {"velocity", "amplitude"} and axes.get_ylim()[1] > 0.0:
-        axes.set_ylim(bottom=min(_least(curves), 0.0) * panel[0].factor * 1.05)
-
-
-def _least(curves: Sequence[Sequence[LogCurve]]) -> float:
-    """Least value of all curves, in SI units; 0 without any."""
-    every = [curve.values.least[np.isfinite(curve.values.least)] for same in curves for curve in same]
-    return float(np.concatenate([*every, np.zeros(1)]).min())
+    for curve in curves:
+        whose = f", {_literal(curve.log)}" if len(shown) > 1 else ""
+        zorder = _ON_TOP - 0.1 * signals.index(curve.signal)
+        _draw(axes, curve, curve.signal.title + whose, names.index(curve.log) > 0, zorder)
+    for words, value in limits_of(shown[0].run, first.axis):
+        axes.axhline(value * first.factor, color=_SLIP, linewidth=0.6, linestyle="--", label=words)
+    if first.name == "drive_force_N":
+        for number, log in enumerate(shown):
+            _mark_slips(axes, log, window_s, second=number > 0, several=len(shown) > 1)
+    axes.set_ylabel(first.axis_title)
+    if first.axis in {"velocity", "amplitude"} and axes.get_ylim()[1] > 0.0:
+        least = [float(np.nanmin(curve.values.least, initial=0.0)) for curve in curves]
+        axes.set_ylim(bottom=min(least) * first.factor * 1.05)
 
 
 def _legend(axes: Any, request: FigureRequest) -> None:
@@ -266,9 +256,10 @@ def _shade(axes: Any, shown: _Shown, window_s: tuple[float, float], named: bool)
     for start, end in pairwise(edges):
         now = int(mode[start])
         if now in _SHADES and end > start:
-            label = _NAMES[now] if named and now not in labelled else None
+            colour, words = _SHADES[now]
+            label = words if named and now not in labelled else None
             labelled.add(now)
-            axes.axvspan(t_s[start], t_s[end], color=_SHADES[now], label=label, linewidth=0, zorder=0)
+            axes.axvspan(t_s[start], t_s[end], color=colour, label=label, linewidth=0, zorder=0)
 
 
 def _save(figure: Any, shown: Sequence[_Shown], out: Path, request: FigureRequest, made: Provenance) -> None:

@@ -1,4 +1,4 @@
-"""Drawable signals of a log: name, symbol, unit, topic."""
+"""Drawable signals of a log and of a running rig: name, symbol, unit, topic, panel. A new signal is a row of a table here."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -12,6 +12,24 @@ from bridge.log.metadata import is_number
 from cockpit.judge.setup import absent_channels
 
 
+class Panel(NamedTuple):
+    """Curves with one axis on the pages of `review` and `serve`."""
+
+    title: str
+    hint: str  # text above the curves
+    is_open: bool = True  # unfolded at first
+
+    @property
+    def signals(self) -> list["PlottedSignal"]:
+        """Its signals, in the order of `SIGNALS`."""
+        return [signal for signal in SIGNALS.values() if signal.panel == self]
+
+    def heading(self) -> dict[str, Any]:
+        """Titles of the panel and of its axis, for a page."""
+        first = self.signals[0]
+        return {"title": self.title, "hint": self.hint, "open": self.is_open, "unit": first.unit, "axis": first.axis}
+
+
 class PlottedSignal(NamedTuple):
     """One signal; logs contain SI units, and `factor` converts them to `unit`."""
 
@@ -23,6 +41,7 @@ class PlottedSignal(NamedTuple):
     factor: float
     unit: str
     colour: str
+    panel: Panel | None = None  # of the pages
     unknown: float | None = None  # value that means "not known"
 
     @property
@@ -33,6 +52,10 @@ class PlottedSignal(NamedTuple):
         base, _, index = self.symbol.partition("_")
         return f"${base}_{{\\mathrm{{{index}}}}}$, {self.words}" if index else f"${base}$, {self.words}"
 
+    def for_page(self) -> dict[str, Any]:
+        """Name, label and colour of the curve, for a page."""
+        return {"name": self.name, "symbol": self.symbol, "words": self.words, "colour": self.colour}
+
     @property
     def axis_title(self) -> str:
         """`velocity [mm/s]`."""
@@ -41,39 +64,70 @@ class PlottedSignal(NamedTuple):
 
 _INK, _RED, _BLUE, _GREEN, _GREY, _BROWN = "#1f2d3a", "#b5402a", "#2a6fb5", "#1e8449", "#808b96", "#9a6a1c"
 
+# fmt: off
+PANELS = (
+    Panel("Drive force",
+        "Rises while the slide sticks and falls when it slips (red triangle). Smooth sliding is a level line."),
+    Panel("Vibration against drive",
+        "Stick-slip ends where the vibration v_a is faster than the drive v_d: blue above red."),
+    Panel("Amplitude of the base against its stroke",
+        "Amplitude of the base, zero to peak. Dashed: its limit. A curve at the limit has no reserve."),
+    Panel("Predicted time to the next slip",
+        "Expected rest of a detected stick. No curve: the controller expects no slip."),
+    Panel("Positions", "The slide rests in a stick and jumps in a slip.", is_open=False),
+    Panel("Accelerations", "The base shows the vibration; the slide shows a peak at each slip.", is_open=False),
+    Panel("Frequency of the vibration", "As applied by the exciter.", is_open=False),
+)
+_FORCE, _SPEEDS, _STROKE, _TO_SLIP, _POSITIONS, _ACCEL, _FREQUENCY = PANELS
+
 SIGNALS = {
     signal.name: signal
     for signal in (
-        PlottedSignal("drive_force_N", "F_d", "drive force", "drive force", "sensors", 1.0, "N", _INK),
-        PlottedSignal("vibration_velocity_mps", "v_a", "vibration, measured", "velocity", "trace", 1e3, "mm/s", _BLUE),
-        PlottedSignal("drive_velocity_mps", "v_d", "drive, measured", "velocity", "trace", 1e3, "mm/s", _RED),
-        PlottedSignal("wanted_velocity_mps", "", "vibration, set point", "velocity", "trace", 1e3, "mm/s", _GREY),
-        PlottedSignal(
-            "sliding_velocity_mps", "v_s", "slide, mean over a window", "velocity", "trace", 1e3, "mm/s", _GREEN
-        ),
-        PlottedSignal(
-            "velocity_ratio", "", "v_a over v_d, measured", "v_a / v_d", "state", 1.0, "", _BLUE, unknown=0.0
-        ),
-        PlottedSignal("amplitude_m", "u_0", "amplitude of the base, applied", "amplitude", "applied", 1e9, "nm", _BLUE),
-        PlottedSignal("wanted_amplitude_m", "", "amplitude asked for", "amplitude", "trace", 1e9, "nm", _GREY),
-        PlottedSignal(
-            "frequency_Hz", "f", "frequency, applied", "frequency", "applied", 1.0, "Hz", _BROWN, unknown=0.0
-        ),
-        PlottedSignal(
-            "time_to_slip_s", "", "predicted time to slip", "time to slip", "trace", 1.0, "s", _BROWN, unknown=-1.0
-        ),
+        PlottedSignal("drive_force_N", "F_d", "drive force", "drive force", "sensors", 1.0, "N", _INK, _FORCE),
+        PlottedSignal("vibration_velocity_mps", "v_a", "vibration, measured", "velocity", "trace", 1e3, "mm/s", _BLUE, _SPEEDS),
+        PlottedSignal("drive_velocity_mps", "v_d", "drive, measured", "velocity", "trace", 1e3, "mm/s", _RED, _SPEEDS),
+        PlottedSignal("wanted_velocity_mps", "", "vibration, set point", "velocity", "trace", 1e3, "mm/s", _GREY, _SPEEDS),
+        PlottedSignal("sliding_velocity_mps", "v_s", "slide, mean over a window", "velocity", "trace", 1e3, "mm/s", _GREEN),
+        PlottedSignal("velocity_ratio", "", "v_a over v_d, measured", "v_a / v_d", "state", 1.0, "", _BLUE, unknown=0.0),
+        PlottedSignal("amplitude_m", "u_0", "amplitude of the base, applied", "amplitude", "applied", 1e9, "nm", _BLUE, _STROKE),
+        PlottedSignal("wanted_amplitude_m", "", "amplitude asked for", "amplitude", "trace", 1e9, "nm", _GREY, _STROKE),
+        PlottedSignal("frequency_Hz", "f", "frequency, applied", "frequency", "applied", 1.0, "Hz", _BROWN, _FREQUENCY,
+            unknown=0.0),
+        PlottedSignal("time_to_slip_s", "", "predicted time to slip", "time to slip", "trace", 1.0, "s", _BROWN, _TO_SLIP,
+            unknown=-1.0),
         PlottedSignal("score", "", "score of stick-slip, 0 to 1", "score", "trace", 1.0, "", _RED),
         PlottedSignal("force_rate", "s", "rate of the force, 1 when stuck", "force rate", "trace", 1.0, "", _INK),
-        PlottedSignal("mass_accel_mps2", "", "slide's acceleration", "acceleration", "sensors", 1.0, "m/s²", _GREEN),
-        PlottedSignal("base_accel_mps2", "", "base's acceleration", "acceleration", "sensors", 1.0, "m/s²", _BLUE),
-        PlottedSignal("mass_position_m", "x", "slide's position", "position", "sensors", 1e3, "mm", _GREEN),
-        PlottedSignal("drive_position_m", "s_d", "drive's position", "position", "sensors", 1e3, "mm", _RED),
-        PlottedSignal(
-            "round_trip_ns", "", "block out to command in", "round trip", "applied", 1e-3, "µs", _BROWN, unknown=0
-        ),
+        PlottedSignal("base_accel_mps2", "", "base's acceleration", "acceleration", "sensors", 1.0, "m/s²", _BLUE, _ACCEL),
+        PlottedSignal("mass_accel_mps2", "", "slide's acceleration", "acceleration", "sensors", 1.0, "m/s²", _GREEN, _ACCEL),
+        PlottedSignal("mass_position_m", "x", "slide's position", "position", "sensors", 1e3, "mm", _GREEN, _POSITIONS),
+        PlottedSignal("drive_position_m", "s_d", "drive's position", "position", "sensors", 1e3, "mm", _RED, _POSITIONS),
+        PlottedSignal("round_trip_ns", "", "block out to command in", "round trip", "applied", 1e-3, "µs", _BROWN, unknown=0),
         PlottedSignal("heat_share", "", "exciter's warmth, over the allowed", "warmth", "applied", 1e2, "%", _RED),
     )
 }
+# fmt: on
+
+
+class WordSignal(NamedTuple):
+    """A code of a log and of a running rig, shown as a word."""
+
+    title: str
+    column: str  # of `bridge.wire.words`
+    topic: str
+    field: str
+    is_band: bool = True  # drawn as a band over time
+
+
+WORD_SIGNALS = (
+    WordSignal("mode", "mode", "trace", "mode"),
+    WordSignal("contact", "state", "trace", "state"),
+    WordSignal("reason", "reason", "trace", "reason"),
+    WordSignal("limit", "limit", "trace", "limit"),
+    WordSignal("guard", "guard_state", "applied", "guard_state"),
+    WordSignal("cause", "cause", "applied", "cause", is_band=False),
+    WordSignal("held by", "cause", "applied", "guard_limit", is_band=False),
+)
+BANDS = [signal for signal in WORD_SIGNALS if signal.is_band]
 USUAL = ("drive_force_N", "vibration_velocity_mps", "drive_velocity_mps")  # default figure of a run
 _USUAL_OF_IMPORT = ("drive_force_N", "mass_position_m", "drive_position_m", "mass_accel_mps2", "base_accel_mps2")
 

@@ -9,6 +9,7 @@ from typing import Any
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from bridge.files import read_json, write_whole
+from bridge.provenance import file_sha256
 from diagnosis.evidence.manifest import MANIFEST, read_manifest
 from diagnosis.result import Diagnosis
 
@@ -27,11 +28,8 @@ def digest_of(folder: Path, tool: str, budget_s: float | None) -> str:
 
     The name of the folder and the times of its files are excluded. Raises Fault BAD_EVIDENCE, OSError.
     """
-    parts = [
-        tool,
-        str(budget_s),
-        *(_sha256(path) for path in evidence_files(folder)),
-    ]  # the manifest contains the names of the files
+    # the manifest contains the names of the files
+    parts = [tool, str(budget_s), *(file_sha256(path) for path in evidence_files(folder))]
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
@@ -40,7 +38,7 @@ def keep(fleet: Path, digest: str, diagnosis: Diagnosis, report: str) -> None:
     table = {
         "format": FORMAT,
         "report": report,
-        "report_sha256": _sha256(fleet / report),
+        "report_sha256": file_sha256(fleet / report),
         "diagnosis": _adapter().dump_python(diagnosis._replace(pictures=()), mode="json"),
     }
     write_whole(_place(fleet, digest), json.dumps(table) + "\n")  # keeps NaN and infinity, unlike strict JSON
@@ -50,7 +48,7 @@ def kept(fleet: Path, digest: str) -> tuple[Diagnosis, str] | None:
     """A result without its pictures, and the file of its report; None without an intact result."""
     try:
         table: dict[str, Any] = read_json(_place(fleet, digest))
-        if table["format"] != FORMAT or _sha256(fleet / table["report"]) != table["report_sha256"]:
+        if table["format"] != FORMAT or file_sha256(fleet / table["report"]) != table["report_sha256"]:
             return None
         return _adapter().validate_python(table["diagnosis"]), table["report"]
     except (OSError, ValueError, TypeError, KeyError, ValidationError):
@@ -59,11 +57,6 @@ def kept(fleet: Path, digest: str) -> tuple[Diagnosis, str] | None:
 
 def _place(fleet: Path, digest: str) -> Path:
     return fleet / RESULTS / f"{digest}.json"
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 @cache

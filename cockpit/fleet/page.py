@@ -3,9 +3,8 @@
 from pathlib import Path
 from urllib.parse import quote
 
-from jinja2 import Environment, StrictUndefined
-
 from bridge.files import write_whole
+from bridge.pages import filled_page
 from bridge.provenance import provenance
 from bridge.units import counted, interval, percent
 from cockpit.fleet.groups import Fleet, RigGroup
@@ -13,10 +12,11 @@ from cockpit.fleet.groups import Fleet, RigGroup
 
 def write_page(fleet: Fleet, path: Path) -> None:
     """Write the page. Raises Fault LOG_WRITE, OSError."""
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    template = Path(__file__).with_name("page.html.j2").read_text(encoding="utf-8")
     shared = [group for group in fleet.groups if group.kind != "no-gap"]
-    text = environment.from_string(template).render(
+    text = filled_page(
+        Path(__file__).with_name("page.html.j2"),
+        f"Fleet of {counted(fleet.folders, 'rig')}",
+        provenance().footer(),
         fleet=fleet,
         shared=shared,
         without=[rig for group in fleet.groups if group.kind == "no-gap" for rig in group.rigs],
@@ -27,7 +27,6 @@ def write_page(fleet: Fleet, path: Path) -> None:
         counted=counted,
         link=quote,
         most=max((group.helps for group in shared), default=0.0),
-        footer=provenance().footer(),
     )
     write_whole(path, text)
 

@@ -2,16 +2,16 @@
 
 import os
 import time
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Generator, Iterator
 from itertools import count
 from pathlib import Path
 
 from bridge.faults import Fault
-from bridge.files import write_json
+from bridge.results import write_json
 from cockpit.fleet.groups import Diagnosed, Failed, Fleet, fleet_of
 from cockpit.fleet.kept import digest_of, evidence_files, keep, kept
 from cockpit.fleet.page import write_page
-from cockpit.run.writable import writing
+from cockpit.run.writable import written
 from diagnosis.diagnose_many import EvidenceFolder, FolderResult
 from diagnosis.report.page import write_report
 from diagnosis.result import Diagnosis
@@ -58,7 +58,7 @@ class FleetFolder:
         name, diagnosis = outcome.source.name, outcome.diagnosis
         self._outcomes[name] = without_pictures(outcome)
         if diagnosis is not None:
-            self._refusable(lambda: self._write(outcome.source, diagnosis))
+            written(lambda: self._write(outcome.source, diagnosis), self.refused)
         self._index()
 
     def fleet(self) -> Fleet:
@@ -75,7 +75,7 @@ class FleetFolder:
 
     def _write(self, source: EvidenceFolder, diagnosis: Diagnosis) -> None:
         report = self._reports[source.name]
-        write_report(diagnosis, source.name, self._at / report, evidence_files(source.folder))
+        write_source_report(source, diagnosis, self._at / report)
         self._written[source.name] = report
         digest = self._digests[source.name]
         if digest and digest == self._digest(source):  # its files may have changed during the diagnosis
@@ -83,16 +83,8 @@ class FleetFolder:
 
     def _index(self) -> None:
         fleet = self.fleet()
-        self._refusable(lambda: write_json(self._at / INDEX_JSON, fleet))
-        self._refusable(lambda: write_page(fleet, self._at / INDEX))
-
-    def _refusable(self, write: Callable[[], None]) -> None:
-        try:
-            with writing():
-                write()
-        except Fault as fault:
-            if fault.line not in {refused.line for refused in self.refused}:  # the index is written many times
-                self.refused.append(fault)
+        written(lambda: write_json(self._at / INDEX_JSON, fleet), self.refused)
+        written(lambda: write_page(fleet, self._at / INDEX), self.refused)
 
     def _digest(self, source: EvidenceFolder) -> str:
         """Digest of the source; empty for unreadable evidence, whose diagnosis reports the reason."""
@@ -100,6 +92,11 @@ class FleetFolder:
             return digest_of(source.folder, self._tool, self._budget_s)
         except (Fault, OSError):
             return ""
+
+
+def write_source_report(source: EvidenceFolder, diagnosis: Diagnosis, path: Path) -> None:
+    """Write the report, with the files of the evidence listed at its end. Raises Fault BAD_EVIDENCE, OSError."""
+    write_report(diagnosis, source.name, path, evidence_files(source.folder))
 
 
 def with_estimate(outcomes: Iterator[FolderResult], left: int) -> Generator[tuple[FolderResult, str]]:

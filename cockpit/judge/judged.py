@@ -5,13 +5,15 @@ from pathlib import Path
 from typing import NamedTuple
 
 from bridge.faults import Fault
-from bridge.log.check.log_check import LogCheck, feed
+from bridge.log.check.log_check import LogCheck
+from bridge.log.finding import Finding
 from bridge.log.log_reader import LogReader
-from bridge.log.logfile import RunData, check_log_file
+from bridge.log.logfile import RunData, check_log_file, feed
+from bridge.results import in_json
 from cockpit.judge.run_judge import RunJudge
 from cockpit.judge.setup import is_known
 from cockpit.judge.verdict import RunVerdict
-from diagnosis.features.cycles import Cycles
+from diagnosis.slips import Cycles
 
 _PIECE_ROWS = 4096  # of a log in memory, per call of the judge
 
@@ -22,12 +24,18 @@ class Judged(NamedTuple):
     verdict: RunVerdict
     check: LogCheck  # the findings of `log check`
     judge: RunJudge
+    JSON_MERGED = "verdict"
+    JSON_HIDDEN = "check", "judge"
+
+    @in_json
+    def findings(self) -> list[Finding]:
+        """The findings of `log check`."""
+        return self.check.findings
 
 
 def judge_log(
     path: Path,
     progress: Callable[[float], None] | None = None,
-    margins: bool = False,
     stretch_from_s: float | None = None,
 ) -> Judged:
     """Judge and check a log in one pass, in constant memory. Raises Fault BAD_LOG.
@@ -35,18 +43,18 @@ def judge_log(
     Args:
         path: of the log.
         progress: called with the share of the log read so far, 0 to 1.
-        margins, stretch_from_s: as in `RunJudge`.
+        stretch_from_s: as in `RunJudge`.
 
     """
     check_log_file(path)
     reader = LogReader(path)
-    judge = RunJudge(path, reader.metadata, margins=margins, stretch_from_s=stretch_from_s)
-    chain = feed(reader, judge, progress)
+    judge = RunJudge(path, reader.metadata, stretch_from_s=stretch_from_s)
+    checksums = feed(reader, judge, progress)
     if not (reader.damage.closed or is_known(reader.metadata)):
         line = f"{path}: is cut after {reader.size_bytes} bytes, before the configuration of the controller: cannot be judged"
         raise Fault("BAD_LOG", f"{line}; `stickslip log check {path}` lists its messages; record the run again")
-    verdict = judge.result(reader.damage, chain, reader.foreign)
-    return Judged(verdict, judge.log.result(reader, chain), judge)
+    verdict = judge.result(reader.damage, checksums, reader.foreign)
+    return Judged(verdict, judge.log.result(reader, checksums), judge)
 
 
 def judge(path: Path) -> RunVerdict:
@@ -64,4 +72,4 @@ def judge_tables(run: RunData) -> tuple[RunVerdict, Cycles | None]:
         for name, table in tables.items():
             part = table[len(table) * piece // pieces : len(table) * (piece + 1) // pieces]
             judge.add(name, part, part["t_ns"])
-    return judge.result(run.damage, run.chain, run.foreign), judge.cycles
+    return judge.result(run.damage, run.checksums, run.foreign), judge.cycles

@@ -25,9 +25,7 @@ from cockpit.judge.window import HasMoved, Window
 
 _FOLLOWS = 0.5  # share of the drive's travel: a slide with more has ended its stick
 _AT_TURN_SIGMAS = 6.0  # of the drive's noise: within it the drive is at its turning point
-_CHANGE_S = (
-    0.25  # margin before the turn at the end of a window: the controller reports it up to 0.03 s earlier or later
-)
+_CHANGE_S = 0.25  # margin before the turn at the end of a window, as the report may be early or late
 _SEEN_SIGMAS = 10.0  # of the noise of both positions: travel of the drive over which its slide is judged
 
 
@@ -46,6 +44,7 @@ class Following(NamedTuple):
 class Reversal(NamedTuple):
     """One change of sign of the drive's velocity."""
 
+    reported_s: float  # by the controller, which is up to 0.03 s early or late
     t_s: float
     stick_s: float  # until the slide makes half of the drive's travel, at most to the end of the stroke
     quadrant_error_m: float  # 0 if the slide never follows
@@ -122,9 +121,7 @@ class MotionOf:
 
     def __init__(self) -> None:
         self._moved = HasMoved()
-        self._last: tuple[float, float, float, int] | None = (
-            None  # last block with a moving drive in the windows before
-        )
+        self._last: tuple[float, float, float, int] | None = None  # moving block, the last of the windows before
         self._until_s = -np.inf  # changes of direction are judged up to this time
 
     def __call__(self, window: Window, block_s: float) -> BlockMotion:
@@ -153,10 +150,7 @@ class MotionOf:
             columns = tuple(
                 np.concatenate([[value], column]) for value, column in zip(self._last, columns, strict=True)
             )
-        changed_s, reversals = _changes(*columns)
-        judged = [
-            reversal for at_s, reversal in zip(changed_s, reversals, strict=True) if self._until_s <= at_s < until_s
-        ]
+        judged = [each for each in reversals_of(*columns) if self._until_s <= each.reported_s < until_s]
         self._until_s = until_s
         moving = np.flatnonzero((direction != 0) & (t_s < until_s))
         if len(moving):
@@ -167,24 +161,17 @@ class MotionOf:
 
 def _paired(window: Window) -> tuple[npt.NDArray[np.int64], Any, Floats, Floats]:
     """Rows of the blocks with both positions and a step of the controller; these steps; the positions."""
-    blocks, trace = window.blocks, window.trace
-    rows = np.arange(len(blocks.sequence))
-    if len(rows) != len(trace) or not np.array_equal(blocks.sequence, trace["block"]):
-        _, rows, at_trace = np.intersect1d(blocks.sequence, trace["block"], return_indices=True)
-        trace = trace[at_trace]
+    blocks = window.blocks
+    _, rows, at_trace = np.intersect1d(blocks.sequence, window.trace["block"], return_indices=True)
     slide_m, drive_m = blocks.slide_m[rows].mean(axis=1), blocks.drive_m[rows].mean(axis=1)
     usable = np.isfinite(slide_m) & np.isfinite(drive_m)
-    if usable.all():
-        return rows, trace, slide_m, drive_m
-    return rows[usable], trace[usable], slide_m[usable], drive_m[usable]
+    return rows[usable], window.trace[at_trace[usable]], slide_m[usable], drive_m[usable]
 
 
 def _shaken(window: Window, rows: npt.NDArray[np.int64]) -> Bools:
     """Blocks with a moving exciter."""
-    numbers, applied = window.blocks.sequence[rows], window.applied
-    if np.array_equal(numbers, applied["sequence"]):
-        return applied["amplitude_m"] > 0.0
-    return np.isin(numbers, applied["sequence"][applied["amplitude_m"] > 0.0])
+    applied = window.applied
+    return np.isin(window.blocks.sequence[rows], applied["sequence"][applied["amplitude_m"] > 0.0])
 
 
 def reversals_of(t_s: Floats, slide_m: Floats, drive_m: Floats, direction: npt.NDArray[np.int64]) -> list[Reversal]:
@@ -195,17 +182,10 @@ def reversals_of(t_s: Floats, slide_m: Floats, drive_m: Floats, direction: npt.N
         direction: of the drive, 0 at rest; it may be late.
 
     """
-    return _changes(t_s, slide_m, drive_m, direction)[1]
-
-
-def _changes(
-    t_s: Floats, slide_m: Floats, drive_m: Floats, direction: npt.NDArray[np.int64]
-) -> tuple[list[float], list[Reversal]]:
-    """The reversals, and the time at which the controller reported each."""
     moving = np.flatnonzero(direction)
     at = np.flatnonzero(np.diff(direction[moving])) + 1
     if not len(at):
-        return [], []
+        return []
     changes, lasts = moving[at], moving[at - 1]  # first block with the new sign, last block with the old sign
     seen_m = _SEEN_SIGMAS * np.hypot(noise_of(slide_m), noise_of(drive_m))
     at_turn_m = _AT_TURN_SIGMAS * noise_of(drive_m)
@@ -214,16 +194,18 @@ def _changes(
         place_m = direction[change] * drive_m[begins[-1] : change + 1]
         begins.append(begins[-1] + int(np.flatnonzero(place_m <= place_m.min() + at_turn_m)[-1]))
     ends = [*np.minimum(begins[2:], lasts[1:] + 1), moving[-1] + 1]
-    changed = [
-        (float(t_s[change]), _reversal(t_s[begin:end], way * slide_m[begin:end], way * drive_m[begin:end], seen_m))
+    return [
+        Reversal(
+            float(t_s[change]),
+            *_stick(t_s[begin:end], way * slide_m[begin:end], way * drive_m[begin:end], seen_m),
+        )
         for change, begin, end, way in zip(changes, begins[1:], ends, direction[changes], strict=True)
         if end - begin > 1
     ]
-    return [at_s for at_s, _ in changed], [reversal for _, reversal in changed]
 
 
-def _reversal(t_s: Floats, slide_m: Floats, drive_m: Floats, seen_m: float) -> Reversal:
-    """Reversal at the begin of a stroke; both positions along the drive's direction."""
+def _stick(t_s: Floats, slide_m: Floats, drive_m: Floats, seen_m: float) -> tuple[float, float, float]:
+    """Begin and length of the stick after a turn, and quadrant error; both positions along the drive's direction."""
     back = (
         np.searchsorted(np.maximum.accumulate(drive_m), drive_m - seen_m, side="right") - 1
     )  # position `seen_m` earlier
@@ -232,8 +214,8 @@ def _reversal(t_s: Floats, slide_m: Floats, drive_m: Floats, seen_m: float) -> R
     way_m = drive_m[now] - drive_m[back[now]]
     follows = now[(way_m > 0.0) & (slide_m[now] - slide_m[back[now]] > _FOLLOWS * way_m)]
     if not len(follows):
-        return Reversal(float(t_s[0]), float(t_s[-1] - t_s[0]), 0.0)
+        return float(t_s[0]), float(t_s[-1] - t_s[0]), 0.0
     first = max(int(follows[0]) - 1, 1)
     error_m = drive_m - slide_m
     peak_m = error_m[: 2 * first + 1].max()
-    return Reversal(float(t_s[0]), float(t_s[first] - t_s[0]), max(float(peak_m - error_m[first:].mean()), 0.0))
+    return float(t_s[0]), float(t_s[first] - t_s[0]), max(float(peak_m - error_m[first:].mean()), 0.0)

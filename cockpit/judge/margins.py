@@ -13,9 +13,6 @@ from bridge.log.metadata import Metadata, configuration_of
 from bridge.log.watches.histogram import Histogram
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.judge.window import Window
-from controller.config import ControllerConfig
-from controller.loop_design import margins
-from controller.records import build
 
 _NEAR_LIMIT = 0.95
 
@@ -31,10 +28,6 @@ class Margins(NamedTuple):
     amplitude_m: float  # largest command
     amplitude_max_m: float  # its limit
 
-    def as_dict(self) -> dict[str, Any]:
-        """For `--json`."""
-        return self._asdict()
-
 
 class MarginSum:
     """Delivered share of the commands, and the largest command, window by window."""
@@ -49,15 +42,21 @@ class MarginSum:
         self._amplitude_m = max(self._amplitude_m, float(command["amplitude_m"].max(initial=0.0)))
         _, at_trace, at_command = np.intersect1d(window.trace["block"], command["block"], return_indices=True)
         trace, command = window.trace[at_trace], command[at_command]
-        excited = (trace["mode"] == wire.EXCITE) & (command["amplitude_m"] > 0.0)
-        commanded_mps = 2.0 * np.pi * command["frequency_Hz"][excited] * command["amplitude_m"][excited]
-        self._share.add(trace["vibration_velocity_mps"][excited] / commanded_mps)
+        commanded_mps = 2.0 * np.pi * command["frequency_Hz"] * command["amplitude_m"]
+        v_a_mps = trace["vibration_velocity_mps"]
+        excited = (trace["mode"] == wire.EXCITE) & (commanded_mps > 0.0) & np.isfinite(v_a_mps)
+        self._share.add(v_a_mps[excited] / commanded_mps[excited])
 
     def result(self, headers: Metadata, path: Path, loop_delay_s: float) -> Margins:
         """Margins from the configuration in the log, shares and stroke from its commands and measurements.
 
         Raises Fault BAD_LOG.
         """
+        # imported here: they load the design of the controller, which most verdicts do without
+        from controller.config import ControllerConfig
+        from controller.loop_design import margins
+        from controller.records import build
+
         controller, plant = (configuration_of(headers, role, path) for role in ("controller", "plant"))
         params: Any = build(ControllerConfig.model_validate(controller))[0][0]
         delay_blocks = round(loop_delay_s / params.block_s)

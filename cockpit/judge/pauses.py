@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.log.pause_events import RunPause
+from bridge.log.watches.event_watch import EventWatch
 from bridge.units import counted
 from bridge.wire import core_timer
 from cockpit.judge.watches import LatencyWatch
@@ -46,12 +47,13 @@ class CommandSum:
     A row has the number of commands before its block, the number of late ones, and the block answered by the newest command.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, events: EventWatch, block_s: float) -> None:
+        self._events, self._block_ns = events, block_s * 1e9
         self._newest: int | None = None  # block answered by the newest command so far
         self._inside = self._one_core = 0
 
-    def add(self, window: Window, block_ns: float, pauses: Sequence[RunPause], one_core: Sequence[RunPause]) -> None:
-        """Add the judged rows of a window, with the known stalls."""
+    def add(self, window: Window) -> None:
+        """Add the judged rows of a window, with the stalls known so far."""
         applied = window.applied[window.own(window.applied)]
         if not len(applied):
             return
@@ -62,13 +64,14 @@ class CommandSum:
         row, first = np.repeat(np.arange(len(applied)), late), np.repeat(np.cumsum(late) - late, late)
         # the oldest commands of a row are late; a stale command answers the newest block again
         block = np.minimum(before[row] + 1 + np.arange(len(row)) - first, newest[row])
-        due_ns, came_ns = np.round((block + 1) * block_ns), applied["t_ns"][row] + applied["late_ns"][row]
-        inside = _held_up(due_ns, came_ns, pauses)
+        due_ns, came_ns = np.round((block + 1) * self._block_ns), applied["t_ns"][row] + applied["late_ns"][row]
+        inside = _held_up(due_ns, came_ns, self._events.pauses)
         self._inside += int(np.count_nonzero(inside))
-        self._one_core += int(np.count_nonzero(_held_up(due_ns, came_ns, one_core) & ~inside))
+        self._one_core += int(np.count_nonzero(_held_up(due_ns, came_ns, self._events.core_pauses) & ~inside))
 
-    def result(self, latency: LatencyWatch, pauses: Sequence[RunPause], end_ns: int) -> Pauses:
+    def result(self, latency: LatencyWatch, end_ns: int) -> Pauses:
         """The sums, with the stalls of every core up to the end of the run."""
+        pauses = sorted(self._events.pauses)
         lengths_ms = [(pause.until_ns - pause.from_ns) * 1e-6 for pause in pauses if pause.from_ns < end_ns]
         outside = latency.late - self._inside
         return Pauses(
@@ -89,7 +92,7 @@ def _held_up(due_ns: Times, came_ns: Times, pauses: Sequence[RunPause]) -> npt.N
     """
     if not pauses or not len(due_ns):
         return np.zeros(len(due_ns), bool)
-    from_ns, until_ns = np.array(pauses, np.float64).T
+    from_ns, until_ns = np.array(sorted(pauses), np.float64).T
     until_ns = np.maximum.accumulate(until_ns)  # stalls of two cores may overlap
     from_ns = np.maximum(from_ns, np.concatenate([from_ns[:1], until_ns[:-1]]))
     edges_ns = np.column_stack([from_ns, np.maximum(from_ns, until_ns)]).ravel()
@@ -101,15 +104,16 @@ def _held_up(due_ns: Times, came_ns: Times, pauses: Sequence[RunPause]) -> npt.N
 class StallSum:
     """Stalls of cores, plant and controller; overlapping stalls count once."""
 
-    def __init__(self) -> None:
+    def __init__(self, events: EventWatch) -> None:
+        self._events = events
         self._stalls = 0
         self._until_ns = np.iinfo(np.int64).min  # end of the latest stall
         self._longest = (0, 0, "")  # length [ns], begin [ns], whose
 
-    def add(self, window: Window, pauses: Sequence[RunPause]) -> None:
+    def add(self, window: Window) -> None:
         """Add the judged stalls of a window."""
         from_ns, until_ns = window.own_ns
-        seen = [("every core", *pause) for pause in pauses if from_ns <= pause.from_ns < until_ns]
+        seen = [("every core", *pause) for pause in self._events.pauses if from_ns <= pause.from_ns < until_ns]
         for whose, rows, name in (("plant", window.applied, "late_ns"), ("controller", window.trace, "lateness_ns")):
             judged = rows[window.own(rows)]
             if len(judged):

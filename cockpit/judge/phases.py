@@ -6,9 +6,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bridge.arrays import Floats
+from bridge.log.in_charge import GONE_S, ChargeWatch
 from cockpit.judge.machine_terms import BlockMotion, Following, FollowingSum
+from cockpit.judge.setup import SETTLING_S, Setup
 from cockpit.judge.slips import Forces
 from cockpit.judge.strokes import Swing
+from cockpit.judge.watches import StepWatch
 
 Stretches = list[tuple[float, float]]
 
@@ -29,10 +32,6 @@ class Phase(NamedTuple):
     mean_force_N: float
     following: Following | None  # None without motion of the drive or without a measured position
     vibration_dose_mm2_per_s: float  # integral of v_a^2
-
-    def as_dict(self) -> dict[str, Any]:
-        """For `--json`."""
-        return self._asdict() | {"following": self.following and self.following._asdict()}
 
 
 class PhaseSum:
@@ -96,6 +95,43 @@ class PhaseSum:
         )
 
 
+class Interruptions:
+    """Stretches in which the controller was stopped, not armed, late or absent; of the part of the log read so far."""
+
+    def __init__(self, setup: Setup, charge: ChargeWatch, steps: StepWatch) -> None:
+        self._setup, self._charge, self._steps = setup, charge, steps
+
+    def stops(self, is_last: bool) -> Stretches:
+        """Stops, each with its settling second."""
+        return self._steps.stops(self._setup.block_s, is_last)
+
+    def fallbacks(self) -> Stretches:
+        """Stretches without a fresh command; infinite end if still open."""
+        since_s = self._charge.open_from_s
+        return [*self._charge.stretches, *([(since_s, np.inf)] if since_s is not None else [])]
+
+    def gone(self) -> Stretches:
+        """Fallbacks too long for a stall."""
+        return [stretch for stretch in self.fallbacks() if stretch[1] - stretch[0] > GONE_S]
+
+    def stalls(self) -> Stretches:
+        """All others after the settling of the controller, each with its settling second."""
+        settled_s = self._setup.settled_from_s
+        short = [
+            (max(from_s, settled_s), until_s) for from_s, until_s in self.fallbacks() if until_s - from_s <= GONE_S
+        ]
+        return settling([*short, *(stretch for stretch in self._steps.stale if stretch[0] > settled_s)])
+
+    def all(self, is_last: bool) -> Stretches:
+        """Stretches excluded from the judgement of the controller, each with its settling second."""
+        return [*self.stops(is_last), *settling([*self.fallbacks(), *self._steps.stale])]
+
+
+def settling(stretches: Iterable[tuple[float, float]]) -> Stretches:
+    """Stretches, each with the settling second after it."""
+    return [(from_s, until_s + SETTLING_S) for from_s, until_s in stretches]
+
+
 def within(at_s: Floats, stretches: Iterable[tuple[float, float]]) -> Any:
     """True for times inside any of the stretches."""
     inside = np.zeros(len(at_s), bool)
@@ -106,25 +142,6 @@ def within(at_s: Floats, stretches: Iterable[tuple[float, float]]) -> Any:
         if first_s < high_s and last_s >= low_s:
             inside |= (at_s > first_s) & (at_s <= last_s)
     return inside
-
-
-def together(phases: Iterable[Phase | None]) -> Phase | None:
-    """Several stretches merged into one, with the following of the longest. None without any."""
-    given = [phase for phase in phases if phase is not None]
-    if not given:
-        return None
-    seconds, slips = sum(phase.seconds for phase in given), sum(phase.slips for phase in given)
-    widest = max(given, key=lambda phase: phase.swing_N)
-    return Phase(
-        seconds=seconds,
-        slips=slips,
-        slips_per_min=60.0 * slips / seconds,
-        swing_N=widest.swing_N,
-        strokes=widest.strokes,
-        mean_force_N=sum(phase.mean_force_N * phase.seconds for phase in given) / seconds,
-        following=max(given, key=lambda phase: phase.seconds).following,
-        vibration_dose_mm2_per_s=sum(phase.vibration_dose_mm2_per_s for phase in given),
-    )
 
 
 def apart(whole: tuple[float, float], without: Stretches) -> Stretches:

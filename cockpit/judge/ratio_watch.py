@@ -15,10 +15,10 @@ from bridge.arrays import Bools, Floats
 from bridge.log.in_charge import NO_COMMAND
 from bridge.log.watches.arrays import Longest
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import GAP, LATE, STALE
 from cockpit.judge.setup import SETTLING_S, Setup
 from cockpit.judge.watches import STANDSTILL_MPS
 from cockpit.judge.window import Rows, Window
-from controller.codes import GAP, LATE, STALE
 
 ALARM_RATIO = 1.05
 # Limit of v_a / v_d in set points, and of the time above it without a break. In a sound run a rising set point or a resonance of

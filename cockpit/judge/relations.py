@@ -12,7 +12,7 @@ import numpy as np
 from bridge.arrays import Bools, Floats
 from bridge.log.watches.arrays import noise_of
 from bridge.wire import stickslip_pb2 as wire
-from cockpit.judge.described import Described
+from cockpit.judge.setup import Described
 from cockpit.judge.window import Rows, Window, means
 
 # Force and spring are compared about their means in this many parts of a second, which removes drift, zeros and scales of both

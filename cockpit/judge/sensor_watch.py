@@ -4,17 +4,17 @@ Only the list of slip times grows with the run. A check without signals to compa
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from bridge.arrays import Floats
 from bridge.log.check.channel import FEW_AT_END, channel_findings
 from bridge.log.check.log_check import LogWatch
-from bridge.wire.messages import CHANNELS
-from cockpit.judge.described import Described
+from bridge.wire.channels import CHANNELS
 from cockpit.judge.phases import Stretches, within
 from cockpit.judge.relations import ChannelRelations, Doubt
+from cockpit.judge.setup import Described
 from cockpit.judge.slips import Forces
 from cockpit.judge.watches import FrozenWatch
 from cockpit.judge.window import Window
@@ -34,10 +34,6 @@ class SensorVerdict(NamedTuple):
     by_position: int | None  # None if the positions cannot show a slip
     by_trace: int
     surges: int  # of `by_trace`
-
-    def as_dict(self) -> dict[str, Any]:
-        """For `--json`."""
-        return self._asdict() | {"findings": [finding._asdict() for finding in self.findings]}
 
 
 class SensorWatch:
@@ -78,9 +74,8 @@ class SensorWatch:
             text = "{force} by drive_force_N, {position} by the positions and {slips} by the controller"
             text = f"slips with the controller in charge: {text.format(**inside)}; in the whole log: {text.format(**whole)}"
             findings.append(Doubt("SLIPS_DISAGREE", text, True))
-        fall_N = 2.0 * of.drop_N
-        if of.uses_force and of.slip_m > 0.0 and fall_N < self._least_N < math.inf:
-            text = f"drive_force_N shows only falls above {self._least_N:.3g} N, and a slip is {fall_N:.3g} N: use less noise"
+        if of.uses_force and of.slip_m > 0.0 and of.fall_N < self._least_N < math.inf:
+            text = f"drive_force_N shows only falls above {self._least_N:.3g} N, and a slip is {of.fall_N:.3g} N: use less noise"
             findings.append(Doubt("SENSOR_NOISE", text, True))
         by_position = inside["position"] if self._least_m < of.slip_m or whole["position"] else None
         by_trace = inside["slips"] + inside["surges"]

@@ -1,12 +1,19 @@
-"""Numbers of the configurations in the log that the judge needs before the first block."""
+"""Numbers of the configurations in the log that the judge needs. On a foreign rig any number may be missing."""
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from bridge.log.check.channel import ChannelLimits, channels_of
 from bridge.log.metadata import Metadata, configuration_of, is_number, number_of, source_of_import, texts_of
 
 SETTLING_S = 1.0  # settling time after the controller is enabled, stopped or absent
+# Largest difference of force and spring, as a share of the larger. Smaller: a described stiffness that is 30 % wrong is doubted.
+# Larger: a force sensor of half or twice the scale, 0.5, passes. With effects that bend the relation, and for a rig without a
+# description, whose configured stiffness may be 10 times wrong, only the sign counts.
+_APART, _APART_SIGN = 0.4, 1.05
+_BENT = {"drive-hardening", "frame-compliance", "drive-damping", "force-sensor-lag", "drive-backlash"}
 
 
 class Setup(NamedTuple):
@@ -27,6 +34,23 @@ class Setup(NamedTuple):
         return settled_from_s(self.enabled_from_s)
 
 
+class Described(NamedTuple):
+    """Description of a rig and its controller; NaN for unknown numbers."""
+
+    channels: dict[str, ChannelLimits]
+    stiffness_N_per_m: (
+        float  # of the drive, in readings of the force sensor; without a rig, from the controller's configuration
+    )
+    apart: float  # allowed difference of force and spring, as a share
+    fall_N: float  # of the force in a slip, 2 (F_s - F_c)
+    slip_m: float  # length of a slip, 2 (F_s - F_c) / k_d
+    mass_kg: float  # of the slide
+    contact_per_s2: float  # stiffness of the contact over the mass
+    uses_force: bool  # the verdict depends on the force: the controller uses it, or the rig is described
+    uses_slide: bool
+    accel_bandwidth_Hz: float  # for which the controller corrects v_a; infinite if unknown
+
+
 def settled_from_s(enabled_from_s: float) -> float:
     """Start of the judged time of a controller enabled at `enabled_from_s`."""
     return enabled_from_s + SETTLING_S if enabled_from_s > 0 else 0.0
@@ -40,21 +64,28 @@ def is_known(headers: Metadata) -> bool:
 def setup_of(headers: Metadata, path: Path, period_ns: float) -> Setup:
     """Setup of a log; `period_ns`: block period without a controller. Raises Fault BAD_LOG."""
     absent = absent_channels(headers, path)
-    plant = configuration_of(headers, "plant", path) if "plant" in headers else {}
+    plant = plant_of(headers, path)
+    mass_kg, stiffness = _number(plant, "rig.slide.mass_kg"), _number(plant, "rig.drive.stiffness_N_per_m")
+    # 1.6 times the slip of the slide on its spring
+    fall_s = max(0.1, 3.0 * math.sqrt(mass_kg / stiffness)) if mass_kg > 0.0 and stiffness > 0.0 else 0.1
     if source := source_of_import(headers, path):
-        return Setup(source, period_ns * 1e-9, math.inf, _slowest_fall_s(plant), absent, True, math.inf, 0.0)
+        return Setup(source, period_ns * 1e-9, math.inf, fall_s, absent, True, math.inf, 0.0)
     controller = configuration_of(headers, "controller", path)
-    v_ratio = controller.get("limits", {}).get("v_ratio")
     return Setup(
         imported="",
         block_s=number_of(controller, "block_s", path),
         enabled_from_s=number_of(controller, "policy.enabled_from_s", path),
-        slowest_fall_s=_slowest_fall_s(plant),
+        slowest_fall_s=fall_s,
         absent=absent,
-        known_gain=bool(controller.get("amplitude", {}).get("known_gain")),
-        v_ratio=v_ratio if is_number(v_ratio) else math.inf,
-        duration_s=plant["duration_s"] if is_number(plant.get("duration_s")) else 0.0,
+        known_gain=bool(_at(controller, "amplitude.known_gain")),
+        v_ratio=_number(controller, "limits.v_ratio", math.inf),
+        duration_s=_number(plant, "duration_s", 0.0),
     )
+
+
+def plant_of(headers: Metadata, path: Path) -> Any:
+    """Configuration of the plant in a log; empty for a log without one. Raises Fault BAD_LOG."""
+    return configuration_of(headers, "plant", path) if "plant" in headers else {}
 
 
 def absent_channels(headers: Metadata, path: Path) -> list[str]:
@@ -62,10 +93,42 @@ def absent_channels(headers: Metadata, path: Path) -> list[str]:
     return texts_of(headers, "import", "missing", path)
 
 
-def _slowest_fall_s(plant: Any) -> float:
-    """Longest duration of a slip: 1.6 times the slip of the plant's slide on its spring, at least 0.1 s."""
-    rig = plant.get("rig")
-    try:
-        return max(0.1, 3.0 * math.sqrt(rig["slide"]["mass_kg"] / rig["drive"]["stiffness_N_per_m"]))
-    except (KeyError, TypeError, ValueError, ArithmeticError):  # missing for a foreign rig
-        return 0.1
+def described(plant: Mapping[str, Any], controller: Mapping[str, Any]) -> Described:
+    """Description from the configurations in a log; empty for a missing one."""
+
+    def rig(path: str, otherwise: float = math.nan) -> float:
+        return _number(plant, f"rig.{path}", otherwise)
+
+    def grown(effect: str) -> float:
+        return 1.0 + rig(f"effects.{effect}.ratio", 0.0)
+
+    effects = _at(plant, "rig.effects")
+    names = effects.keys() if isinstance(effects, Mapping) else set[str]()
+    gain = rig("sensors.force_gain", 1.0) * grown("force-sensor-gain")
+    k_d = rig("drive.stiffness_N_per_m") * gain * grown("drive-stiffness")
+    static_N = rig("contact.static_force_N") * grown("static-level")
+    fall_N = 2.0 * (static_N - rig("contact.coulomb_force_N") * grown("coulomb-level")) * gain
+    mass_kg = rig("slide.mass_kg") or math.nan
+    return Described(
+        channels=channels_of(plant),
+        stiffness_N_per_m=k_d if k_d > 0.0 else _number(controller, "drive_stiffness_N_per_m"),
+        apart=_APART if k_d > 0.0 and not _BENT & names else _APART_SIGN,
+        fall_N=fall_N,
+        slip_m=fall_N / k_d if k_d > 0.0 else math.nan,
+        mass_kg=mass_kg,
+        contact_per_s2=rig("contact.stiffness_N_per_m") / mass_kg,
+        uses_force=k_d > 0.0 or _at(controller, "estimator.use_force") is not False,
+        uses_slide=k_d > 0.0 or _at(controller, "estimator.use_slide_position") is not False,
+        accel_bandwidth_Hz=_number(controller, "amplitude.accel_bandwidth_Hz", math.inf),
+    )
+
+
+def _number(table: Any, path: str, otherwise: float = math.nan) -> float:
+    value = _at(table, path)
+    return float(value) if is_number(value) else otherwise
+
+
+def _at(table: Any, path: str) -> Any:
+    for name in path.split("."):
+        table = table.get(name) if isinstance(table, Mapping) else None
+    return table

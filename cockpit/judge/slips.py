@@ -20,7 +20,7 @@ from bridge.arrays import Floats
 from cockpit.judge.setup import Setup
 from cockpit.judge.strokes import DriveStroke, steady_parts, strokes_of
 from cockpit.judge.window import HasMoved, Window
-from diagnosis.features.cycles import Cycles, find_cycles, smallest_drop_N
+from diagnosis.slips import Cycles, find_cycles, joined, smallest_drop_N, steep_part
 
 BIN_S = 1e-3  # of the means in which slips are searched
 # Before and after a fall: the drive velocity is taken in these times, and no block may be missing in them.
@@ -28,7 +28,6 @@ _BESIDE_S = 0.02
 _STOPS = 0.5  # share of the drive velocity before the fall
 # Mean velocity of the slide over the drive from 10 to 90 % of a fall: a sine with the peak of a slip, 1.5 v_d.
 _RUNS_AHEAD = 1.4
-_NONE = Cycles(*(np.empty(0) for _ in Cycles._fields))
 
 
 class Forces(NamedTuple):
@@ -62,7 +61,7 @@ def forces_of(window: Window, setup: Setup, moved: HasMoved) -> Forces:
         nothing = np.empty(0)
         none = np.empty(0, np.int64)
         return Forces(
-            _NONE, np.empty(0, bool), nothing, nothing, none, none, window.end, False, window.stroke,
+            joined([]), np.empty(0, bool), nothing, nothing, none, none, window.end, False, window.stroke,
             math.inf, nothing, math.inf,
         )  # fmt: skip
     blocks = blocks.part(usable) if len(usable) < len(finite) else blocks
@@ -101,7 +100,7 @@ def forces_of(window: Window, setup: Setup, moved: HasMoved) -> Forces:
             falls = find_cycles(t_s, drive - slide, least_m, setup.slowest_fall_s)
             places = _Stroke(t_s, drive - slide, drive, slide)
             by_position_s.append(_slips_among(falls, limits_s, places, bin_s).breakaway_t_s)
-    cycles = Cycles(*(np.concatenate(parts) for parts in zip(*slips, strict=True))) if slips else _NONE
+    cycles = joined(slips)
     mine = slice(first, int(np.searchsorted(usable, end)))
     steps = np.diff(blocks.sequence, prepend=blocks.sequence[:1] - 1) - 1
     goes_on = (i for i, stroke in enumerate(strokes) if usable[begins + stroke.end - 1] >= end)
@@ -158,8 +157,7 @@ def _place_m(means_m: Floats, name: str, setup: Setup, moved: HasMoved) -> Float
     known = np.isfinite(place_m)
     if not moved(name, place_m) or name in setup.absent or not known.any():
         return np.full(len(place_m), np.nan)
-    at = np.flatnonzero(known)
-    return place_m if len(at) == len(place_m) else np.interp(np.arange(len(place_m)), at, place_m[at])
+    return np.interp(np.arange(len(place_m)), np.flatnonzero(known), place_m[known])
 
 
 def _signed(cycles: Cycles, way: int) -> Cycles:
@@ -176,22 +174,12 @@ def _slips_among(falls: Cycles, limits_s: Sequence[float], stroke: _Stroke, bin_
     slips = np.array(
         [is_judged and _is_slip(stroke, a, b, bin_s) for a, b, is_judged in zip(first, last, judged, strict=True)], bool
     )
-    stick = slips[: len(falls.restick_t_s)]
-    return Cycles(
-        falls.breakaway_t_s[slips],
-        falls.breakaway_force_N[slips],
-        falls.restick_t_s[stick],
-        falls.restick_force_N[stick],
-    )
+    return falls.kept(slips)
 
 
 def _is_slip(stroke: _Stroke, first: int, last: int, bin_s: float) -> bool:
     """True if the slide outruns the drive in the fall between two bins; without its position: if the drive goes on."""
-    force_N = stroke.force_N[first : last + 1]
-    force_N = force_N[: int(force_N.argmin()) + 1]
-    drop_N = float(force_N[0] - force_N[-1])
-    begin = first + int(np.flatnonzero(force_N >= force_N[0] - 0.1 * drop_N)[-1])
-    end = first + int(np.flatnonzero(force_N <= force_N[0] - 0.9 * drop_N)[0])
+    begin, end = steep_part(stroke.force_N, first, last)
     beside = max(end - begin, math.ceil(_BESIDE_S / bin_s))
     before, after = max(begin - beside, 0), min(end + beside, len(stroke.t_s) - 1)
     if not before < begin < end < after:

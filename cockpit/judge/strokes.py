@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from bridge.arrays import Floats
 from bridge.log.watches.arrays import median, noise_of
-from diagnosis.look.turns import turns
+from diagnosis.slips import turning_points
 
 _SHORTEST_STROKE = 1e-3  # of the whole travel of the drive: a few steps of its encoder
 _TURN_SIGMAS = 10.0  # of the noise of the drive position: shortest stroke
@@ -32,9 +32,7 @@ def strokes_of(drive_m: Floats) -> list[DriveStroke]:
     if np.isnan(drive_m).any():
         return [DriveStroke(0, count, 1)]
     shortest_m = max(_SHORTEST_STROKE * float(np.ptp(drive_m)), _TURN_SIGMAS * float(noise_of(drive_m)))
-    at = [0] * count
-    turned = turns(drive_m.tolist(), shortest_m, at)
-    limits = [0, *at[:turned], count]
+    limits = [0, *turning_points(drive_m, shortest_m).tolist(), count]
     return [
         DriveStroke(first, end, (-1) ** i) for i, (first, end) in enumerate(itertools.pairwise(limits)) if end > first
     ]

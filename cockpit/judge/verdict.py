@@ -1,10 +1,11 @@
 """Figures of a run, and the verdict on its control: ok, not ok or not judged."""
 
-from typing import Any, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 from bridge.faults import FAULTS
 from bridge.log.in_charge import WEAK_S, InCharge
-from bridge.log.storage.chain import HashChain
+from bridge.log.storage.checksums import Checksums
+from bridge.results import in_json
 from bridge.units import counted
 from bridge.wire.event_codes import EVENTS, TESTS, TRIPS, harms
 from cockpit.judge.pauses import Computer, Pauses
@@ -13,7 +14,10 @@ from cockpit.judge.ratio_watch import RatioVerdict
 from cockpit.judge.sensor_watch import SensorVerdict
 from cockpit.judge.watches import Latency
 
-OK, NOT_OK, NOT_JUDGED = "ok", "not ok", "not judged"
+OK: Final = "ok"
+NOT_OK: Final = "not ok"
+NOT_JUDGED: Final = "not judged"
+Control = Literal["ok", "not ok", "not judged"]
 # Allowed share of missing blocks in the judged time. Larger: slips hide in a gap. Smaller: one stall of the recorder, 80 ms in
 # 8 s, leaves a run without a verdict.
 MISSING_SHARE = 0.01
@@ -59,19 +63,33 @@ class RunVerdict(NamedTuple):
     not_watched: str  # reason for which stalls are unknown; else empty
     faults: list[str]  # harmful events and findings
     told: list[str]  # other events
-    chain: HashChain
+    checksums: Checksums
     normal_scheduling: list[str]  # processes without a real-time priority; irrelevant in lockstep
     untested: str  # reason for which nothing was tested; empty if the drive moved under control
     doubts: list[str]  # reasons against a verdict although something was tested
     imported: str  # source file of an imported log; empty for a run
     gain_verified: bool  # gain of the exciter: by a loop check, or by the configuration
 
-    @property
-    def control(self) -> str:
+    @in_json
+    def headline(self) -> str:
+        """The answer in one line; for a cut log preceded by its end."""
+        from cockpit.judge.verdict_words import headline
+
+        return headline(self)
+
+    @in_json
+    def data(self) -> str:
+        """Losses of the log, and doubts about the sensors, in words."""
+        from cockpit.judge.verdict_words import data_in_words
+
+        return data_in_words(self)
+
+    @in_json
+    def control(self) -> Control:
         """Verdict on the controller: OK, NOT_OK or NOT_JUDGED."""
         return self._judged()[0]
 
-    @property
+    @in_json
     def reason(self) -> str:
         """Reason for NOT_OK or NOT_JUDGED; empty for OK."""
         return self._judged()[1]
@@ -82,24 +100,24 @@ class RunVerdict(NamedTuple):
         ends = f"the log ends at {self.seconds:.2f} s, the run was to end at {self.planned_s:.2f} s"
         return ends if self.planned_s and self.blocks else ""
 
-    @property
+    @in_json
     def good(self) -> bool:
         """True if control is OK; for an imported log, without a controller, if it is complete."""
         if self.imported:
             return self.lost_blocks == 0 and not self.faults
         return self.control == OK
 
-    @property
+    @in_json
     def trips(self) -> list[str]:
         """Trips of the rig's guard, and doubts of the controller about a sensor or the exciter."""
         return [fault for fault in (*self.faults, *self.told) if _code(fault) in _TRIPS]
 
-    @property
+    @in_json
     def injected(self) -> list[str]:
         """Faults injected by a scenario or an operator."""
         return [line for line in self.told if _code(line) in TESTS]
 
-    @property
+    @in_json
     def warnings(self) -> list[str]:
         """All other events and findings."""
         apart = {*self.trips, *self.injected}
@@ -125,7 +143,7 @@ class RunVerdict(NamedTuple):
         losses += [counted(number, *names) for number, *names in counts if number]
         return [*losses, *([] if self.all_losses_known else ["the number of lost messages is unknown"])]
 
-    def _judged(self) -> tuple[str, str]:
+    def _judged(self) -> tuple[Control, str]:
         if self.imported:
             return NOT_JUDGED, self.untested
         wrong = self._who_failed()
@@ -136,14 +154,10 @@ class RunVerdict(NamedTuple):
             wrong += self._figures_that_fail()
         if wrong:
             return NOT_OK, "; ".join(wrong)
-        unsure = (
-            [f"blocks are missing within {counted(self.unsure_slips, 'slip')}, which may be none"]
-            if self.unsure_slips
-            else []
-        )
-        cut = [f"{self.cut}; record the run again"] if self.cut else []
-        absent = [f"no message of /{name} is in the log" for name in self.absent]
-        doubts = [*cut, *blind, *absent, *self.doubts, *unsure]
+        doubts = [f"{self.cut}; record the run again"] if self.cut else []
+        doubts += [*blind, *(f"no message of /{name} is in the log" for name in self.absent), *self.doubts]
+        if self.unsure_slips:
+            doubts.append(f"blocks are missing within {counted(self.unsure_slips, 'slip')}, which may be none")
         return (NOT_JUDGED, "; ".join(doubts)) if doubts else (OK, "")
 
     @property
@@ -169,19 +183,6 @@ class RunVerdict(NamedTuple):
         if self.ratio is not None and not self.ratio.ok:
             wrong.append(f"v_a/v_d {self.ratio.in_words()}")
         return wrong
-
-    def as_dict(self) -> dict[str, Any]:
-        """For `--json`."""
-        from cockpit.judge.verdict_words import data_in_words, headline
-
-        table: dict[str, Any] = self._asdict() | {"good": self.good, "chain": self.chain.as_dict()}
-        for name in ("before", "taking_over", "after", "alone"):
-            table[name] = table[name] and table[name].as_dict()
-        for name in ("charge", "latency", "pauses", "computer", "ratio"):
-            table[name] = table[name] and table[name]._asdict()
-        table["sensors"] = self.sensors and self.sensors.as_dict()
-        more = {"headline": headline(self), "control": self.control, "reason": self.reason, "data": data_in_words(self)}
-        return table | more | {"trips": self.trips, "injected": self.injected, "warnings": self.warnings}
 
 
 def _code(line: str) -> str:

@@ -3,7 +3,8 @@
 import math
 from typing import Any
 
-from bridge.log.storage.chain import chain_in_words
+from bridge.log.storage.checksums import checksums_in_words
+from bridge.results import strict_json
 from bridge.units import counted
 from bridge.wire import realtime
 from cockpit.judge.machine_terms import Following
@@ -11,7 +12,6 @@ from cockpit.judge.pauses import computer_in_words, pauses_in_words
 from cockpit.judge.phases import Phase
 from cockpit.judge.verdict import NOT_JUDGED, NOT_OK, OK, RunVerdict
 
-VERDICT = "verdict"  # metadata record written by `stickslip run`
 _MOST_WARNINGS = 3  # in the short form; more would scroll the six lines off the screen
 _FADE_S = 0.2  # of the vibration at the end of a run
 
@@ -94,7 +94,7 @@ def _figures(verdict: RunVerdict) -> list[str]:
     lines.extend(f"trip     {line}" for line in v.trips)
     lines.extend(f"injected {line}" for line in v.injected)
     lines.extend(f"warning  {line}" for line in v.warnings)
-    lines.append(chain_in_words(v.chain))
+    lines.append(checksums_in_words(v.checksums))
     lines.append(f"log      {v.log}")
     return lines
 
@@ -183,9 +183,10 @@ def _um(size_m: float) -> str:
 
 
 def noted(verdict: RunVerdict) -> dict[str, Any]:
-    """Fields of the table `verdict` in a log."""
-    apart = "log", "chain", "good", "headline"  # the first two change when the file is moved or rewritten
-    figures = {name: value for name, value in verdict.as_dict().items() if name not in apart}
+    """Fields of the verdict file of a log."""
+    # the name of the log may change, and the file names the digest itself
+    apart = "log", "checksums", "good", "headline"
+    figures = {name: value for name, value in strict_json(verdict).items() if name not in apart}
     return {"good": verdict.good, "headline": headline(verdict), "figures": figures}
 
 

@@ -1,4 +1,4 @@
-"""Latency, repeated blocks and steps of the controller, message by message in constant memory."""
+"""Repeated blocks, latency, state of the rig, and steps of the controller, message by message in constant memory."""
 
 from typing import NamedTuple
 
@@ -7,16 +7,12 @@ import numpy.typing as npt
 
 from bridge.log.watches.arrays import Longest, steps
 from bridge.log.watches.histogram import Histogram
-from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import CHANNELS, Records
+from bridge.wire.channels import CHANNELS
+from bridge.wire.messages import STALE, Records
 from cockpit.judge.setup import SETTLING_S
-from controller.codes import STALE
 
 STANDSTILL_MPS = 2e-5  # default of the controller
-# A turning drive rests for a moment and may slip: 17 times in an hour of the belt axis, with 718 turns.
-# Smaller: these count as slips with a dead transducer. Larger: a transducer at the end of its range is found later.
-_TURN_S = 0.2
 
 
 class Latency(NamedTuple):
@@ -36,7 +32,7 @@ class LatencyWatch:
         self.late = 0  # commands later than 1 ms
         self.blocks = self.commands = 0
 
-    def applied(self, records: Records) -> None:
+    def add(self, records: Records) -> None:
         """Add rows of the rig, [blocks]."""
         self.blocks += len(records)
         self.commands += int(records["commands"].sum())
@@ -54,6 +50,32 @@ class LatencyWatch:
         return Latency(p50_us, p99_us, p999_us, in_time)
 
 
+class RigWatch:
+    """Answers to the rig, its gain and its disarming."""
+
+    def __init__(self) -> None:
+        self.answered = False  # some block has a fresh command
+        self.gain_seen = False  # a loop check confirmed the exciter's gain
+        self.end_ns = 0
+        self._disarmed_s = np.inf  # first time at which the rig disarmed itself without a fresh command
+
+    def add(self, records: Records) -> None:
+        """Add rows of the rig, [blocks]."""
+        self.answered |= bool((records["fallback"] == 0).any())
+        self.gain_seen |= bool(np.isin(records["cause"], (wire.CHECK_PASSED, wire.GAIN_ACCEPTED)).any())
+        self.end_ns = max(self.end_ns, int(records["t_ns"].max()))
+        left = (records["guard_state"] == wire.DISARMED) & (records["cause"] == wire.COMMAND_LOST)
+        if left.any():
+            self._disarmed_s = min(self._disarmed_s, 1e-9 * float(records["t_ns"][left.argmax()]))
+
+    def disarmed(self) -> str:
+        """Sentence if the rig disarmed itself; else empty."""
+        if self._disarmed_s == np.inf:
+            return ""
+        why = f"the rig disarmed itself at {self._disarmed_s:.2f} s, as no fresh command reached it"
+        return f"{why}: look at the controller and the link to it, then `stickslip arm`"
+
+
 class FrozenWatch:
     """Blocks equal to the block before, sample by sample: the driver of a stopped converter resends its last buffer."""
 
@@ -61,7 +83,7 @@ class FrozenWatch:
         self.runs = {name: Longest() for name in CHANNELS}  # of repeated blocks
         self._last: dict[str, npt.NDArray[np.float32]] = {}
 
-    def sensors(self, records: Records) -> None:
+    def add(self, records: Records) -> None:
         """Add sensor blocks, [blocks]."""
         for name, run in self.runs.items():
             values = np.concatenate([self._last.get(name, np.full_like(records[name][:1], np.nan)), records[name]])
@@ -84,40 +106,24 @@ class StepWatch:
         self.highest_set_point = 0.0  # of v_a / v_d during vibration
         self.drive_velocity_max_mps = 0.0
         self.loop_delay_s = 0.0
-        self._slips: int | None = None
-        self._unseen = 0  # slips at a constant drive position
-        self._unseen_s = 0.0
-        self._moved_s = -np.inf  # last time of motion of the drive
         self.stale: list[tuple[float, float]] = []  # first and last step of stretches without a timely block
         self._idle: list[tuple[float, float]] = []  # first and last step of each finished stretch
         self._idle_from_s: float | None = None
         self._last_s = 0.0
 
-    def trace(self, records: Records) -> None:
+    def add(self, records: Records) -> None:
         """Add steps of the controller, [steps]."""
-        if not len(records):
-            return
         self.steps += len(records)
         self.missed += int(records["gap_blocks"].sum())
         self.last_block = max(self.last_block, int(records["block"].max()))
         not_armed = records["reason"] == wire.NOT_ARMED
         self.armed = self.armed or not not_armed.all()
         v_d_mps, t_s = records["drive_velocity_mps"], records["t_ns"] * 1e-9
-        at_rest = ~(np.abs(v_d_mps) > STANDSTILL_MPS)
-        self.moved = self.moved or not at_rest.all()
+        self.moved = self.moved or bool((np.abs(v_d_mps) > STANDSTILL_MPS).any())
         self.drive_velocity_max_mps = max(self.drive_velocity_max_mps, float(v_d_mps.max()))
         set_points = records["velocity_ratio"][records["mode"] == wire.EXCITE]
         self.highest_set_point = max(self.highest_set_point, float(set_points.max(initial=0.0)))
         self.loop_delay_s = max(self.loop_delay_s, float(records["loop_delay_s"].max()))
-        slips = records["slips"].astype(np.int64)
-        moved_s = np.maximum.accumulate(np.where(at_rest, self._moved_s, t_s))
-        self._moved_s = float(moved_s[-1])
-        rose = steps(slips, int(slips[0]) if self._slips is None else self._slips) > 0
-        unseen = rose & (t_s - moved_s > _TURN_S)
-        if unseen.any():
-            self._unseen_s = self._unseen_s if self._unseen else float(t_s[unseen][0])
-            self._unseen += int(np.count_nonzero(unseen))
-        self._slips = int(slips[-1])
         for at_s in t_s[(records["events"] & STALE) != 0].tolist():
             goes_on = self.stale and at_s - self.stale[-1][1] <= SETTLING_S
             self.stale[len(self.stale) - bool(goes_on) :] = [(self.stale[-1][0] if goes_on else at_s, at_s)]
@@ -137,12 +143,3 @@ class StepWatch:
             until_s = self._last_s + SETTLING_S if is_last else np.inf
             stretches.append((self._idle_from_s - block_s, until_s))
         return stretches
-
-    def unseen(self) -> str:
-        """Line about slips at a constant drive position; empty without any."""
-        if not self._unseen:
-            return ""
-        return (
-            f"DRIVE_UNSEEN: {counted(self._unseen, 'slip')} at a constant drive position, first at {self._unseen_s:.3f} s: "
-            "is its transducer at the end of its range, or loose?"
-        )

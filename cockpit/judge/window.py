@@ -40,7 +40,7 @@ APPLIED_ROW = np.dtype(
     ]
 )  # fmt: skip
 
-_LAYOUTS = {"trace": TRACE_ROW, "applied": APPLIED_ROW, "command": COMMAND_ROW}
+LAYOUTS = {"trace": TRACE_ROW, "applied": APPLIED_ROW, "command": COMMAND_ROW}
 
 
 class JudgedBlocks(NamedTuple):
@@ -57,10 +57,6 @@ class JudgedBlocks(NamedTuple):
     def part(self, rows: Any) -> "JudgedBlocks":
         """A selection of the blocks."""
         return JudgedBlocks(*(column[rows] for column in self))
-
-    def copied(self) -> "JudgedBlocks":
-        """A copy in separate memory."""
-        return JudgedBlocks(*(column.copy() for column in self))
 
 
 def reduced(sensors: Records, bins: int) -> JudgedBlocks:
@@ -133,7 +129,7 @@ class WaitingRows:
     def __init__(self) -> None:
         self.blocks = 0
         self._sensors: list[JudgedBlocks] = []
-        self._rows: dict[str, list[Rows]] = {name: [np.empty(0, layout)] for name, layout in _LAYOUTS.items()}
+        self._rows: dict[str, list[Rows]] = {name: [np.empty(0, layout)] for name, layout in LAYOUTS.items()}
         self._first = self._begins = self._stroke = 0
         self._after_turn = False
 
@@ -143,8 +139,8 @@ class WaitingRows:
         self.blocks += len(blocks.sequence)
 
     def others(self, topic: str, records: Records) -> None:
-        """Add messages of `trace`, `applied` or `command`."""
-        self._rows[topic].append(rows_of(records, _LAYOUTS[topic]))
+        """Add messages of a topic in `LAYOUTS`."""
+        self._rows[topic].append(rows_of(records, LAYOUTS[topic]))
 
     def is_full(self, block_s: float) -> bool:
         """True if a window can be judged."""
@@ -152,13 +148,9 @@ class WaitingRows:
 
     def window(self, is_last: bool, block_s: float) -> Window:
         """All pending rows, at least one block; `end` is the latest end of the window."""
-        blocks = JudgedBlocks(*(np.concatenate(columns) for columns in zip(*self._sensors, strict=True)))
-        rows = {name: np.concatenate(parts) for name, parts in self._rows.items()}
         return Window(
-            blocks,
-            rows["trace"],
-            rows["applied"],
-            rows["command"],
+            JudgedBlocks(*(np.concatenate(columns) for columns in zip(*self._sensors, strict=True))),
+            *(np.concatenate(parts) for parts in self._rows.values()),
             first=self._first,
             end=self.blocks if is_last else self.blocks - round(AHEAD_S / block_s),
             begins=self._begins,
@@ -178,7 +170,7 @@ class WaitingRows:
 
         """
         keep = max(window.end - round(BEHIND_S / block_s), 0)
-        self._sensors = [window.blocks.part(slice(keep, None)).copied()]
+        self._sensors = [JudgedBlocks(*(column[keep:].copy() for column in window.blocks))]
         keep_ns = int(window.blocks.t_ns[keep])
         for name, rows in (("trace", window.trace), ("applied", window.applied), ("command", window.command)):
             self._rows[name] = [rows[rows["t_ns"] >= keep_ns]]

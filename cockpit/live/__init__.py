@@ -1,11 +1,12 @@
-"""A running rig, live: a browser page (`stickslip serve`) and a terminal screen (`stickslip watch`).
+"""A running rig, live: a browser page (`stickslip serve`), a terminal screen (`stickslip watch`), its state and commands to it.
 
 listener   viewer session on the bus; reconnects whenever the rig was away; drops and counts messages that overflow its queue
 tables     messages of one topic as one array
-buckets    signals reduced to smallest, mean and largest sample per few blocks; the modes and limits in force
+buckets    the last minute of curves: stretches of 5 ms of `bridge.log.viewers` on an even time grid
 trigger    samples at full rate around a slip
 tally      lost messages, latency of commands
 answer     state of a rig in one sentence; meanings of the words
+frame_words  this state line by line, for `watch` and `status`
 view       all of these together: the state to display
 frames     the same as bytes for a browser
 gate       which requests of a browser are answered
@@ -13,9 +14,11 @@ token      secret that permits arming from the page
 viewers    connected browsers; slow ones are dropped
 server     one local port: the page, the frames, the operator's commands
 foxglove_server  the same for Foxglove and Lichtblick, with the extra `foxglove`
+operator   operator commands to a rig
 operator_link  operator commands from the page
-page       HTML page with uPlot and the curves of `cockpit.review`
+page       HTML page with uPlot and the curves of `cockpit.review`; its style is bridge/page.css
 screen     the same in a terminal
+status     one frame of it
 
 None of this is in the control loop: a viewer session may publish nothing, and the rig waits for no viewer.
 """

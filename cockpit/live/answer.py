@@ -1,12 +1,11 @@
-"""State of a rig in one sentence; meanings of the words in its columns."""
+"""State of a rig in one sentence."""
 
-import functools
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from bridge.units import counted
-from bridge.wire.event_codes import FAILURE, OUTSIDE, TRIPS, WEAK_REASONS, harms
-from bridge.wire.words import words
+from bridge.wire.event_codes import FAILURE, OUTSIDE, SEVERITIES, TRIPS, WEAK_REASONS, harms
+from bridge.wire.words import help_of
 
 GOOD, LOOK, BAD, OFF = "good", "look", "bad", "off"
 
@@ -18,17 +17,9 @@ class Answer(NamedTuple):
     text: str
 
 
-@functools.cache
-def known() -> dict[tuple[str, int], tuple[str, str]]:
-    """Word and meaning by column and number."""
-    return {(row.column, row.number): (row.word, row.help.replace("`", "")) for row in words()}
-
-
-def help_of(column: str, word: str) -> str:
-    """Meaning of a word in a column."""
-    return next(
-        (meaning for (of, _), (name, meaning) in known().items() if (of, name) == (column, word)), "not known here"
-    )
+def plain_help(column: str, word: str) -> str:
+    """Meaning of a word in a column, for a screen or a page: without backticks."""
+    return help_of(column, word).replace("`", "")
 
 
 def of_a_live_rig(figures: Mapping[str, Any], slips: int, over_s: float) -> Answer:
@@ -36,7 +27,7 @@ def of_a_live_rig(figures: Mapping[str, Any], slips: int, over_s: float) -> Answ
     guard, cause = figures.get("guard_state"), figures.get("cause")
     mode, reason = figures.get("mode"), figures.get("reason")
     if guard == "FAULT":
-        why = help_of("cause", str(cause))
+        why = plain_help("cause", str(cause))
         more = "" if "reset" in why else "; nothing vibrates until a reset, then arm"
         return Answer(BAD, f"FAULT: {cause}: {why.partition(': ')[2]}{more}")
     if mode is None:
@@ -44,11 +35,12 @@ def of_a_live_rig(figures: Mapping[str, Any], slips: int, over_s: float) -> Answ
     if figures.get("fallback") and guard in {"ARMED", "ACTIVE", "NO_GUARD"}:
         return Answer(BAD, "the rig has no fresh command and ramps the vibration to zero by itself")
     if guard in {"DISARMED", "CHECKING", "READY"}:
-        letter, _, why = help_of("cause", str(cause)).partition(": ")
-        more = f"; since {cause}: {why}" if letter in {FAILURE, OUTSIDE} else ""
-        return Answer(LOOK, f"{guard}: {help_of('guard_state', guard)}{more}")
-    summary = f"{counted(slips, 'slip') if slips else 'no slip'} in the last {over_s:.0f} s"
-    summary += f"; {mode}: {help_of('mode', str(mode))}"
+        severity, _, why = plain_help("cause", str(cause)).partition(": ")
+        more = f"; since {cause}: {why}" if severity in {SEVERITIES[FAILURE], SEVERITIES[OUTSIDE]} else ""
+        return Answer(LOOK, f"{guard}: {plain_help('guard_state', guard)}{more}")
+    summary = f"{mode}: {plain_help('mode', str(mode))}"
+    if over_s >= 1.0:
+        summary = f"{counted(slips, 'slip') if slips else 'no slip'} in the last {over_s:.0f} s; {summary}"
     if reason in {*WEAK_REASONS, *TRIPS}:
-        return Answer(BAD if harms(str(reason)) else LOOK, f"{reason}: {help_of('reason', str(reason))}; {summary}")
+        return Answer(BAD if harms(str(reason)) else LOOK, f"{reason}: {plain_help('reason', str(reason))}; {summary}")
     return Answer(LOOK if slips else GOOD, summary)

@@ -14,7 +14,8 @@ from bridge.faults import Fault
 from bridge.log.viewers import foxglove_log
 from bridge.log.viewers.stretches import ScopeBlocks, Stretches
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import CHANNELS, SCOPE
+from bridge.wire.channels import CHANNELS
+from bridge.wire.messages import SCOPE
 from bridge.wire.payloads import file_descriptor_set
 from bridge.wire.topics import SCOPE as SCOPE_TOPIC
 from cockpit.live.view import ViewUpdate
@@ -66,14 +67,14 @@ class Foxglove:
     ) -> None:
         self._server.stop()
 
-    def tell(self, step: ViewUpdate) -> None:
+    def send(self, step: ViewUpdate) -> None:
         """Send the news of a step."""
-        if step.anew:
+        if step.new_run:
             self._stretches = Stretches()
             self._began_ns = None
         for topic in ("applied", "trace"):
             if topic in step.tables:
-                self._stretches.say(topic, step.tables[topic])
+                self._stretches.add(topic, step.tables[topic])
         table = step.tables.get("sensors")
         if table is not None:
             t_ns = table["t_ns"].astype(np.int64)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from bridge.files import strict_json
+from bridge.results import strict_json
 
 _ALIGNED = 4  # a browser reads float32 only at offsets divisible by 4
 

@@ -4,25 +4,26 @@ import contextlib
 import json
 import threading
 import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 from bridge.faults import Fault
 from bridge.wire import realtime
 from bridge.wire.topics import APPLIED, CONTROLLER_EVENT, PLANT_EVENT, RECORDER_EVENT, SENSORS, TRACE
-from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
+from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, is_frozen
 
 EVENTS = (PLANT_EVENT, CONTROLLER_EVENT, RECORDER_EVENT)
 ROLES = ("plant", "controller", "recorder")
-_LIMIT = (
+LIMIT = (
     6000  # queued messages: 2 s of a run. Larger: a stalled viewer shows older data. Smaller: it drops messages sooner
 )
 _DIAL_S = 0.5  # timeout of one attempt; Ctrl-C is delayed by up to as much
 _AGAIN_S = 0.2  # pause between two attempts
 _LOOK_S = 0.05
-_UNLINKED_S = (
-    1.0  # without a link before the session is reopened with the current password; Zenoh itself reconnects shorter cuts
-)
+# without a link before the session is reopened with the current password; Zenoh itself reconnects shorter cuts
+_UNLINKED_S = 1.0
 _HEADER_S = 0.5
 
 
@@ -34,23 +35,67 @@ class Presence(NamedTuple):
     trouble: str  # why no session can be opened; empty if merely no peer answers
 
 
-_NO_PRESENCE = Presence(False, frozenset(), "")
+@dataclass
+class Source:
+    """Messages of a bus for a view."""
+
+    inbox: Inbox  # received signals and events
+    presence: Presence
+    headers: dict[str, Any] = field(default_factory=dict)  # configurations of rig and controller by role
 
 
-class Listener:
+def connected(config: BusConfig, role: str, patience_s: float, frozen: str, absent: str, about: str = "") -> Bus:
+    """A session with a running rig.
+
+    Args:
+        role: of the session; an operator's command must not be lost.
+        frozen: remedy for a rig that accepts connections but does not answer.
+        absent: remedy if no rig answers.
+        about: begin of the message of the fault.
+
+    Raises Fault NO_PEER.
+
+    """
+    try:
+        return Bus(config, role, lockstep=role == "operator", patience_s=patience_s)
+    except Fault as fault:
+        if fault.kind.code != "NO_PEER":
+            raise
+    where = config.endpoint
+    if is_frozen(config):
+        line = f"{about}the rig at {where} accepts connections but does not answer (frozen or overloaded)"
+        raise Fault("NO_PEER", f"{line}: must run; {frozen}")
+    line = f"{about}no rig answered at {where} within {patience_s:g} s: {config.must_be} of a running rig"
+    raise Fault("NO_PEER", f"{line}; {absent}")
+
+
+def listen(bus: Bus, inbox: Inbox) -> None:
+    """Receive all that a view shows."""
+    for topic in (SENSORS, APPLIED, TRACE):
+        bus.listen(topic, inbox.push)
+    for topic in EVENTS:
+        bus.listen(topic, inbox.keep)
+
+
+def configurations(bus: Bus, roles: Sequence[str], timeout_s: float, stop: threading.Event) -> dict[str, Any]:
+    """The configurations of those `roles` that answer in time, without unreadable ones."""
+    readable: dict[str, Any] = {}
+    for role, header in bus.headers(roles, timeout_s, stop).items():
+        with contextlib.suppress(ValueError, RecursionError):  # header of a foreign program
+            readable[role] = json.loads(header.configuration)
+    return readable
+
+
+class Listener(Source):
     """Follows a bus in a separate thread; a context manager.
 
     Args:
         config: connection to the bus.
 
-    `inbox`: received signals and events; `presence`: participants; `headers`: configurations of rig and controller by role.
-
     """
 
     def __init__(self, config: BusConfig) -> None:
-        self.inbox = Inbox(_LIMIT)
-        self.presence = _NO_PRESENCE
-        self.headers: dict[str, Any] = {}
+        super().__init__(Inbox(LIMIT), Presence(False, frozenset(), ""))
         self._config = config
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._follow, name="listener", daemon=True)
@@ -70,10 +115,7 @@ class Listener:
             trouble = ""
             try:
                 with Bus(self._config, "viewer", lockstep=False, stop=self._over, patience_s=_DIAL_S) as bus:
-                    for topic in (SENSORS, APPLIED, TRACE):
-                        bus.listen(topic, self.inbox.push)
-                    for topic in EVENTS:
-                        bus.listen(topic, self.inbox.keep)
+                    listen(bus, self.inbox)
                     realtime.raise_priority()
                     self._while_linked(bus)
             except Fault as fault:
@@ -98,6 +140,4 @@ class Listener:
             if linked and counts != arrivals:
                 arrivals = counts
                 alive = [role for role in ROLES[:2] if bus.alive(role)]
-                for role, header in bus.headers(alive, _HEADER_S, self._over).items():
-                    with contextlib.suppress(ValueError, RecursionError):  # header of a foreign program
-                        self.headers[role] = json.loads(header.configuration)
+                self.headers |= configurations(bus, alive, _HEADER_S, self._over)

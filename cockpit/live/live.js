@@ -1,17 +1,22 @@
 // The page: shows the frames of the server and reports when they stop. Old values are never shown as current.
 "use strict";
 
-const CUT_MS = 1500; // without a frame before the connection counts as lost; the server sends 20 frames per second
+const OLD_S = 1; // age of the data from which on the headline names it
+const GONE_S = 3; // age from which on they are hidden; a connection without a frame for as long is reopened
 const LOOK_MS = 250;
-const AGAIN_MS = 1000;
-const OLD_MS = 20_000; // after which the outcome of a command is hidden: it is no longer the state of the rig
+const AGAIN_MS = 500;
 const READ_MS = 200; // between two updates of the figures, so that they can be read
+const DRIFT_MS = 0.01; // of the clocks of server and browser, which may be two computers, in a frame: 200 ppm
+const NO_SERVER = "no connection to `stickslip serve`: the state is unknown, and STOP reaches no rig; use `stickslip stop` in a terminal, or the amplifier's switch";
+const LATE = "this browser is too slow or its connection is; STOP still works";
 const WINDOWS_S = [2, 10, 30, 60];
 const EVENTS_SHOWN = 200;
 const element = (id) => document.getElementById(id);
 
 let hello = null, store = null, scope = null, axis = null, socket = null, helps = new Map();
-let plots = [], heard_ms = performance.now(), window_s = 10, follows = true, dirty = false, phase = "", said = "", read_ms = 0, old = 0;
+let plots = [], window_s = 10, follows = true, dirty = false, phase = "", said = "", read_ms = 0;
+let latest = null, heard_ms = performance.now(), fresh_ms = heard_ms, offset_ms = null, full = ""; // the newest frame and its times
+const commands = new Commands(() => socket, () => phase);
 
 /** Build the display of a run; `step_s` is null without a run. */
 function begin(step_s) {
@@ -65,9 +70,23 @@ function refresh() {
   element("follow").classList.toggle("on", follows);
 }
 
-function showNow(now) {
-  document.body.classList.toggle("off", now.phase !== "live");
-  element("answer").className = `verdict ${now.answer.level}`;
+/** Note a frame: when its data were current, by the server's clock. The fastest frame gives the difference of the clocks. */
+function note(now) {
+  const delay_ms = performance.now() - 1e3 * now.sent_s;
+  offset_ms = offset_ms === null ? delay_ms : Math.min(delay_ms, offset_ms + DRIFT_MS);
+  fresh_ms = 1e3 * now.sent_s + offset_ms - (now.phase === "live" ? 1e3 * now.silent_s : 0);
+  latest = now;
+  commands.follow(now);
+}
+
+/** Show the newest frame with its age; without one, or if it is too old, report this and blank the old values. */
+function show() {
+  const age_s = (performance.now() - fresh_ms) / 1e3, gone = !latest || !commands.connected || age_s > GONE_S;
+  const why = full || (commands.connected ? (latest ? LATE : "connecting") : NO_SERVER);
+  const now = gone ? { phase: "cut", answer: { level: "bad", text: why } } : latest;
+  element("age").textContent = full || age_s <= OLD_S ? "" : gone ? `no data for ${age_s.toFixed(0)} s: ` : `${age_s.toFixed(0)} s old: `;
+  document.querySelector("main").classList.toggle("off", now.phase !== "live");
+  element("answer").className = `verdict ${now.answer.level === "good" && age_s > OLD_S ? "look" : now.answer.level}`;
   if (said !== now.answer.text) element("said").replaceChildren(...rich((said = now.answer.text))); // once: it is read aloud
   element("whose").textContent = [now.rig && `rig ${now.rig}`, now.roles?.length ? `on the bus: ${now.roles.join(", ")}` : "no process on the bus"].filter(Boolean).join("; ");
   document.title = `${now.phase === "live" ? (now.guard_state === "FAULT" ? "FAULT" : (now.mode ?? "no controller")) : now.phase}: stickslip`;
@@ -104,68 +123,46 @@ function receive(buffer) {
     scope = new ScopeView(told);
     element("events").replaceChildren(table(["time [s]", "local time", "source", "event", "NE 107", "text", "meaning and remedy"], []));
     begin(told.step_s);
-  } else if (told.kind === "anew") {
+  } else if (told.kind === "new-run") {
     begin(told.step_s);
   } else if (told.kind === "capture") {
     scope.add(told, values);
   } else if (told.kind === "answer") {
-    tell([...(told.done ? [] : [`${told.word.toLowerCase()}: NOT DONE`]), ...told.lines].join("\n"), !told.done);
-    element("stop").classList.remove("busy");
+    commands.answered(told);
   } else if (told.kind === "full") {
-    tell(told.line, true);
+    full = told.line;
   } else {
     if (store && told.count) store.add(told.first, told.count, values);
     addEvents(told.events);
     showLimits(told);
-    showNow(told);
+    note(told);
+    show();
     if (told.latency) element("latency").replaceChildren(histogram([{ latency: told.latency }]));
     dirty = true;
   }
   document.body.dataset.ready = "yes";
 }
 
-/** Show the outcome of a command with its time of day; a success is hidden after OLD_MS. */
-function tell(text, bad) {
-  const place = element("told");
-  place.textContent = `${new Date().toLocaleTimeString([], { hour12: false })}  ${text}`;
-  clearTimeout(old);
-  if (!bad) old = setTimeout(() => (place.hidden = true), OLD_MS);
-  place.classList.toggle("bad", bad);
-  place.hidden = false;
-}
-
-/** Without the server the state is unknown: report that, and blank the old values. */
-function cut() {
-  showNow({ phase: "cut", answer: { level: "bad", text: "no connection to `stickslip serve`: the state is unknown, and STOP on this page does nothing; use `stickslip stop` in a terminal, or the amplifier's switch" } });
-}
-
 function connect() {
   heard_ms = performance.now();
+  [offset_ms, full] = [null, ""];
   socket = new WebSocket(`ws://${location.host}/stream`);
   socket.binaryType = "arraybuffer";
+  socket.onopen = () => commands.retry();
   socket.onmessage = (message) => receive(message.data);
   socket.onclose = () => {
-    cut();
+    commands.disconnected();
+    show();
     setTimeout(connect, AGAIN_MS);
   };
 }
 
-function say(word) {
-  if (socket?.readyState !== WebSocket.OPEN) {
-    tell(`${word.toLowerCase()}: NOT SENT: no connection to the server. Use \`stickslip ${word.toLowerCase()}\` in a terminal, or the amplifier's switch`, true);
-    return;
-  }
-  socket.send(JSON.stringify({ word, token: word === "STOP" ? "" : element("token").value.trim() }));
-  if (word !== "SCOPE") tell(`${word.toLowerCase()}: sent, waiting for the rig`, false);
+element("stop").addEventListener("click", () => commands.order("STOP", ""));
+element("orders").addEventListener("submit", (event) => event.preventDefault()); // Enter in the field sends no command
+for (const button of document.querySelectorAll("[data-word]")) {
+  button.addEventListener("click", () => commands.order(button.dataset.word, element("token").value.trim()));
 }
-
-element("stop").addEventListener("click", () => {
-  element("stop").classList.add("busy");
-  say("STOP");
-});
-element("person").addEventListener("submit", (event) => event.preventDefault()); // Enter in the field sends no command
-for (const button of document.querySelectorAll("[data-word]")) button.addEventListener("click", () => say(button.dataset.word));
-element("take").addEventListener("click", () => say("SCOPE"));
+element("take").addEventListener("click", () => commands.order("SCOPE", ""));
 element("follow").addEventListener("click", () => {
   follows = true;
   dirty = true;
@@ -183,10 +180,9 @@ setInterval(() => {
   const late_ms = performance.now() - looked_ms - LOOK_MS;
   looked_ms = performance.now();
   // a page that stalled itself has unread frames
-  if (late_ms < LOOK_MS && looked_ms - heard_ms > CUT_MS && hello) {
-    cut();
-    socket?.close();
-  }
+  if (late_ms < LOOK_MS && looked_ms - heard_ms > 1e3 * GONE_S && !full) socket?.close();
+  commands.retry();
+  show();
 }, LOOK_MS);
 (function draw() {
   if (dirty) {

@@ -3,16 +3,19 @@
 import asyncio
 import json
 import secrets
+import time
 from typing import Any, NamedTuple
 
 from bridge.faults import Fault
 from bridge.plain import plain
 from bridge.wire.zenoh_link import BusConfig
-from cockpit.run.operator import tell
+from cockpit.live.operator import send_command
 
 STOP, SCOPE = "STOP", "SCOPE"
 _WITH_TOKEN = ("ARM", "DISARM", "RESET")
 _WRONG_S = 1.0  # for which a wrong token blocks further attempts, against guessing
+_STOP_S = 3.0  # in which an undelivered STOP is sent again; the last attempt takes 2 s more
+_STOP_AGAIN_S = 0.2
 
 
 class Wish(NamedTuple):
@@ -50,7 +53,7 @@ class Words:
         self._stopping: asyncio.Task[dict[str, Any]] | None = None
         self._busy = False
 
-    async def say(self, wish: Wish) -> dict[str, Any]:
+    async def deliver(self, wish: Wish) -> dict[str, Any]:
         """Send a command; its outcome as `word`, `done` and readable `lines`."""
         if wish.word == STOP:
             if self._stopping is None or self._stopping.done():
@@ -70,11 +73,16 @@ class Words:
             self._busy = False
 
     async def _send(self, word: str) -> dict[str, Any]:
-        try:
-            outcome = await asyncio.to_thread(tell, self._bus, word)
-        except Fault as fault:
-            return _answer(word, False, [fault.line])
-        return _answer(word, outcome.done, outcome.in_words())
+        until_s = time.monotonic() + (_STOP_S if word == STOP else 0.0)
+        while True:
+            try:
+                outcome = await asyncio.to_thread(send_command, self._bus, word)
+            except Fault as fault:
+                if fault.kind.code != "NO_PEER" or time.monotonic() > until_s:
+                    return _answer(word, False, [fault.line])
+                await asyncio.sleep(_STOP_AGAIN_S)
+            else:
+                return _answer(word, outcome.done, outcome.in_words())
 
 
 def _answer(word: str, done: bool, lines: list[str]) -> dict[str, Any]:

@@ -6,10 +6,11 @@ import re
 from pathlib import Path
 
 from cockpit.live.gate import NAMES
-from cockpit.review.page import SHARED_SCRIPTS, filled, text_of, uplot
+from cockpit.review.page import page_of_curves, text_of
 
 _FOLDER = Path(__file__).parent
-_SCRIPTS = ("store.js", "state.js", "scope.js", "live.js")
+_SCRIPTS = ("store.js", "state.js", "scope.js", "command.js", "live.js")
+_NO_ICON = '<link rel="icon" href="data:,">\n'  # the browser asks for none
 
 
 class Page:
@@ -21,12 +22,8 @@ class Page:
     """
 
     def __init__(self, port: int) -> None:
-        parts = {
-            "STYLE": "\n".join([text_of("vendor/uPlot.min.css"), text_of("page.css"), _file_text("live.css")]),
-            "UPLOT": uplot(),
-            "SCRIPT": "\n".join([*map(text_of, SHARED_SCRIPTS), *map(_file_text, _SCRIPTS)]),
-        }
-        page = filled(_file_text("live.html"), parts)
+        body = text_of(_FOLDER / "live.html")
+        page = page_of_curves("stickslip: waiting", body, _NO_ICON, [_FOLDER / name for name in _SCRIPTS])
         self.body = page.encode()
         # only the scripts of this page may run, and the page may connect to this server only
         scripts = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
@@ -36,10 +33,6 @@ class Page:
             f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data:; connect-src {streams}; "
             "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
         )
-
-
-def _file_text(name: str) -> str:
-    return (_FOLDER / name).read_text(encoding="utf-8")
 
 
 def _sha256(text: str) -> str:

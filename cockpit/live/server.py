@@ -16,10 +16,10 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from bridge.faults import Fault
-from bridge.wire.messages import CHANNELS
+from bridge.wire.channels import CHANNELS
 from bridge.wire.words import words
 from bridge.wire.zenoh_link import BusConfig
-from cockpit.figures.signals import SIGNALS
+from cockpit.figures.signals import PANELS, Panel
 from cockpit.live.buckets import COLUMNS, Buckets
 from cockpit.live.frames import frame
 from cockpit.live.gate import NO_METHOD, PAGE, refusal
@@ -29,7 +29,6 @@ from cockpit.live.page import Page
 from cockpit.live.trigger import Capture
 from cockpit.live.view import View, ViewUpdate
 from cockpit.live.viewers import MOST_VIEWERS, Viewers
-from cockpit.review.panels import PANELS
 
 HOST = "127.0.0.1"
 PERIOD_S = 0.05  # between two frames
@@ -155,11 +154,11 @@ class Server:
             self._also(step)
         if not len(self._viewers):
             return
-        if step.anew:
-            self._viewers.tell(frame("anew", self._grid()))
-        self._viewers.tell(self._now(step))
+        if step.new_run:
+            self._viewers.broadcast(frame("new-run", self._grid()))
+        self._viewers.broadcast(self._now(step))
         if step.capture is not None:
-            self._viewers.tell(_captured(step.capture))
+            self._viewers.broadcast(_captured(step.capture))
 
     def _grid(self) -> dict[str, Any]:
         run = self._view.run
@@ -168,10 +167,10 @@ class Server:
     def _now(self, step: ViewUpdate) -> bytes:
         """Frame of the news and the current state."""
         state = self._view.now() | {"events": [event._asdict() for event in step.events]}
-        state |= {"viewers": len(self._viewers), "viewers_dropped": self._viewers.dropped}
+        state |= {"viewers": len(self._viewers), "viewers_dropped": self._viewers.dropped, "sent_s": time.monotonic()}
         if time.monotonic() > self._latency_s + _LATENCY_S and self._view.run is not None:
             self._latency_s = time.monotonic()
-            state["latency"] = self._view.run.tally.latency()
+            state["latency"] = self._view.run.tally.latency_us.bars("us")
         return _bucketed("now", state, step.buckets)
 
     def _first(self) -> list[bytes]:
@@ -186,8 +185,9 @@ class Server:
             **self._grid(),
         }
         events = [event._asdict() for event in view.events]
-        latency = run.tally.latency() if run is not None else None
-        first = [frame("hello", hello), _bucketed("now", view.now() | {"events": events, "latency": latency}, kept)]
+        latency = run.tally.latency_us.bars("us") if run is not None else None
+        now = view.now() | {"events": events, "latency": latency, "sent_s": time.monotonic()}
+        first = [frame("hello", hello), _bucketed("now", now, kept)]
         return [*first, *([_captured(view.capture)] if view.capture is not None else [])]
 
     async def _attend(self, socket: ServerConnection) -> None:
@@ -215,7 +215,7 @@ class Server:
                     task.add_done_callback(tasks.discard)
 
     async def _run_command(self, socket: ServerConnection, wish: Any) -> None:
-        answer = await self._words.say(wish)
+        answer = await self._words.deliver(wish)
         with contextlib.suppress(ConnectionClosed):
             await socket.send(frame("answer", answer))
 
@@ -231,13 +231,6 @@ def _captured(capture: Capture) -> bytes:
     return frame("capture", table, capture.samples)
 
 
-def _panel(panel: Any) -> dict[str, Any]:
-    signals = [SIGNALS[name] for name in panel.signals]
-    return {
-        "title": panel.title,
-        "hint": panel.hint,
-        "open": panel.is_open,
-        "unit": signals[0].unit,
-        "axis": signals[0].axis,
-        "curves": [signal._asdict() for signal in signals],
-    }
+def _panel(panel: Panel) -> dict[str, Any]:
+    curves = [signal.for_page() | {"factor": signal.factor} for signal in panel.signals]
+    return panel.heading() | {"curves": curves}

@@ -12,7 +12,7 @@ const fixed = (value, digits) => (value === null || value === undefined ? DASH :
 /** A tile: title, value, details, and optionally a bar from 0 to 1. */
 function tile(what, value, more = "", { share = null, level = "" } = {}) {
   const parts = [made("div", what, { className: "what" }), made("div", value, { className: "value" })];
-  if (share !== null) parts.push(Object.assign(document.createElement("meter"), { min: 0, max: 1, high: 0.9, optimum: 0, value: Math.min(share, 1) }));
+  if (share !== null) parts.push(Object.assign(document.createElement("meter"), { min: 0, max: 1, high: 0.9, optimum: 0, value: Math.min(share, 1), ariaLabel: what }));
   parts.push(made("div", more, { className: "more" }));
   return made("div", parts, { className: `tile ${level}` });
 }
@@ -66,7 +66,7 @@ function eventRow(event) {
     cell.textContent = text; // untrusted: any client of the bus may have sent it
     cell.className = at === 0 ? "number" : at < 5 ? "key" : "";
     return cell;
-  }), { className: event.letter });
+  }), { className: { F: "bad", S: "look", M: "look" }[event.letter] ?? "" });
   row.cells[4].title = event.weight;
   return row;
 }

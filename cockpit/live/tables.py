@@ -8,7 +8,8 @@ import numpy as np
 
 from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import CHANNELS, Layout, Records, sensor_block
+from bridge.wire.channels import CHANNELS
+from bridge.wire.messages import Layout, Records, sensor_block
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import SENSORS
 

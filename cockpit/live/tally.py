@@ -1,15 +1,12 @@
 """Lost messages and latency of commands, since the viewer first saw the run."""
 
-import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from bridge.log.watches.histogram import Histogram
 from bridge.wire.messages import Records
-
-_PER_DECADE, _DECADES = 20, 7  # bins of the histogram, from 1 us
-_EDGES_US = 10.0 ** (np.arange(_PER_DECADE * _DECADES + 1) / _PER_DECADE)
 
 
 class Lost(NamedTuple):
@@ -29,7 +26,7 @@ class Tally:
     def __init__(self) -> None:
         self._controller = self._viewer = self._commands = self._late = self._refused = 0
         self._expected: int | None = None
-        self._bins = np.zeros(len(_EDGES_US) - 1, np.int64)
+        self.latency_us = Histogram()
 
     def add_blocks(self, numbers: npt.NDArray[np.int64]) -> None:
         """Add block numbers, in order."""
@@ -46,26 +43,12 @@ class Tally:
         self._commands += int(applied["commands"].sum())
         self._late += int(applied["commands_late"].sum())
         self._refused += int(applied["commands_refused"].sum())
-        round_trip_ns = applied["round_trip_ns"]
-        self._bins += np.histogram(round_trip_ns[round_trip_ns > 0] * 1e-3, _EDGES_US)[0]
+        self.latency_us.add(applied["round_trip_ns"][applied["round_trip_ns"] > 0] * 1e-3)
 
     def lost(self, dropped: int) -> Lost:
         """Counts so far; `dropped`: messages dropped by the inbox."""
         return Lost(self._controller, self._viewer, dropped, self._commands, self._late, self._refused)
 
-    def latency(self) -> dict[str, Any] | None:
-        """Bin edges [us] and commands per bin, in the format of `cockpit.review`; None without commands."""
-        known = np.flatnonzero(self._bins)
-        if not len(known):
-            return None
-        first, end = int(known[0]), int(known[-1]) + 1
-        edges = [round(float(edge), 3) for edge in _EDGES_US[first : end + 1]]
-        return {"edges_us": edges, "counts": self._bins[first:end].tolist()}
-
     def percentile_us(self, share: float) -> float | None:
-        """Quantile of the latency [us], as the upper edge of its bin; None without commands."""
-        total = int(self._bins.sum())
-        if not total:
-            return None
-        at = int(np.searchsorted(np.cumsum(self._bins), math.ceil(share * total)))
-        return float(_EDGES_US[at + 1])
+        """Quantile of the latency [us]; None without commands."""
+        return self.latency_us.quantile(share) if self.latency_us.count else None

@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from bridge.wire.messages import CHANNELS, Records
+from bridge.wire.channels import CHANNELS
+from bridge.wire.messages import Records
 
 BEFORE_S, AFTER_S = 0.1, 0.1  # a slip takes a few ms, the stick before it a few 0.1 s
 _AGAIN_S = 0.5  # least distance of two captures; an operator reads no more

@@ -4,7 +4,7 @@ import collections
 import contextlib
 import time
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,14 +15,15 @@ from bridge.plain import plain
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.block_numbers import WINDOW
 from bridge.wire.complaints import Complaints
-from bridge.wire.event_codes import EVENTS, LETTERS
+from bridge.wire.event_codes import SEVERITIES, event_code
 from bridge.wire.messages import APPLIED, TRACE, Records
 from bridge.wire.payloads import parsed
-from bridge.wire.zenoh_link import Inbox, Received
-from cockpit.figures.signals import stroke_limits
-from cockpit.live.answer import BAD, OFF, Answer, known, of_a_live_rig
+from bridge.wire.words import word_of
+from bridge.wire.zenoh_link import Received
+from cockpit.figures.signals import SIGNALS, WORD_SIGNALS, stroke_limits
+from cockpit.live.answer import BAD, OFF, Answer, of_a_live_rig
 from cockpit.live.buckets import Bucketing, Buckets, block_numbers
-from cockpit.live.listener import Presence
+from cockpit.live.listener import Source
 from cockpit.live.tables import SensorTables, table_of
 from cockpit.live.tally import Tally
 from cockpit.live.trigger import Capture, Scope
@@ -35,25 +36,6 @@ _EVENTS_AT_ONCE = 50  # per step; further ones are only counted
 _LONGEST_TEXT = 500
 _SLIPS_S = 10.0  # window for the count of recent slips
 WAITING, LIVE, SILENT, LEFT, ENDED = "waiting", "live", "silent", "left", "ended"
-
-
-class Source(Protocol):
-    """Source of messages: `cockpit.live.listener`, or a test."""
-
-    @property
-    def inbox(self) -> Inbox:
-        """Received messages."""
-        ...
-
-    @property
-    def presence(self) -> Presence:
-        """Participants on the bus."""
-        ...
-
-    @property
-    def headers(self) -> Mapping[str, Any]:
-        """Configurations of rig and controller by role."""
-        ...
 
 
 class EventRow(NamedTuple):
@@ -72,7 +54,7 @@ class EventRow(NamedTuple):
 class ViewUpdate(NamedTuple):
     """News since the last step."""
 
-    anew: bool  # a new run began: discard the display of the earlier one
+    new_run: bool  # a new run began: discard the display of the earlier one
     buckets: Buckets | None
     capture: Capture | None
     events: list[EventRow]
@@ -133,14 +115,14 @@ class View:
                 else:
                     events.append(message)
         self._taken = {}
-        anew = self._take_blocks(waiting["sensors"])
+        new_run = self._take_blocks(waiting["sensors"])
         self._take("trace", waiting["trace"])
         self._take("applied", waiting["applied"])
         run = self.run
         capture = run.scope.ready() if run is not None else None
-        self.capture = capture or (None if anew else self.capture)
-        buckets = run.buckets.ready() if run is not None else None
-        return ViewUpdate(anew, buckets, capture, self._take_events(events), self._taken)
+        self.capture = capture or (None if new_run else self.capture)
+        buckets = run.buckets.made(self._taken.get("sensors")) if run is not None else None
+        return ViewUpdate(new_run, buckets, capture, self._take_events(events), self._taken)
 
     def take_now(self) -> None:
         """Trigger the scope by hand."""
@@ -153,33 +135,32 @@ class View:
         if table is None:
             return False
         numbers = block_numbers("sensors", table)
-        anew = False
+        new_run = False
         if self.run is not None:
             steps = np.diff(numbers, prepend=self.run.newest["sensors"])
             breaks = np.flatnonzero((steps < -WINDOW) | (steps > _FAR * self.run.buckets.blocks))
-            anew = bool(len(breaks)) or table.dtype != self.run.dtype
-            if anew:
+            new_run = bool(len(breaks)) or table.dtype != self.run.dtype
+            if new_run:
                 begin = breaks[-1] if len(breaks) else 0
                 table, numbers, self.run = table[begin:], numbers[begin:], None
         if self.run is None:
             block_ns = _block_ns(table, numbers)
             if block_ns is None:
-                return anew
+                return new_run
             self.run = _Run(block_ns, table.dtype)
             self._ended_at_s = None
-            anew = True
+            new_run = True
         keep = numbers > np.maximum.accumulate(np.append(self.run.newest["sensors"], numbers[:-1]))
         table, numbers = table[keep], numbers[keep]
         if not len(table):
-            return anew
+            return new_run
         self.run.newest["sensors"] = int(numbers[-1])
         self._heard_s["sensors"] = self._clock()
         self._newest["sensors"] = table[-1:]
         self._taken["sensors"] = table
-        self.run.buckets.add("sensors", table, numbers)
         self.run.scope.add_blocks(table, numbers)
         self.run.tally.add_blocks(numbers)
-        return anew
+        return new_run
 
     def _take(self, topic: str, payloads: list[bytes]) -> None:
         if not payloads or self.run is None:
@@ -198,7 +179,7 @@ class View:
         self._heard_s[topic] = self._clock()
         self._newest[topic] = table[-1:]
         self._taken[topic] = table
-        self.run.buckets.add(topic, table, numbers)
+        self.run.buckets.add(topic, table)
         if topic == "applied":
             self.run.tally.add_applied(table)
             return
@@ -216,33 +197,15 @@ class View:
                 event = parsed(wire.Event, message.payload, message.topic.name)
                 if event.code in (PAUSE, CORE_PAUSE):
                     self.pauses += 1
-                else:
-                    fresh.append(self._event_of(event, message.topic.sender))
+                    continue
+                if event.code == "END" and message.topic.sender == "plant":
+                    self._ended_at_s = event.t_ns * 1e-9
+                fresh.append(_event_row(event, message.topic.sender))
         if len(received) > _EVENTS_AT_ONCE:
             text = f"{len(received) - _EVENTS_AT_ONCE} more events in one step; the log contains them"
-            fresh.append(self._event(0.0, "page", "FLOOD", text))
+            fresh.append(_event_row(wire.Event(code="FLOOD", text=text), "page"))
         self.events.extend(fresh)
         return fresh
-
-    def _event_of(self, event: wire.Event, sender: str) -> EventRow:
-        t_s = event.t_ns * 1e-9
-        if event.code == "END" and sender == "plant":
-            self._ended_at_s = t_s
-        return self._event(t_s, sender, event.code, event.text)
-
-    def _event(self, t_s: float, source: str, code: str, text: str) -> EventRow:
-        known = EVENTS.get(code)
-        letter = known.letter if known is not None else ""
-        return EventRow(
-            t_s=round(t_s, 3),
-            at=time.strftime("%H:%M:%S"),
-            source=source,
-            code=plain(code[:40]),
-            letter=letter,
-            weight=LETTERS[letter],
-            text=plain(text[:_LONGEST_TEXT]),
-            help=known.help.replace("`", "") if known is not None else "not known to this version",
-        )
 
     def _of(self, topic: str) -> Any:
         """Newest message of a topic; None if older than SILENT_S."""
@@ -267,6 +230,7 @@ class View:
         figures = self._figures() if phase == LIVE else {}
         late = self._slips_of_late()
         return {
+            "endpoint": self._where,
             "phase": phase,
             "silent_s": round(self._clock() - self._heard_s.get("sensors", self._began_s), 1),
             "answer": self.answer(phase, figures)._asdict(),
@@ -289,36 +253,26 @@ class View:
 
     def _figures(self) -> dict[str, Any]:
         block, trace, applied = self._of("sensors"), self._of("trace"), self._of("applied")
-        figures: dict[str, Any] = {
-            "t_s": round(float(block["t_ns"]) * 1e-9, 3),
-            "drive_force_N": _number(float(np.mean(block["drive_force_N"]))),
-        }
+        figures: dict[str, Any] = {"t_s": round(float(block["t_ns"]) * 1e-9, 3)}
+        records = {"sensors": block, "applied": applied, "trace": trace}
+        for signal in SIGNALS.values():
+            record = records.get(signal.topic)
+            if record is not None:
+                value = float(np.mean(record[signal.name]))
+                figures[signal.name] = _number(value) if value != signal.unknown else None
+        for signal in WORD_SIGNALS:
+            record = records[signal.topic]
+            if record is not None:
+                figures[signal.field] = word_of(signal.column, int(record[signal.field]))
         if applied is not None:
-            figures |= {
-                "amplitude_m": _number(applied["amplitude_m"]),
-                "frequency_Hz": _number(applied["frequency_Hz"]),
-                "fallback": bool(applied["fallback"]),
-                "guard_state": _word("guard_state", applied),
-                "cause": _word("cause", applied),
-                "guard_limit": _word("cause", applied, "guard_limit"),
-            }
+            figures["fallback"] = bool(applied["fallback"])
         if trace is not None:
-            v_a, v_d = float(trace["vibration_velocity_mps"]), float(trace["drive_velocity_mps"])
-            waiting_s = float(trace["time_to_slip_s"])
-            figures |= {
-                "vibration_velocity_mps": _number(v_a),
-                "drive_velocity_mps": _number(v_d),
-                "wanted_velocity_mps": _number(trace["wanted_velocity_mps"]),
-                "velocity_ratio": _number(v_a / abs(v_d)) if v_d else None,
-                "wanted_amplitude_m": _number(trace["wanted_amplitude_m"]),
-                "time_to_slip_s": _number(waiting_s) if waiting_s >= 0.0 else None,
-                "breakaway_force_N": _number(trace["breakaway_force_N"]) or None,
-                "slips": int(trace["slips"]),
-                "mode": _word("mode", trace),
-                "state": _word("state", trace),
-                "reason": _word("reason", trace),
-                "limit": _word("limit", trace),
-            }
+            v_a, v_d = figures["vibration_velocity_mps"], figures["drive_velocity_mps"]
+            # otherwise the trace repeats an old value
+            measured = trace["state"] > wire.STANDSTILL and trace["limit"] not in (wire.STALE_INPUT, wire.NOT_FINITE)
+            figures["velocity_ratio"] = v_a / abs(v_d) if v_a is not None and v_d and measured else None
+            figures["breakaway_force_N"] = _number(trace["breakaway_force_N"]) or None
+            figures["slips"] = int(trace["slips"])
         return figures
 
     def answer(self, phase: str, figures: Mapping[str, Any]) -> Answer:
@@ -345,12 +299,21 @@ class View:
     def _slips_of_late(self) -> tuple[int, float]:
         """Recent slips and their window [s], shorter than usual shortly after the start."""
         slips = self.run.slips if self.run is not None else ()
-        return (slips[-1][1] - slips[0][1], round(self._clock() - slips[0][0], 1)) if slips else (0, 0.0)
+        return (slips[-1][1] - slips[0][1], round(slips[-1][0] - slips[0][0], 1)) if slips else (0, 0.0)
 
 
-def _word(column: str, record: Any, field: str = "") -> str:
-    number = int(record[field or column])
-    return known().get((column, number), (str(number), ""))[0]
+def _event_row(event: wire.Event, sender: str) -> EventRow:
+    known = event_code(event.code)
+    return EventRow(
+        t_s=round(event.t_ns * 1e-9, 3),
+        at=time.strftime("%H:%M:%S"),
+        source=sender,
+        code=plain(event.code[:40]),
+        letter=known.letter,
+        weight=SEVERITIES[known.letter],
+        text=plain(event.text[:_LONGEST_TEXT]),
+        help=known.help.replace("`", ""),
+    )
 
 
 def _number(value: Any) -> float | None:

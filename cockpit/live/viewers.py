@@ -21,7 +21,7 @@ class Viewers:
     def __len__(self) -> int:
         return len(self._queues)
 
-    def tell(self, frame: bytes) -> None:
+    def broadcast(self, frame: bytes) -> None:
         """Queue a frame for all; drop a browser whose queue is full."""
         for socket, queue in [*self._queues.items()]:
             try:

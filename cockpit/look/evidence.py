@@ -3,16 +3,14 @@
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from bridge.config import validate
 from bridge.faults import Fault
-from bridge.files import replacing
 from cockpit.look.source import MeasuredRecord
 from diagnosis.evidence.assumed import with_assumed
-from diagnosis.evidence.manifest import MANIFEST, RigTable, RunTable
-from diagnosis.evidence.manifest_text import manifest_text
+from diagnosis.evidence.import_table import write_run
+from diagnosis.evidence.manifest import RigTable, RunTable
+from diagnosis.evidence.manifest_text import rig_lines
 from diagnosis.look.look import LookResult
 
 _LEAST_TOLERANCE = 0.01  # relative, for numbers with less scatter: sensors are calibrated to 1 %
@@ -70,12 +68,7 @@ def rig_of(seen: LookResult, file: str) -> tuple[RigTable, list[str]]:
 def full_map(record: MeasuredRecord, seen: LookResult) -> str:
     """Map of a record with its rig, for `log import`. Raises Fault as `rig_of`."""
     rig, assumed = rig_of(seen, record.path.name)
-    lines = [f'drive = "{rig.drive}"']
-    for name, value in rig.values().items():
-        if value is not None:
-            lines.append(f"{name} = {value!r}" + ("  # assumed, not measured" if name in assumed else ""))
-    tolerance = [f"{name} = {value!r}" for name, value in rig.tolerance.items()]
-    return "\n".join([record.map_text.rstrip(), "", "[rig]", *lines, "", "[rig.tolerance]", *tolerance]) + "\n"
+    return "\n".join([record.map_text.rstrip(), "", *rig_lines(rig, assumed)]) + "\n"
 
 
 def write_evidence(record: MeasuredRecord, seen: LookResult, folder: Path) -> tuple[RigTable, list[str]]:
@@ -87,8 +80,5 @@ def write_evidence(record: MeasuredRecord, seen: LookResult, folder: Path) -> tu
     speed = seen.known.speed_mps if record.position_m is None else None
     run = RunTable(file=record.path.stem + ".parquet", drive_velocity_mps=speed)
     folder.mkdir(parents=True, exist_ok=True)
-    schema = pa.schema([pa.field(name, pa.float64(), nullable=False) for name in columns])
-    with replacing(folder / MANIFEST) as manifest, replacing(folder / run.file) as file:
-        manifest.write(manifest_text(rig, [run], assumed).encode("utf-8"))
-        pq.write_table(pa.table(list(columns.values()), schema=schema), file, use_dictionary=False)
+    write_run(folder, columns, rig, [run], assumed)
     return rig, assumed

@@ -7,11 +7,10 @@ import numpy as np
 from bridge.arrays import Floats
 from bridge.faults import Fault
 from bridge.log.finding import Finding
-from bridge.tables.one_clock import with_own_rows
+from bridge.tables.one_clock import gaps_of, with_own_rows
 from bridge.tables.table import Table
 from bridge.units import counted
 
-_GAP_STEPS = 10.0  # median steps; the record is cut at the same length
 _MOST_BACK = 0.1  # share of rows with a time not after the row before, above which the column is not a time
 
 
@@ -63,10 +62,7 @@ def of_time(t_s: Floats, where: str) -> list[Finding]:
                 f"{where}: {text}: must be few; give --time with another column, or --rate, or one table per file",
             )
         omitted.append(Finding("time", where, f"{text}; left out", len(late)))
-    steps = np.diff(np.unique(known))
-    gaps = np.flatnonzero(steps > _GAP_STEPS * float(np.median(steps))) if len(steps) else np.zeros(0, np.int64)
+    gaps, text = gaps_of(np.unique(known))
     if len(gaps):
-        first = float(np.unique(known)[gaps[0]])
-        text = f"{counted(len(gaps), 'gap')} in time, first at {first:.6g} s, the longest {steps.max():.3g} s"
         omitted.append(Finding("time-gap", where, f"{text}: cut there", len(gaps)))
     return omitted

@@ -51,7 +51,7 @@ def whole(seen: LookResult, size_in: tuple[float, float] = (9.0, 3.2)) -> "Figur
         axes.plot(ends[:, 0], sign * ends[:, 1], "^", color=_BLUE, markersize=4, label="re-stick")
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, ncols=2)  # above the curve
     axes.set_xlabel("time [s]")
-    axes.set_ylabel("friction coefficient" if seen.known.coefficient else f"force [{seen.known.force_unit}]")
+    axes.set_ylabel(_force(seen, "force"))
     return figure
 
 
@@ -68,9 +68,7 @@ def laid_over(seen: LookResult) -> "Figure":
         span = slice(*np.searchsorted(part.t_s, ends_s).tolist())
         _draw(axes, part.t_s[span] - cycle.breakaway_t_s, part.force_N[span], alpha=max(0.08, 1.0 / len(cycles) ** 0.5))
     axes.set_xlabel("time from breakaway [s]")
-    axes.set_ylabel(
-        "friction coefficient" if seen.known.coefficient else f"force along the motion [{seen.known.force_unit}]"
-    )
+    axes.set_ylabel(_force(seen, "force along the motion"))
     return figure
 
 
@@ -80,19 +78,16 @@ def histograms(seen: LookResult) -> "Figure":
 
     figure = Figure(figsize=(9.0, 2.8), layout="constrained")
     left, right = figure.subplots(1, 2)
-    dwells = np.array([cycle.dwell_s for cycle in seen.cycles])
-    for axes, values, label in (
-        (
-            left,
-            np.array([cycle.breakaway_force_N for cycle in seen.cycles]),
-            "coefficient at breakaway" if seen.known.coefficient else f"force at breakaway [{seen.known.force_unit}]",
-        ),
-        (right, dwells[np.isfinite(dwells)], "stick time [s]"),
-    ):
-        spread = float(np.ptp(values)) > 1e-6 * abs(float(values.mean()))  # one bin for values equal to float precision
-        bins = min(max(int(len(values) ** 0.5) + 1, 5), 40) if spread else 1
-        axes.hist(values, bins=bins, color=_PALE, edgecolor="white")
-        axes.axvline(float(values.mean()), color=_RED, linewidth=1.2)
+    tops = [cycle.breakaway_force_N for cycle in seen.cycles]
+    dwells = [cycle.dwell_s for cycle in seen.cycles if np.isfinite(cycle.dwell_s)]
+    of_tops = _force(seen, "force at breakaway", "coefficient at breakaway")
+    for axes, column, label in ((left, tops, of_tops), (right, dwells, "stick time [s]")):
+        values = np.array(column)
+        mean, middle = float(values.mean()), 0.5 * float(values.min() + values.max())
+        half = max(0.501 * float(np.ptp(values)), 0.01 * abs(mean))  # equal values: bins of a size that can be read
+        bins = min(max(int(len(values) ** 0.5) + 1, 5), 40)
+        axes.hist(values, bins=bins, range=(middle - half, middle + half), color=_PALE, edgecolor="white")
+        axes.axvline(mean, color=_RED, linewidth=1.2)
         axes.set_xlabel(label)
         axes.set_ylabel("slips")
         axes.yaxis.get_major_locator().set_params(integer=True)
@@ -120,28 +115,30 @@ def over_speed(seen: LookResult) -> "Figure":
         )
     axes.set_xscale("log")
     axes.set_xlabel(f"speed of the drive [m{seen.known.speed_unit}]")
-    axes.set_ylabel("friction coefficient" if load or seen.known.coefficient else f"force [{seen.known.force_unit}]")
+    axes.set_ylabel("friction coefficient" if load else _force(seen, "force"))
     axes.legend(frameon=False)
     return figure
 
 
-def save(figure: "Figure", file: IO[bytes], kind: str, dpi: int = 200, note: str = "") -> None:
+def save(figure: "Figure", file: IO[bytes], kind: str, note: str) -> None:
     """Write a figure; `kind` is svg, pdf or png, and `note` is written at its foot and in its metadata."""
     from matplotlib import rc_context
 
     metadata = {"Title": note} if kind in ("svg", "pdf") else {"Description": note}
+    figure.text(0.005, 0.005, note, fontsize=4.5, color="#808b96", va="bottom")
+    figure.get_layout_engine().set(rect=(0.0, 0.03, 1.0, 0.97))  # type: ignore[union-attr]
     with rc_context({"svg.fonttype": "none", "pdf.fonttype": 42}):
-        if note:
-            figure.text(0.005, 0.005, note, fontsize=4.5, color="#808b96", va="bottom")
-            figure.get_layout_engine().set(rect=(0.0, 0.03, 1.0, 0.97))  # type: ignore[union-attr]
-        figure.savefig(file, dpi=dpi, format=kind, metadata=metadata | ({"Date": None} if kind == "svg" else {}))
+        figure.savefig(file, dpi=200, format=kind, metadata=metadata | ({"Date": None} if kind == "svg" else {}))
 
 
 def as_svg(figure: "Figure") -> str:
-    """A figure as SVG for a page."""
-    file = io.BytesIO()
-    save(figure, file, "svg")
-    text = file.getvalue().decode()
+    """A figure as SVG for a page, on the ground of the page."""
+    from matplotlib import rc_context
+
+    file = io.StringIO()
+    with rc_context({"svg.fonttype": "none"}):
+        figure.savefig(file, format="svg", metadata={"Date": None}, transparent=True)
+    text = file.getvalue()
     return text[text.index("<svg") :]
 
 
@@ -152,6 +149,11 @@ def _figure(size_in: tuple[float, float]) -> tuple["Figure", Any]:
     axes = figure.subplots()
     _plain(axes)
     return figure, axes
+
+
+def _force(seen: LookResult, force: str, coefficient: str = "friction coefficient") -> str:
+    """The label of an axis of forces or of coefficients."""
+    return coefficient if seen.known.coefficient else f"{force} [{seen.known.force_unit}]"
 
 
 def _plain(axes: Any) -> None:

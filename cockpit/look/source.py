@@ -21,9 +21,9 @@ from diagnosis.evidence.manifest_keys import ChannelMap
 from diagnosis.evidence.mapped import calendar_unit_s, has_time, mapped
 from diagnosis.evidence.run_log import columns_of_log
 from diagnosis.look.guess import Guess, guess, no_time
-from diagnosis.look.look import RecordFacts
-from diagnosis.look.position_owner import is_of_slide
+from diagnosis.look.look import LookResult, RecordFacts, look
 from diagnosis.look.record import FEWEST
+from diagnosis.look.sticks import is_of_slide
 
 
 class LookOptions(NamedTuple):
@@ -141,6 +141,15 @@ def read_record(path: Path, asked: LookOptions) -> MeasuredRecord:
         )
     known = RecordFacts(asked.speed_mps, load_N, asked.mass_kg, of_load and load_N is None, torsion)
     return _record(path, columns, known, findings, map_text(table, channels, asked), of_load)
+
+
+def looked_at(record: MeasuredRecord) -> LookResult:
+    """The numbers of a record. Raises Fault BAD_TABLE for a record that is too short."""
+    seen = look(record.t_s, record.force_N, record.position_m, record.known)
+    if seen is None:
+        line = f"{record.path.name}: fewer than 16 samples of a force with a time; give a longer record"
+        raise Fault("BAD_TABLE", line)
+    return seen
 
 
 def _is_run_log(path: Path) -> bool:

@@ -8,10 +8,8 @@ from bridge.log.watches.arrays import noise_of
 
 _FIRST = 20  # samples for the first estimate of the level
 _FEWEST = 50  # fewest samples of a stretch
-_LEAST_SHARE, _MOST_SHARE = (
-    0.005,
-    0.5,
-)  # of the record: a shorter stretch is the foot of a climb, a longer one a record at rest
+# Of the record: a shorter stretch is the foot of a climb, a longer stretch a record at rest.
+_LEAST_SHARE, _MOST_SHARE = 0.005, 0.5
 _STILL = 0.01  # of the range of the force: a smaller change is not a climb
 _OF_NOISE = 6.0  # standard deviations: no sample of pure noise in a stretch exceeds them
 _LARGEST = 0.25  # of the force afterwards: a larger force belongs to a slide at rest under load

@@ -45,12 +45,12 @@ REFERENCE: Final[dict[Key, tuple[float, float, float] | tuple[float]]] = {
 class PaperRow(NamedTuple):
     """One line of the report. `deviation_percent` is None for a claim without a number."""
 
-    group: str
     claim: str
     found: str
     criterion: str
     passed: bool
     deviation_percent: float | None = None
+    group: str = PAPER_CLAIMS
 
 
 def paper_claims(runs: Mapping[Key, PairRun]) -> list[PaperRow]:
@@ -59,7 +59,6 @@ def paper_claims(runs: Mapping[Key, PairRun]) -> list[PaperRow]:
     expected = (0.126, 0.251, 0.377, 0.503, 0.628)
     rows = [
         PaperRow(
-            PAPER_CLAIMS,
             "v_a at 1, 2, 3, 4, 5 kHz and u0 = 0.02 µm is 0.126, 0.251, 0.377, 0.503, 0.628 mm/s (2π f u0, no run)",
             ", ".join(f"{velocity:.3f}" for velocity in velocities) + " mm/s",
             "each within 0.001 mm/s",
@@ -72,7 +71,6 @@ def paper_claims(runs: Mapping[Key, PairRun]) -> list[PaperRow]:
         ours = runs[pair, 0]
         rows.append(
             PaperRow(
-                PAPER_CLAIMS,
                 f"{pair}: no stick-slip without vibration (follows from assumed friction values, see below)",
                 f"{ours.mean.late_slips:.0f} slips; F_d {ours.mean.settled_force_N:.2f} N",
                 "no slip",
@@ -90,7 +88,6 @@ def _claims_of_a_pair(pair: str, runs: Mapping[Key, PairRun]) -> list[PaperRow]:
     swing_text = " → ".join(f"{swing:.2f}" for swing in swings) + " N"
     return [
         PaperRow(
-            PAPER_CLAIMS,
             f"{pair}: v_a below v_d (1, 2, 3 kHz) reduces the stick-slip only in part",
             f"{', '.join(f'{at[f].late_slips:.0f}' for f in sliding[1:])} slips remain; "
             f"{', '.join(f'{100 * (1 - swing / swings[0]):.0f}' for swing in swings[1:])} % less swing",
@@ -98,14 +95,12 @@ def _claims_of_a_pair(pair: str, runs: Mapping[Key, PairRun]) -> list[PaperRow]:
             all(at[f].late_slips > 0 and 0 < at[f].swing_N < swings[0] for f in sliding[1:]),
         ),
         PaperRow(
-            PAPER_CLAIMS,
             f"{pair}: the reduction grows with v_a (swing F_d max - F_d min at 0 → 1 → 2 → 3 kHz)",
             swing_text,
             "smaller at each step",
             _falling(swings),
         ),
         PaperRow(
-            PAPER_CLAIMS,
             f"{pair}: complete elimination once v_a reaches v_d (4 kHz: v_a/v_d = "
             f"{vibration_velocity_mps(4000) / DRIVE_VELOCITY_MPS:.3f}; 5 kHz)",
             f"{at[4000].late_slips:.0f} and {at[5000].late_slips:.0f} slips",
@@ -113,7 +108,6 @@ def _claims_of_a_pair(pair: str, runs: Mapping[Key, PairRun]) -> list[PaperRow]:
             at[4000].late_slips == at[5000].late_slips == 0,
         ),
         PaperRow(
-            PAPER_CLAIMS,
             f"{pair}: the drive force falls further from 4 to 5 kHz",
             f"{at[4000].settled_force_N:.2f} → {at[5000].settled_force_N:.2f} N",
             "lower at 5 kHz",
@@ -125,18 +119,13 @@ def _claims_of_a_pair(pair: str, runs: Mapping[Key, PairRun]) -> list[PaperRow]:
 
 def _stick_row(pair: str, sticks_s: list[float]) -> PaperRow:
     chain = " → ".join(f"{stick_s:.3f}" for stick_s in sticks_s) + " s"
-    claim, criterion, passed = (
-        f"{pair}: the stick phases shorten with f (re-stick to next breakaway at 0 → 1 → 2 → 3 kHz)",
-        "shorter at each step",
-        _falling(sticks_s),
-    )
-    if not pair.startswith("C45-C45"):
-        # the paper claims it for steel on steel (Figures 3, 4); on cast iron one step of three is 0.2-0.5 %
-        # longer
-        claim = f"{pair}: the stick phases are shorter at 3 kHz than at 0 (claimed by the paper for steel only)"
-        criterion = "shorter at 3 kHz than at 0; not required at each step"
-        passed = sticks_s[3] < sticks_s[0]
-    return PaperRow(PAPER_CLAIMS, claim, chain, criterion, passed)
+    if pair.startswith("C45-C45"):
+        claim = f"{pair}: the stick phases shorten with f (re-stick to next breakaway at 0 → 1 → 2 → 3 kHz)"
+        return PaperRow(claim, chain, "shorter at each step", _falling(sticks_s))
+    # the paper claims it for steel on steel (Figures 3, 4); on cast iron one step of three is 0.2-0.5 % longer
+    claim = f"{pair}: the stick phases are shorter at 3 kHz than at 0 (claimed by the paper for steel only)"
+    criterion = "shorter at 3 kHz than at 0; not required at each step"
+    return PaperRow(claim, chain, criterion, sticks_s[3] < sticks_s[0])
 
 
 def _falling(values: list[float]) -> bool:
@@ -153,7 +142,7 @@ def reference_rows(runs: Mapping[Key, PairRun]) -> list[PaperRow]:
         if len(reference) == 1:
             settled_N, slips = run.mean.settled_force_N, run.mean.late_slips
             rows.append(_number(group, f"{where}: drive force", settled_N, reference[0], "N", _FORCE_PERCENT))
-            rows.append(PaperRow(group, f"{where}: period = none", f"{slips:.0f} slips", "no slip", slips == 0))
+            rows.append(PaperRow(f"{where}: period = none", f"{slips:.0f} slips", "no slip", slips == 0, group=group))
             continue
         for name, ours, scatter, theirs, unit, percent in zip(
             ("F_d max", "F_d min", "period"),
@@ -210,10 +199,10 @@ def _number(
     digits = max(0, 4 - len(str(int(abs(theirs)))))
     spread = f" ± {scatter:.3f}" if scatter is not None else ""
     return PaperRow(
-        group,
         f"{claim} {theirs:.{min(digits, 3)}f} {unit}",
         f"{ours:.{digits}f}{spread} {unit}",
         f"within {percent:g} %",
         abs(deviation_percent) <= percent,
         deviation_percent,
+        group,
     )

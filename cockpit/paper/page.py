@@ -2,15 +2,14 @@
 
 import time
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from jinja2 import (
-    Environment,
-    StrictUndefined,
-)  # at the top, so that a missing package fails before minutes of simulation
+import jinja2  # noqa: F401 - a missing package fails before minutes of simulation
 
 from bridge.files import write_whole
+from bridge.pages import filled_page
 from bridge.provenance import provenance
+from bridge.results import in_json
 from cockpit.paper.claims import PAPER_CLAIMS, PaperRow, paper_claims, parameter_rows, reference_rows, slip_rows
 from cockpit.paper.runs import (
     CYCLES_FROM_S,
@@ -32,12 +31,12 @@ class ReproduceResult(NamedTuple):
     rows: list[PaperRow]
     elapsed_s: float
 
-    @property
+    @in_json
     def passed(self) -> bool:
         """True if every check holds."""
         return all(row.passed for row in self.rows)
 
-    @property
+    @in_json
     def verdict(self) -> str:
         """The line to print."""
         held = sum(row.passed for row in self.rows)
@@ -45,11 +44,6 @@ class ReproduceResult(NamedTuple):
         claims_held = sum(row.passed for row in claims)
         of_the_paper = f"{claims_held} of {len(claims)} claims of the paper hold"
         return f"{of_the_paper}; {held} of {len(self.rows)} checks in all"
-
-    def as_json(self) -> dict[str, Any]:
-        """The result as plain dictionaries, for `json.dump`."""
-        rows = [row._asdict() for row in self.rows]
-        return {"passed": self.passed, "verdict": self.verdict, "rows": rows, "elapsed_s": self.elapsed_s}
 
 
 def reproduce(out: Path, progress: bool) -> ReproduceResult:
@@ -90,13 +84,13 @@ def _page(result: ReproduceResult, runs: dict[Key, PairRun]) -> str:
     groups: dict[str, list[PaperRow]] = {}
     for row in result.rows:
         groups.setdefault(row.group, []).append(row)
-    template = Path(__file__).with_name("page.html.j2").read_text(encoding="utf-8")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     one_kHz = runs["C45-C45 @ 0.063", 1000]
     drifting = runs["C45-C45 @ 0.063", 5000].course
-    return environment.from_string(template).render(
+    return filled_page(
+        Path(__file__).with_name("page.html.j2"),
+        f"Stick-slip paper, reproduced: {result.verdict}",
+        provenance().footer(),
         result=result,
-        footer=provenance().footer(),
         groups=groups,
         rigs={pair: paper_rig(pair) for pair in (*STEEL_PAIRS, *PTFE_PAIRS)},
         figures=figures(runs),

@@ -1,12 +1,11 @@
 """The paper's Figures 2-4 and 6-9 from our runs, as PNG pictures inside the page."""
 
-import base64
-import io
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from bridge.pages import png
 from cockpit.paper.runs import DRIVE_VELOCITY_MPS, FREQUENCIES_HZ, Key, PairRun, vibration_velocity_mps
 
 if TYPE_CHECKING:
@@ -139,6 +138,4 @@ def _png(figure: "Figure") -> str:
     for axis in figure.axes:
         axis.grid(alpha=0.25)
         axis.tick_params(labelsize=8)
-    memory = io.BytesIO()
-    figure.savefig(memory, format="png", dpi=120)
-    return base64.b64encode(memory.getvalue()).decode()
+    return png(figure, 120)

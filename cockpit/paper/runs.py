@@ -6,8 +6,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from bridge.arrays import Floats
 from bridge.config import validate
-from diagnosis.features.cycles import Floats, find_cycles
+from diagnosis.slips import find_cycles
 from plant.config import RigConfig
 from plant.pairs import PAIRS
 from plant.simulate import Simulation, simulate
@@ -133,12 +134,7 @@ def measure(simulation: Simulation) -> Measured:
 
 def _course(simulation: Simulation, samples_per_block: int) -> Course:
     every = slice(samples_per_block - 1, None, samples_per_block)
-    return Course(
-        simulation.t_s[every].copy(),
-        simulation.drive_force_N[every].copy(),
-        simulation.position_m[every].copy(),
-        simulation.drive_position_m[every].copy(),
-    )
+    return Course(*(getattr(simulation, name)[every].copy() for name in Course._fields))
 
 
 def one_slip(pair: str) -> Slip:

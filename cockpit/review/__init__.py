@@ -1,8 +1,7 @@
 """One log, or two overlaid, as one self-contained HTML file.
 
-panels        which curves share a panel, and the hint above it
 bands         modes and limits of the controller as intervals with a word each
 differences   parameters that differ between two logs
 data          all of it as JSON, curves as base64 of float32
-page          the file, assembled from page.html, page.css, the scripts and uPlot (vendor/, version 1.6.32, MIT)
+page          the file, assembled from page.html, the scripts and uPlot (vendor/, version 1.6.32, MIT)
 """

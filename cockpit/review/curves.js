@@ -1,8 +1,9 @@
 // Curves: one uPlot plot per panel, all zoomed by the same time axis.
 "use strict";
 
-const LEFT = 64, RIGHT = 14; // margins of the plotting area in pixels, the same for all panels and the ribbon
-const EXCITING = "#e4f0e1", LIMIT = "#b5402a", MARK = "#b5402a", BEGIN = "#1f2d3a";
+const LEFT = 72, RIGHT = 14; // margins of the plotting area in pixels, the same for all panels and the ribbon
+// drawn on a ground that is light or dark: pale colours are transparent ones
+const EXCITING = "#1e844922", GRID = "#1c283316", LIMIT = "#b5402a", MARK = "#b5402a", BEGIN = "#1f2d3a";
 
 /** Decode a curve (base64 of little-endian float32) to an array; null for missing values. */
 function unpacked(text) {
@@ -168,13 +169,13 @@ function plotOf(place, panel, x, logs, axis) {
     cursor: { sync: { key: "time", setSeries: false }, drag: { x: true, y: false, setScale: false } },
     scales: { x: { time: false, range: () => [axis.from, axis.to] }, y: { range: heightOf(panel) } },
     axes: [
-      { label: "time [s]", labelSize: 18, labelFont: "12px system-ui", size: 34, grid: { stroke: "#eef0f1" } },
+      { label: "time [s]", labelSize: 18, labelFont: "12px system-ui", size: 34, grid: { stroke: GRID } },
       {
         label: panel.unit ? `${panel.axis} [${panel.unit}]` : panel.axis,
         labelSize: 20,
         labelFont: "12px system-ui",
         size: LEFT - 20,
-        grid: { stroke: "#eef0f1" },
+        grid: { stroke: GRID },
       },
     ],
     series,

@@ -9,22 +9,21 @@ from typing import Any
 import numpy as np
 
 from bridge.log.logfile import RunData, block_period_ns, read_run
+from bridge.log.watches.histogram import Histogram
 from bridge.provenance import Provenance, shown_name
-from bridge.wire.event_codes import EVENTS, LETTERS
+from bridge.wire.event_codes import SEVERITIES, event_code
 from cockpit.figures.grid import Envelope, Grid, on_grid
-from cockpit.figures.signals import SIGNALS, Floats, PlottedSignal, holds, limits_of, samples_of
+from cockpit.figures.signals import PANELS, Floats, Panel, PlottedSignal, holds, limits_of, samples_of
 from cockpit.judge.judged import judge_tables
 from cockpit.judge.verdict import RunVerdict
 from cockpit.judge.verdict_words import headline, in_words
-from cockpit.review.bands import bands_of, title_of, used_words
+from cockpit.review.bands import bands_of, used_words
 from cockpit.review.differences import differences, parameters_of
-from cockpit.review.panels import PANELS
-from diagnosis.features.cycles import Cycles
+from diagnosis.slips import Cycles
 
 FORMAT = "stickslip-review/1"
 # of all logs together, for longer runs: 11 signals of three values then take 3.5 MB; two runs of 20 s take 4.5 MB
 _MOST_BINS = 20_000
-_PER_DECADE = 20  # bins of the latency histogram
 _MOST_EVENTS = 2000  # listed per log
 
 
@@ -46,8 +45,8 @@ def review_data(paths: Sequence[Path], made: Provenance) -> tuple[dict[str, Any]
         "figures": _figures(verdicts),
         "panels": [panel for panel in (_panel(panel, runs, grid) for panel in PANELS) if panel["curves"]],
         "words": [
-            {"row": title_of(word.column), "word": _lower(word.word), "help": word.help.replace("`", "")}
-            for word in used_words(rows)
+            {"row": title, "word": _lower(word.word), "help": word.help.replace("`", "")}
+            for title, word in used_words(rows)
         ],
         "parameters": [{"key": key, "value": value} for key, value in sorted(parameters[0].items())],
         "differences": [difference._asdict() for difference in differences([*parameters])] if len(runs) > 1 else [],
@@ -104,8 +103,8 @@ def _figures(verdicts: Sequence[RunVerdict]) -> list[dict[str, Any]]:
     return [{"what": name, "logs": [lines.get(name, []) for lines in tables]} for name in names]
 
 
-def _panel(panel: Any, runs: Sequence[RunData], grid: Grid) -> dict[str, Any]:
-    signals = [SIGNALS[name] for name in panel.signals]
+def _panel(panel: Panel, runs: Sequence[RunData], grid: Grid) -> dict[str, Any]:
+    signals = panel.signals
     curves = [
         _curve(run, number, signal, grid)
         for signal in signals
@@ -118,14 +117,9 @@ def _panel(panel: Any, runs: Sequence[RunData], grid: Grid) -> dict[str, Any]:
         for number, of_log in enumerate(limits)
         for words, value in of_log
     ]
-    return {
-        "title": panel.title,
-        "hint": panel.hint,
-        "unit": signals[0].unit,
-        "axis": signals[0].axis,
-        "open": panel.is_open,
+    return panel.heading() | {
         "empty": not any(curve["known"] for curve in curves),
-        "slips": panel.signals[0] == "drive_force_N",
+        "slips": signals[0].name == "drive_force_N",
         "limits": [{"words": words, "value": value * signals[0].factor} for words, value in dict.fromkeys(named)],
         "curves": curves,
     }
@@ -136,12 +130,8 @@ def _curve(run: RunData, number: int, signal: PlottedSignal, grid: Grid) -> dict
     made = on_grid(t_s, values * signal.factor, grid)
     if signal.topic != "sensors" and len(t_s) > 1:
         made = _held(made, math.ceil(float(np.median(np.diff(t_s))) / grid.step_s - 0.5))
-    curve = {
+    curve = signal.for_page() | {
         "log": number,
-        "name": signal.name,
-        "symbol": signal.symbol,
-        "words": signal.words,
-        "colour": signal.colour,
         "known": bool(np.isfinite(made.mean).any()),
         "mean": _packed(made.mean),
     }
@@ -177,20 +167,15 @@ def _events(run: RunData) -> list[dict[str, Any]]:
             "source": event.source,
             "code": event.code,
             "text": event.text,
-            "help": EVENTS[event.code].help.replace("`", "") if event.code in EVENTS else "",
-            "weight": LETTERS[EVENTS[event.code].letter] if event.code in EVENTS else "",
+            "help": event_code(event.code).help.replace("`", ""),
+            "weight": SEVERITIES[event_code(event.code).letter],
         }
         for event in events
     ]
 
 
 def _latency(run: RunData) -> dict[str, Any] | None:
-    """Histogram of the latency from a block to its command; None in lockstep and without commands."""
-    round_trip_us = run.applied["round_trip_ns"][run.applied["round_trip_ns"] > 0] * 1e-3
-    if not len(round_trip_us):
-        return None
-    lowest = math.floor(math.log10(float(round_trip_us.min())) * _PER_DECADE)
-    highest = math.floor(math.log10(float(round_trip_us.max())) * _PER_DECADE) + 1
-    edges_us = 10.0 ** (np.arange(lowest, highest + 1) / _PER_DECADE)
-    counts = np.histogram(round_trip_us, edges_us)[0]
-    return {"edges_us": [round(float(edge), 3) for edge in edges_us], "counts": counts.tolist()}
+    """Histogram of the latency from a block to its command [us]; None in lockstep and without commands."""
+    latency_us = Histogram()
+    latency_us.add(run.applied["round_trip_ns"][run.applied["round_trip_ns"] > 0] * 1e-3)
+    return latency_us.bars("us")

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from bridge.log.logfile import RunData
-from cockpit.judge.verdict_words import VERDICT
+from bridge.log.storage.verdict_file import VERDICT
 
 
 class ParameterDifference(NamedTuple):

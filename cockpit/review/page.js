@@ -6,9 +6,10 @@ const logs = data.logs;
 const axis = new TimeAxis(data.grid.start_s, data.grid.start_s + (data.grid.bins - 1) * data.grid.step_s);
 
 function answers() {
+  into("name", logs.map((log) => log.name).join(" and "));
   for (const log of logs) {
-    const name = logs.length > 1 ? `${log.label}: ${log.name}` : log.name;
-    into("answers", made("p", [made("small", name), log.answer], { className: `verdict ${{ true: "good", false: "bad" }[log.good] ?? "unjudged"}` }));
+    const name = logs.length > 1 ? [made("small", `${log.label}: ${log.name}`)] : [];
+    into("answers", made("p", [...name, log.answer], { className: `verdict ${{ true: "good", false: "bad" }[log.good] ?? "unjudged"}` }));
   }
   if (logs.length < 2) return;
   const first = data.differences.slice(0, 4).map((row) => `${row.key} ${row.values.map((value) => value || "(none)").join(" \u2192 ")}`);

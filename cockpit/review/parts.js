@@ -12,9 +12,14 @@ function into(id, ...children) {
   document.getElementById(id).append(...children);
 }
 
+/** A box that scrolls if the page is narrower than its content. */
+function wide(content) {
+  return made("div", [content], { className: "wide", tabIndex: 0 });
+}
+
 function table(head, rows) {
-  const heads = made("tr", head.map((text) => made("th", text)));
-  return made("div", [made("table", [heads, ...rows])], { className: "wide" });
+  const heads = made("tr", head.map((text) => made(text ? "th" : "td", text)));
+  return wide(made("table", [heads, ...rows]));
 }
 
 /** Latency histogram as SVG: a bar per interval, its height the logarithm of the count. */
@@ -30,7 +35,7 @@ function histogram(logs) {
     element.textContent = text;
     return element;
   };
-  const picture = svg("svg", { viewBox: `0 0 ${w} ${h}`, style: "width: 100%; max-width: 900px", "font-size": 12, role: "img", "aria-label": "histogram of latency" });
+  const picture = svg("svg", { viewBox: `0 0 ${w} ${h}`, "font-size": 12, role: "img", "aria-label": "histogram of latency" });
   for (const [at, log] of logs.entries()) {
     const fill = at === 0 ? "#2a6fb5" : "none";
     log.latency.counts.forEach((count, bar) => {
@@ -45,5 +50,5 @@ function histogram(logs) {
   picture.append(svg("text", { x: (left + w) / 2, y: h - 6, "text-anchor": "middle" }, "time from the block to its command"));
   picture.append(svg("line", { x1: left, x2: w - 10, y1: h - bottom, y2: h - bottom, stroke: "#808b96" }));
   picture.append(svg("text", { x: 0, y: 14 }, "commands"));
-  return picture;
+  return wide(picture);
 }

@@ -2,12 +2,13 @@
 "use strict";
 
 const ROW = 20; // pixels of height
-const COLOURS = ["#d5e3f0", "#e8daef", "#d6eaea", "#fdebd0", "#e3e7c8", "#dfe3f5"];
+const QUIET = "#1c28331a", BAD = "#c0392b70"; // transparent, as the ground is light or dark
+const COLOURS = ["#2a6fb53a", "#7d3c983a", "#148f773a", "#ca6f1e3a", "#7d8b1f3a", "#4a5fc13a"];
 
 /** Assign colours to words in the order of first use; quiet words are grey. */
 function colouring() {
-  const known = new Map([["excite", "#bfe0b8"], ["watch", "#e5e7e9"], ["disabled", "#eef0f1"], ["stick", "#f2d694"], ["slip", "#e6a394"],
-    ["smooth", "#dcebd8"], ["standstill", "#e5e7e9"], ["unknown", "#eef0f1"], ["fault", "#e6a394"], ["stopped", "#e6a394"], ["no limit", "#eef0f1"]]);
+  const known = new Map([["excite", "#1e844955"], ["watch", QUIET], ["disabled", QUIET], ["stick", "#d4a01770"], ["slip", BAD],
+    ["smooth", "#1e844930"], ["standstill", QUIET], ["unknown", QUIET], ["fault", BAD], ["stopped", BAD], ["no limit", QUIET]]);
   return (word) => {
     if (!known.has(word)) known.set(word, COLOURS[known.size % COLOURS.length]);
     return known.get(word);
@@ -26,6 +27,8 @@ function ribbon(place, logs, axis, helps) {
   if (!rows.length) return;
   const canvas = document.createElement("canvas"), colour = colouring();
   canvas.id = "bands";
+  canvas.role = "img";
+  canvas.ariaLabel = "modes, limits and events over time";
   place.append(canvas);
   const tip = document.createElement("div");
   tip.id = "tip";

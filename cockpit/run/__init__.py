@@ -2,11 +2,11 @@
 
 scenario, scenario_file     the model of a run; its files as tables
 sensor_needs                sensors that a scenario needs, checked before the run
-run                         one run, from its scenario to its verdict
+run, outcome                one run, from its scenario to its verdict; its result
 in_process, closed_loop     in one process, without a bus; plant and controller in turns, compiled
 simulated/                  in one process, with faults of bus and processes, in simulated time
 processes, child_process    as several processes: start, supervision, end; signals and faults of each
-progress, operator, status  the progress line; operator commands to a rig; the state of a rig
+progress                    the progress line
 lifecycle_lines                     lines on the terminal of a process that was started alone
 replay, log_to_bus          a log through this version's controller; a log published on the bus
 soak                        a run of hours, with memory and latency

@@ -11,11 +11,11 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Generator
-from typing import Any
+from typing import Any, NamedTuple
 
 from bridge import compiling
 from bridge.faults import Fault
-from bridge.plain import say
+from bridge.plain import print_line
 from bridge.wire import realtime
 
 _PARENT_CHECK_S = 0.25
@@ -69,6 +69,17 @@ def handle_endings(handler: Callable[[int, Any], Any]) -> dict[signal.Signals, A
     return {number: signal.signal(number, handler) for number in (signal.SIGINT, *_ending_signals())}
 
 
+@contextlib.contextmanager
+def endings_handled(handler: Callable[[int, Any], Any]) -> Generator[None]:
+    """Handle Ctrl-C, SIGTERM and SIGHUP alike in the body."""
+    before = handle_endings(handler)
+    try:
+        yield
+    finally:
+        for number, earlier in before.items():
+            signal.signal(number, earlier)
+
+
 def end_like_ctrl_c() -> None:
     """Let SIGTERM and SIGHUP end the command like Ctrl-C: it stops its workers, keeps whole files, reports INTERRUPTED."""
 
@@ -114,24 +125,22 @@ def left_on_ctrl_c(line: str, left: str, again: bool) -> Generator[None]:
 
     def announce() -> None:
         enabled.set()
-        say(line)
+        print_line(line)
 
     def on_signal(_number: int, _frame: Any) -> None:
         if enabled.is_set():
             raise KeyboardInterrupt
 
-    before = handle_endings(on_signal)
     timer = threading.Timer(_LONG_S, announce)
     timer.daemon = True
-    timer.start()
-    try:
-        yield
-    except KeyboardInterrupt:
-        raise Fault("INTERRUPTED", left) from None
-    finally:
-        timer.cancel()
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    with endings_handled(on_signal):
+        timer.start()
+        try:
+            yield
+        except KeyboardInterrupt:
+            raise Fault("INTERRUPTED", left) from None
+        finally:
+            timer.cancel()
 
 
 @contextlib.contextmanager
@@ -174,16 +183,24 @@ def warn_without_priority() -> None:
         print(f"stickslip: warning: {realtime.NORMAL}: {realtime.NOT_GUARANTEED}", file=sys.stderr)
 
 
+class ReportedFault(NamedTuple):
+    """A fault as JSON."""
+
+    fault: str  # code
+    line: str
+    exit_status: int
+
+
 def report(fault: Fault, as_json: bool) -> int:
     """Print a fault, as one line on stderr or a JSON object on stdout; return its exit status."""
     if as_json:
-        print(json.dumps({"fault": fault.kind.code, "line": fault.line, "exit_status": fault.kind.exit_status}))
+        print(json.dumps(ReportedFault(fault.kind.code, fault.line, fault.kind.exit_status)._asdict()))
     else:
-        say(f"stickslip: {fault.kind.code}: {fault.line}")
+        print_line(f"stickslip: {fault.kind.code}: {fault.line}")
     return fault.kind.exit_status
 
 
-def guarded(work: Callable[[], int | None], as_json: bool = False) -> int:
+def exit_status_of(work: Callable[[], int | None], as_json: bool = False) -> int:
     """Run a command's work; return its exit status, also for faults and Ctrl-C."""
     compiling.guard = functools.partial(_ended_at_once, as_json)
     try:

@@ -1,104 +1,116 @@
 """Plant and controller in turns, many blocks per call of compiled code: the interpreter does not slow a run down."""
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from bridge.guard.core import accept
-from bridge.guard.estimates import expect_drive
+from bridge.arrays import Floats
 from bridge.guard.states import apply_order
-from bridge.kernel import unlocked_kernel
+from bridge.kernel import kernel, unlocked_kernel
 from bridge.kernel_cache import compile_once
-from bridge.wire.messages import APPLIED, CHANNELS, COMMAND, TRACE, Records, sensor_block
+from bridge.wire.channels import CHANNELS
+from bridge.wire.messages import ANNOUNCED, APPLIED, BLOCK, COMMAND, TRACE, Records, sensor_block
 from controller.announced import take_announcement
-from controller.codes import ANNOUNCED, BLOCK
 from controller.config import ControllerConfig
 from controller.core import step as controller_step
 from controller.records import build as controller_records
 from plant.config import RigConfig
-from plant.inputs import InputsAhead, RigInputs
+from plant.inputs import Inputs, InputsAhead, RigInputs
+from plant.piezo import base_velocity_mps, delivered_share
 from plant.records import TRUTH, guard_records
 from plant.records import build as plant_records
-from plant.step import step as plant_step
+from plant.step import act, report
 
 _VELOCITY = TRUTH.index("true_velocity_mps")
+Pair = tuple[npt.NDArray[Any], npt.NDArray[Any]]  # parameters and memory, one record each
 
 
-@unlocked_kernel
-def advance_both(
-    plant_params: npt.NDArray[Any],
-    plant_state: npt.NDArray[Any],
-    guard_params: npt.NDArray[Any],
-    guard_state: npt.NDArray[Any],
-    velocity_mps: npt.NDArray[np.float64],
-    delay_blocks: npt.NDArray[np.int64],
-    noise: npt.NDArray[np.float64],
-    controller_params: npt.NDArray[Any],
-    controller_state: npt.NDArray[Any],
-    operator_events: int,
-    announcements: npt.NDArray[np.int64],
-    announce: npt.NDArray[Any],
-    answered: int,
-    analogue: npt.NDArray[np.float64],
-    truth: npt.NDArray[np.float64],
-    sensors: npt.NDArray[Any],
-    applied: npt.NDArray[Any],
-    commands: npt.NDArray[Any],
-    traces: npt.NDArray[Any],
-) -> int:
-    """Advance the rig and its controller by many blocks, in place; return how many were done.
-
-    Args:
-        plant_params, plant_state, guard_params, guard_state, controller_params, controller_state: one record each.
-        velocity_mps: of the drive, [blocks].
-        delay_blocks: additional delay of the command on its way to the exciter, [blocks].
-        noise: standard normal numbers, [blocks, 5, samples].
-        operator_events: bits STOP and RESET of `controller.codes`, for the first block.
-        announcements: number of announcements that the rig makes before each block's samples, [blocks].
-        announce: these announcements in order, message records.
-        answered: 1 if `commands[0]` answers the block before the first, 0 at the start of a run.
-        analogue, truth: [5, samples] and [6, samples], overwritten by every block.
-        sensors, applied, traces: message records [blocks], filled.
-        commands: message records [blocks + 1]; the rig receives the first with the first block, the others are filled.
-
-    Stops early, before a block in which the slide's velocity becomes NaN or infinite.
-
-    """
-    last, announced = truth.shape[1] - 1, 0
-    for i in range(velocity_mps.shape[0]):
-        received = answered if i == 0 else 1
-        if received == 1 and not accept(guard_params[0], guard_state[0], commands[i]):
-            received = 0
-        first, announced = announced, announced + announcements[i]
-        for row in range(first, announced):
-            expect_drive(guard_state[0], announce[row].drive_velocity_mps)
-        plant_step(
-            plant_params, plant_state, guard_params, guard_state, velocity_mps[i], commands[i : i + 1], received,
-            delay_blocks[i], noise[i], 0, 0, 0, analogue, truth, sensors[i : i + 1], applied[i : i + 1],
-        )  # fmt: skip
-        if not math.isfinite(truth[_VELOCITY, last]):
-            return i
-        events = BLOCK | operator_events if i == 0 else BLOCK
-        for row in range(first, announced):
-            take_announcement(controller_state[0], announce[row].holds_from_ns, announce[row].drive_velocity_mps)
-            events |= ANNOUNCED
-        controller_step(
-            controller_params, controller_state, sensors[i : i + 1], events, 0, sensors[i].t_ns,
-            commands[i + 1 : i + 2], traces[i : i + 1],
-        )  # fmt: skip
-    return velocity_mps.shape[0]
-
-
-class StretchMessages(NamedTuple):
-    """Messages of one stretch of a run, [blocks] each."""
+class Stretch(NamedTuple):
+    """Messages and truth of one stretch of a run, [blocks] each but the announcements."""
 
     sensors: Records
     applied: Records
     command: Records
     trace: Records
     announce: Records  # [announcements]
+    truth: Floats  # [blocks, 6, samples], rows as `plant.records.TRUTH`
+    v_a_mps: Floats  # of the base at the end of each block
+    frequency_Hz: Floats  # of the exciter
+    gain: Floats  # v_a for one metre of commanded amplitude at that frequency
+
+
+def advancing(answer: Callable[..., None]) -> Callable[..., int]:
+    """The kernel that advances a rig and its subject, which answers each sensor block by the kernel `answer`.
+
+    Args:
+        answer: fills row `i` of `made.command` and `made.trace`; its arguments are subject, i, announce, events, made.
+
+    """
+
+    def advance(
+        plant: Pair,
+        guard: Pair,
+        subject: Any,
+        inputs: Inputs,
+        operator_events: int,
+        command: Records,
+        analogue: Floats,
+        made: Stretch,
+    ) -> int:
+        """Advance by many blocks, in place; return the number of blocks done.
+
+        Args:
+            plant, guard: their memory is advanced.
+            subject: passed to `answer`.
+            inputs: of the rig.
+            operator_events: bits STOP and RESET of `bridge.wire.messages`, for the first block.
+            command: the answer to the block before the first, [1]; [0] at the start of a run.
+            analogue: [5, samples], overwritten by every block.
+            made: filled.
+
+        Stops early, before a block in which the slide's velocity becomes NaN or infinite.
+
+        """
+        p, s = plant[0][0], plant[1][0]
+        announced, events = 0, BLOCK | operator_events
+        for i in range(inputs.velocity_mps.shape[0]):
+            first, announced = announced, announced + inputs.announcements[i]
+            announce = inputs.announce[first:announced]
+            truth, sensors, applied = made.truth[i], made.sensors[i : i + 1], made.applied[i : i + 1]
+            accepted = act(
+                plant[0], plant[1], guard[0], guard[1], inputs.velocity_mps[i], command, inputs.delay_blocks[i], announce,
+                inputs.noise[i], analogue, truth, sensors,
+            )  # fmt: skip
+            report(plant[0], plant[1], guard[0], guard[1], accepted, 0, 0, 0, sensors, applied)
+            if not math.isfinite(truth[_VELOCITY, -1]):
+                return i
+            made.v_a_mps[i] = base_velocity_mps(p, s)
+            made.frequency_Hz[i] = s.frequency_Hz
+            made.gain[i] = delivered_share(p, s.frequency_Hz) * 2.0 * math.pi * s.frequency_Hz
+            if s.amplitude_m > 0.0:
+                made.gain[i] = made.v_a_mps[i] / s.amplitude_m
+            answer(subject, i, announce, events, made)
+            command, events = made.command[i : i + 1], BLOCK
+        return inputs.velocity_mps.shape[0]
+
+    return unlocked_kernel(advance)
+
+
+@kernel
+def _controller_answer(subject: Pair, i: int, announce: Records, events: int, made: Stretch) -> None:
+    for row in range(announce.shape[0]):
+        take_announcement(subject[1][0], announce[row].holds_from_ns, announce[row].drive_velocity_mps)
+        events |= ANNOUNCED
+    controller_step(
+        subject[0], subject[1], made.sensors[i : i + 1], events, 0, made.sensors[i].t_ns, made.command[i : i + 1],
+        made.trace[i : i + 1],
+    )  # fmt: skip
+
+
+_advance_both = advancing(_controller_answer)
 
 
 class ClosedLoop:
@@ -115,44 +127,52 @@ class ClosedLoop:
     def __init__(self, rig: RigConfig, seed: int, config: ControllerConfig, arm: bool) -> None:
         self.block = 0  # number of the next block
         self.block_ns = round(rig.solver.block_s * 1e9)
-        self.controller_state: npt.NDArray[Any]
-        samples = rig.solver.samples_per_block
         self._rig = rig
         self._inputs = InputsAhead(RigInputs(rig, seed))
-        self._sensors = sensor_block(samples)
-        self._plant_params, self._plant_state = plant_records(rig)
-        self._guard_params, self._guard_state = guard_records(rig, 1, arm)
-        self._controller_params, self.controller_state = controller_records(config)
-        self._analogue, self._truth = np.empty((len(CHANNELS), samples)), np.empty((len(TRUTH), samples))
-        self._last_command = COMMAND.blank()
+        self._sensors = sensor_block(rig.solver.samples_per_block)
+        self._plant, self._guard = plant_records(rig), guard_records(rig, 1, arm)
+        self._controller = controller_records(config)
+        self._analogue = np.empty((len(CHANNELS), self._sensors.samples))
+        self._last_command = COMMAND.blank(0)
 
     def warm_up(self) -> None:
         """Compile or load the kernel, so that the log begins when the run does."""
         compile_once("a run in one process", lambda: self.advance(0))
 
+    @property
+    def controller_state(self) -> Records:
+        """The controller's memory."""
+        return self._controller[1]
+
     def reconfigure(self, config: ControllerConfig) -> None:
         """Continue with another configuration of the controller and its present memory."""
-        self._controller_params, _ = controller_records(config)
+        self._controller = controller_records(config)[0], self.controller_state
 
     def apply_order(self, word: int) -> None:
         """The rig receives an operator command, a `wire.Operator.Action`, before its next block."""
-        apply_order(self._guard_state[0], word)
+        apply_order(self._guard[1][0], word)
 
-    def advance(self, blocks: int, operator_events: int = 0) -> StretchMessages:
+    def advance(self, blocks: int, operator_events: int = 0) -> Stretch:
         """Advance by `blocks`; the controller receives `operator_events` in the first block.
 
         Returns fewer blocks if the rig's state became NaN or infinite in the block after them.
         """
-        velocity_mps, noise, delay_blocks, announcements, announce = self._inputs.draw(blocks)
-        commands = COMMAND.blank(blocks + 1)
-        commands[:1] = self._last_command
-        sensors, applied, trace = self._sensors.blank(blocks), APPLIED.blank(blocks), TRACE.blank(blocks)
-        done = advance_both(
-            self._plant_params, self._plant_state, self._guard_params, self._guard_state, velocity_mps, delay_blocks, noise,
-            self._controller_params, self.controller_state, operator_events, announcements, announce, min(self.block, 1),
-            self._analogue, self._truth, sensors, applied, commands, trace,
+        return self._advance(_advance_both, self._controller, self._draw(blocks), operator_events)
+
+    def _draw(self, blocks: int) -> Inputs:
+        return self._inputs.draw(blocks)
+
+    def _advance(self, advance: Callable[..., int], subject: Any, inputs: Inputs, operator_events: int = 0) -> Stretch:
+        blocks = len(inputs.noise)
+        truth = np.empty((blocks, len(TRUTH), self._sensors.samples))
+        made = Stretch(
+            self._sensors.blank(blocks), APPLIED.blank(blocks), COMMAND.blank(blocks), TRACE.blank(blocks),
+            inputs.announce, truth, np.empty(blocks), np.empty(blocks), np.empty(blocks),
         )  # fmt: skip
+        last = self._last_command
+        done = advance(self._plant, self._guard, subject, inputs, operator_events, last, self._analogue, made)
         self.block += done
-        self._last_command = commands[done : done + 1]
-        announced = announce[: int(announcements[:done].sum())]
-        return StretchMessages(sensors[:done], applied[:done], commands[1 : done + 1], trace[:done], announced)
+        if done:
+            self._last_command = made.command[done - 1 : done]
+        announced = made.announce[: int(inputs.announcements[:done].sum())]
+        return Stretch(*(part[:done] for part in made))._replace(announce=announced)

@@ -11,7 +11,6 @@ import numpy.typing as npt
 from bridge.guard.config import wider
 from bridge.guard.events import GuardEvents, changes
 from bridge.log.runlog import RunLog
-from bridge.log.storage.chain import HashChain
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import seal_all
 from bridge.wire.topics import (
@@ -25,7 +24,7 @@ from bridge.wire.topics import (
     STATE,
     TRACE,
 )
-from cockpit.run.closed_loop import ClosedLoop, StretchMessages
+from cockpit.run.closed_loop import ClosedLoop, Stretch
 from cockpit.run.scenario import Scenario, header
 from controller.node import obeyed
 from controller.replay import Change
@@ -57,10 +56,8 @@ def run_onboard(
     words: Sequence[TimedAction] = (),
     stopped: Callable[[], bool] = lambda: False,
     judge: "RunJudge | None" = None,
-) -> HashChain:
+) -> None:
     """Run a scenario without faults and write its log; a duration of 0 lasts until `stopped`. Raises Fault LOG_WRITE.
-
-    Returns the hash chain of the log.
 
     Args:
         progress: called after every stretch of blocks with the simulated time [s].
@@ -76,11 +73,11 @@ def run_onboard(
     blocks = round(scenario.duration_s / scenario.rig.solver.block_s) if scenario.duration_s > 0 else 2**62
     if judge is not None:
         judge.begin(log.tables)
-    say = _Events(log, judge)
-    say("plant", 0, "START", "lockstep")
+    publish = _Events(log, judge)
+    publish("plant", 0, "START", "lockstep")
     if wide := wider(scenario.rig.guard):
-        say("plant", 0, "WIDE_LIMITS", wide)
-    ahead, to_say = list(changes), list(words)
+        publish("plant", 0, "WIDE_LIMITS", wide)
+    ahead, due = list(changes), list(words)
     try:
         # the log is compressed and written while the next stretch is computed
         with ThreadPoolExecutor(max_workers=1) as writer:
@@ -89,35 +86,36 @@ def run_onboard(
                 while ahead and _first_step(loop, ahead[0].t_ns) <= loop.block:
                     loop.reconfigure(ahead.pop(0).config)
                 events = 0
-                while to_say and _first_step(loop, to_say[0].t_ns) <= loop.block:
-                    action = to_say.pop(0).action
+                while due and _first_step(loop, due[0].t_ns) <= loop.block:
+                    action = due.pop(0).action
                     loop.apply_order(action)
                     events = obeyed(events, action)
                 # a change of the configuration or an operator command also ends a stretch
                 ends = [blocks, (loop.block // _STRETCH_BLOCKS + 1) * _STRETCH_BLOCKS]
-                ends += [_first_step(loop, part[0].t_ns) for part in (ahead, to_say) if part]
+                ends += [_first_step(loop, part[0].t_ns) for part in (ahead, due) if part]
                 made = loop.advance(min(ends) - loop.block, events)
                 if written is not None:
                     written.result()
-                written = writer.submit(_write, log, say, loop.block, loop.block_ns, made, loop.controller_state.copy())
+                written = writer.submit(
+                    _write, log, publish, loop.block, loop.block_ns, made, loop.controller_state.copy()
+                )
                 if loop.block < min(ends):
                     written.result()
-                    _end(say, loop)
+                    _end(publish, loop)
                     raise no_number(scenario.rig, loop.block)
                 if progress is not None:
                     progress(loop.block * scenario.rig.solver.block_s)
             if written is not None:
                 written.result()
-        _end(say, loop)
+        _end(publish, loop)
     finally:
         log.close()
-    return log.chain()
 
 
-def _end(say: "_Events", loop: ClosedLoop) -> None:
+def _end(publish: "_Events", loop: ClosedLoop) -> None:
     t_ns = loop.block * loop.block_ns
-    say("plant", t_ns, "END", f"blocks={loop.block}")
-    say("controller", t_ns, "END", f"steps={loop.block} duplicates=0 dropped=0")
+    publish("plant", t_ns, "END", f"blocks={loop.block}")
+    publish("controller", t_ns, "END", f"steps={loop.block} duplicates=0 dropped=0")
 
 
 def log_of(scenario: Scenario, path: Path, about: dict[str, Any]) -> RunLog:
@@ -145,13 +143,12 @@ class _Events:
     def __call__(self, source: str, t_ns: int, code: str, text: str) -> None:
         topic = PLANT_EVENT if source == "plant" else CONTROLLER_EVENT
         event = wire.Event(sequence=self._sequence[source], t_ns=t_ns, source=source, code=code, text=text)
-        payload = event.SerializeToString()
-        self._log.write(topic, payload)
+        self._log.write(topic, event.SerializeToString())
         if self.judge is not None:
-            self.judge.add_others(topic.name, [payload])
+            self.judge.add_others(topic.name, [event])
         self._sequence[source] += 1
 
-    def of(self, made: StretchMessages) -> dict[int, list[tuple[str, str, str]]]:
+    def of(self, made: Stretch) -> dict[int, list[tuple[str, str, str]]]:
         """Events of guard and controller in a stretch: source, code and text, by the number of the block before."""
         events: dict[int, list[tuple[str, str, str]]] = {}
         for row in changes(made.applied):
@@ -163,13 +160,13 @@ class _Events:
         return {block: news for block, news in events.items() if news}
 
 
-def _write(log: RunLog, say: _Events, end: int, block_ns: int, made: StretchMessages, memory: npt.NDArray[Any]) -> None:
+def _write(log: RunLog, publish: _Events, end: int, block_ns: int, made: Stretch, memory: npt.NDArray[Any]) -> None:
     """Write the messages of a stretch that ends before block `end`, with the state and snapshot messages that are due."""
     begin = end - len(made.trace)
     for row in range(len(made.announce)):
         log.write(ANNOUNCE, made.announce[row : row + 1].tobytes())
     seal_all(made.sensors)
-    news = say.of(made)
+    news = publish.of(made)
     tables = {SENSORS: made.sensors, APPLIED: made.applied, COMMAND: made.command, TRACE: made.trace}
     # a stretch that was cut short begins or ends with an incomplete period of the state message
     whole = min(begin + -begin % STATE_EVERY, end), max(end - end % STATE_EVERY, begin)
@@ -185,10 +182,10 @@ def _write(log: RunLog, say: _Events, end: int, block_ns: int, made: StretchMess
         )
         log.write_blocks(part, states)
         for source, code, text in news.get(last - 1, ()):
-            say(source, last * block_ns, code, text)
+            publish(source, last * block_ns, code, text)
     if end % SNAPSHOT_EVERY == 0 and end > begin:
         log.write(SNAPSHOT, snapshot(memory, end, end * block_ns))
     log.flush()
-    if say.judge is not None:
+    if publish.judge is not None:
         for topic, table in tables.items():
-            say.judge.add(topic.name, table, table["t_ns"])
+            publish.judge.add(topic.name, table, table["t_ns"])

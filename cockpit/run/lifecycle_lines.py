@@ -5,13 +5,13 @@ import threading
 from collections.abc import Generator
 from contextlib import contextmanager
 
-from bridge.plain import LOADED, Tell, say
+from bridge.plain import LOADED, StepReport, print_line
 
 _LAST_LINES_S = 1.0  # wait at the end for lines that are not yet printed
 
 
 @contextmanager
-def telling(quiet: bool) -> Generator[Tell]:
+def step_reports(quiet: bool) -> Generator[StepReport]:
     """A function that prints a line on stderr, e.g. `waiting  for a rig`, in a thread: Ctrl-S must not stall a control loop.
 
     Args:
@@ -25,7 +25,7 @@ def telling(quiet: bool) -> Generator[Tell]:
 
     def print_them() -> None:
         while (line := lines.get()) is not None:
-            say(line)
+            print_line(line)
 
     # Started before the process claims its priority, which a thread inherits. This thread may hold Python's lock.
     thread = threading.Thread(target=print_them, name="telling", daemon=True)
@@ -37,13 +37,13 @@ def telling(quiet: bool) -> Generator[Tell]:
         thread.join(_LAST_LINES_S)
 
 
-def _once_loaded() -> Tell:
+def _once_loaded() -> StepReport:
     is_printed = False
 
     def print_once(_label: str, _text: str) -> None:
         nonlocal is_printed
         if not is_printed:
             is_printed = True
-            say(f"stickslip: {LOADED}")
+            print_line(f"stickslip: {LOADED}")
 
     return print_once

@@ -4,6 +4,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from bridge.log.damage import Damage
+from bridge.log.storage.checksums import checksums_of
 from cockpit.judge.judged import judge_log
 from cockpit.judge.phases import Phase
 from cockpit.judge.run_judge import RunJudge
@@ -31,5 +32,6 @@ def without_controller(scenario: Scenario, from_s: float, seconds: float) -> Pha
             run_with_faults(alone, path, {})
             return judge_log(path, stretch_from_s=from_s).judge.stretch
         judge = RunJudge(path, {}, stretch_from_s=from_s)
-        judge.result(Damage(0, 0, closed=True), run_onboard(alone, path, {}, judge=judge), {})
+        run_onboard(alone, path, {}, judge=judge)
+        judge.result(Damage(0, 0, closed=True), checksums_of(path), {})
         return judge.stretch

@@ -14,8 +14,9 @@ from typing import Any
 
 from bridge.compiling import Progress, left_in
 from bridge.faults import FAULTS, Fault
-from bridge.plain import ANOTHER_COMPILES, LOADED, say
-from cockpit.run.child_process import handle_endings
+from bridge.plain import ANOTHER_COMPILES, LOADED, print_line
+from cockpit.run.child_process import endings_handled
+from cockpit.run.writable import stamp_of
 
 _GRACE_S = 6.0  # time for a child to fade out, leave the bus and close the log, before it is killed
 _LOOK_S = 0.05
@@ -64,7 +65,7 @@ class Child:
                     elif words.rstrip() == LOADED:
                         self.still = READY
                     if waits or line.startswith(_WARNING):
-                        say(line.rstrip())
+                        print_line(line.rstrip())
 
     def last_words(self) -> str:
         """The last line on stderr."""
@@ -138,12 +139,8 @@ def _ctrl_c_afterwards() -> Generator[None]:
     def note(number: int, _frame: Any) -> None:
         signals.append(number)
 
-    before = handle_endings(note)
-    try:
+    with endings_handled(note):
         yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
     if signals:
         signal.raise_signal(signals[0])
 
@@ -157,18 +154,12 @@ class StartWatch:
     def __init__(self, children: list[Child], log: Path, wait_s: float | None) -> None:
         self._children = children
         self._log = log
-        self._before = self._stamp()
+        self._before = stamp_of(log)
         self._since_s = time.monotonic()
         self._due_s = self._since_s + _REPORT_S
         self._wait_s = wait_s
         self._begun = False
         self._progress = Progress()
-
-    def _stamp(self) -> tuple[int, int] | None:
-        if not self._log.is_file():
-            return None
-        now = self._log.stat()
-        return now.st_mtime_ns, now.st_size
 
     def look(self) -> None:
         """Report the missing processes when a line is due. Raises Fault NO_PEER after the longest time."""
@@ -177,15 +168,14 @@ class StartWatch:
         late = self._wait_s is not None and now_s > self._since_s + self._wait_s
         if self._begun or not (late or now_s > self._due_s):
             return
-        self._begun = self._stamp() != self._before
+        self._begun = stamp_of(self._log) != self._before
         if self._begun:
             return
-        waited_s = now_s - self._since_s
-        missing = self._missing()
+        waited_s, missing = now_s - self._since_s, self._missing()
         if late:
             raise Fault("NO_PEER", f"{missing} after {waited_s:.0f} s; allow more time with --wait S, or omit --wait")
         if not any(child.still == COMPILES for child in self._children):  # the progress shows compilation
-            say(f"waiting  {missing}, since {waited_s:.0f} s; Ctrl-C ends it")
+            print_line(f"waiting  {missing}, since {waited_s:.0f} s; Ctrl-C ends it")
         self._due_s = now_s + _REPORT_S
 
     def _missing(self) -> str:

@@ -5,7 +5,7 @@ import math
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 
 from rich.console import Console
 from rich.live import Live
@@ -18,10 +18,12 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.event_codes import TRIPS, WEAK_REASONS, harms, is_listed
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import APPLIED, COMMAND, CONTROLLER_EVENT, PLANT_EVENT, RECORDER_EVENT, STATE
+from bridge.wire.words import word_of
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
 
 _LOOK_S = 0.1
 _SHOWN_S = 3.0  # of an event that is no failure
+_ROLES = ("controller", "recorder")
 _EVENTS = (PLANT_EVENT, CONTROLLER_EVENT, RECORDER_EVENT)
 
 
@@ -30,14 +32,13 @@ def progress_line(
 ) -> str:
     """The state of the run in one line, with the number and total length of the computer's stalls."""
     t_s = state.t_ns * 1e-9
-    bar = (
-        f"[{'#' * round(20 * min(t_s / duration_s, 1.0)):<20}] " if duration_s else ""
-    )  # none for a run without an end
+    # none for a run without an end
+    bar = f"[{'#' * round(20 * min(t_s / duration_s, 1.0)):<20}] " if duration_s else ""
     ratio = f"v_a/v_d {state.velocity_ratio:4.2f}" if state.velocity_ratio > 0.01 else "no vibration"
     paused = f"  computer stalled {pauses} x, {paused_ms:.0f} ms" if pauses else ""
     warned = "".join(f"  {warning}" for warning in warnings)
     return (
-        f"{t_s:6.1f} s {bar}{wire.ContactState.Name(state.state):<10} {wire.Mode.Name(state.mode):<8} "
+        f"{t_s:6.1f} s {bar}{word_of('state', state.state):<10} {word_of('mode', state.mode):<8} "
         f"F_d {state.drive_force_N:5.2f} N  {ratio:<12}  slips {state.slips}{paused}{warned}"
     )
 
@@ -58,66 +59,57 @@ def follower(config: BusConfig, duration_s: float) -> Callable[[threading.Event]
     return follow
 
 
-class ProgressWatch:
-    """Warnings to show at once with the progress: no fresh command, a weak exciter, events with a severity."""
+class _EventWatch:
+    """Events with a severity, each shown for a while, and the stalls of the computer."""
 
     def __init__(self) -> None:
-        self._shown_until_s: dict[str, float] = {}  # by code of the event
-        self._applied: bytes | None = None
-        self._command: bytes | None = None
+        self.pauses, self.paused_ms = 0, 0.0
+        self._shown_until_s: dict[str, float] = {}  # by code; a failure is shown to the end of the run
 
     def note(self, received: Received) -> None:
-        """Take a message of the rig or the controller, or an event. Raises Fault BAD_MESSAGE."""
-        if received.topic is APPLIED:
-            self._applied = received.payload
-        elif received.topic is COMMAND:
-            self._command = received.payload
-        elif received.topic in _EVENTS:
-            event = parsed(wire.Event, received.payload, received.topic.name)
-            if is_listed(event.code):
-                # a failure is shown to the end of the run
-                self._shown_until_s[event.code] = math.inf if harms(event.code) else time.monotonic() + _SHOWN_S
+        """Take an event. Raises Fault BAD_MESSAGE."""
+        event = parsed(wire.Event, received.payload, received.topic.name)
+        if is_listed(event.code):
+            self._shown_until_s[event.code] = math.inf if harms(event.code) else time.monotonic() + _SHOWN_S
+        for pause in pauses_of([event]):
+            self.pauses, self.paused_ms = self.pauses + 1, self.paused_ms + (pause.until_ns - pause.from_ns) * 1e-6
 
-    def warnings(self, roles: Iterable[str]) -> list[str]:
-        """The warnings now, with `roles` on the bus."""
-        lines = [f"no {role}" for role in ("controller", "recorder") if role not in roles]
-        if self._applied is not None and parsed(wire.Applied, self._applied, APPLIED.name).fallback:
-            lines.append("FALLBACK: no fresh command")
-        if self._command is not None:
-            reason = parsed(wire.Command, self._command, COMMAND.name).reason
-            lines += [name for name in (*WEAK_REASONS, *TRIPS) if wire.Reason.Value(name) == reason]
-        return [*lines, *(code for code, until_s in self._shown_until_s.items() if time.monotonic() < until_s)]
+    def shown(self) -> list[str]:
+        """Codes to show now."""
+        return [code for code, until_s in self._shown_until_s.items() if time.monotonic() < until_s]
+
+
+def _warnings(roles: Iterable[str], newest: Mapping[str, bytes]) -> list[str]:
+    """Missing roles, no fresh command, a weak or doubted sensor or exciter. Raises Fault BAD_MESSAGE."""
+    lines = [f"no {role}" for role in _ROLES if role not in roles]
+    if APPLIED.name in newest and parsed(wire.Applied, newest[APPLIED.name], APPLIED.name).fallback:
+        lines.append("FALLBACK: no fresh command")
+    if COMMAND.name in newest:
+        reason = word_of("reason", parsed(wire.Command, newest[COMMAND.name], COMMAND.name).reason)
+        lines += [reason] if reason in {*WEAK_REASONS, *TRIPS} else []
+    return lines
 
 
 def _show(bus: Bus, duration_s: float, over: threading.Event) -> None:
-    inbox = Inbox(1000)
-    watch = ProgressWatch()
-    for topic in (STATE, *_EVENTS):
+    inbox, watch = Inbox(1000), _EventWatch()
+    for topic in _EVENTS:
         bus.listen(topic, inbox.push)
-    newest_of: dict[str, Received] = {}
-    for topic in (APPLIED, COMMAND):  # a thousand per second; only the newest of each 0.1 s is parsed
-        bus.listen(topic, lambda received: newest_of.__setitem__(received.topic.name, received))
-    pauses, paused_ms = 0, 0.0
+    newest: dict[str, bytes] = {}
+    for topic in (STATE, APPLIED, COMMAND):  # up to a thousand per second; only the newest of each 0.1 s is parsed
+        bus.listen(topic, lambda received: newest.__setitem__(received.topic.name, received.payload))
     # shown from the first state message on; before, the terminal shows the progress of compilation
     live = Live(console=Console(stderr=True), refresh_per_second=8, transient=True)
     with contextlib.ExitStack() as shown:
         while not over.wait(_LOOK_S):
-            newest = None
             while (received := inbox.get_nowait()) is not None:
-                if received.topic is STATE:
-                    newest = received
-                    continue
                 with contextlib.suppress(Fault):  # skip malformed messages of other clients
                     watch.note(received)
-                    for pause in pauses_of([parsed(wire.Event, received.payload, received.topic.name)]):
-                        pauses, paused_ms = pauses + 1, paused_ms + (pause.until_ns - pause.from_ns) * 1e-6
-            if newest is not None:
-                with contextlib.suppress(Fault):
-                    for received in [*newest_of.values()]:
-                        watch.note(received)
-                    state = parsed(wire.State, newest.payload, STATE.name)
-                    roles = [role for role in ("controller", "recorder") if bus.alive(role)]
-                    line = progress_line(state, duration_s, pauses, paused_ms, watch.warnings(roles))
-                    if not live.is_started:
-                        shown.enter_context(live)
-                    live.update(Text(plain(line)))
+            if STATE.name not in newest:
+                continue
+            with contextlib.suppress(Fault):
+                state = parsed(wire.State, newest[STATE.name], STATE.name)
+                warnings = [*_warnings([*filter(bus.alive, _ROLES)], newest), *watch.shown()]
+                line = progress_line(state, duration_s, watch.pauses, watch.paused_ms, warnings)
+                if not live.is_started:
+                    shown.enter_context(live)
+                live.update(Text(plain(line)))

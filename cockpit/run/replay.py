@@ -16,8 +16,7 @@ from bridge.log.logfile import Piece, RunData, check_log_file, iter_pieces, read
 from bridge.log.metadata import configuration_of, table_of, texts_of
 from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.payloads import parsed
-from controller.codes import RESET, STOP
+from bridge.wire.messages import RESET, STOP
 from controller.config import ControllerConfig
 from controller.replay import Change, OutOfOrder, Replay, ReplayDifference, Replayer, replay
 
@@ -135,6 +134,9 @@ class Replayed(NamedTuple):
         return lines
 
 
+ReplayResult = list[Replayed]
+
+
 def replay_log(path: Path, from_s: float, settings: list[str]) -> Replayed:
     """Replay one log from a time on, and compare it with this version's controller. Raises Fault BAD_LOG and CONFIG."""
     check_log_file(path)
@@ -196,8 +198,8 @@ def _one_pass(
 
 def _add(replayer: Replayer, piece: Piece) -> None:
     if piece.topic == "snapshot":
-        for payload in piece.payloads:
-            replayer.add_snapshot(parsed(wire.Snapshot, payload, "/snapshot"))
+        for snapshot in piece.messages:
+            replayer.add_snapshot(snapshot)
     else:
         replayer.add(piece.topic, piece.records)
 
@@ -223,7 +225,7 @@ def _installed(version: str) -> str:
     wheel = f"stickslip-{version}-py3-none-any.whl"
     return (
         f"after `pip install '{wheel}[all]'`, or `pip install '.[all]'` in a checkout of v{version}, it is repeated bit for bit; "
-        "what-if runs (`--set`, `--closed-loop`) work with this version"
+        "changed replays (`--set`, `--closed-loop`) work with this version"
     )
 
 

@@ -5,35 +5,32 @@ import shutil
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from bridge.faults import Fault
 from bridge.log.live import refuse_a_live_log
 from bridge.log.storage.parts import parts_of
-from bridge.plain import say
+from bridge.log.storage.verdict_file import verdict_path
+from bridge.plain import print_line
+from bridge.results import strict_json
 from bridge.wire.session import rig_security
 from cockpit.run.child_process import left_on_ctrl_c, stop_event, warn_without_priority
 from cockpit.run.scenario import (
     Scenario,
     load_scenario,
-    refuse_faults_of_processes,
-    refuse_faults_that_take_time,
+    refuse_faults,
     refuse_short_blocks,
 )
-from cockpit.run.writable import LOG, check_output
+from cockpit.run.writable import LOG, check_output, stamp_of
 
 if TYPE_CHECKING:
-    from bridge.log.storage.chain import HashChain
-    from cockpit.judge.margins import Margins
-    from cockpit.judge.phases import Phase
     from cockpit.judge.run_judge import RunJudge
-    from cockpit.judge.verdict import RunVerdict
+    from cockpit.run.outcome import RunOutcome
 
 
 # A run without an end in one process writes some 2 GB per minute and ends below this free space. Larger: it ends earlier.
 # Smaller: the judging of the log and other programs meet a full disk.
 _LEAST_FREE_BYTES = 1 << 30
-_LOOK_S = 0.5  # interval of the check of the disk; 20 MB are written in it
 
 
 def log_path(given: Path | None, name: str) -> Path:
@@ -50,13 +47,13 @@ def keep_aside(path: Path) -> None:
     aside, number = path.with_stem(f"{path.stem}-{written}"), 1
     while aside.exists():
         aside, number = path.with_stem(f"{path.stem}-{written}-{number}"), number + 1
-    parts = parts_of(path)
+    files = [*parts_of(path), *([verdict_path(path)] if verdict_path(path).exists() else [])]
     try:
-        for part in parts:  # run-0001.mcap becomes run-20261121-101500-0001.mcap
-            part.rename(aside.with_stem(aside.stem + part.stem.removeprefix(path.stem)))
+        for file in files:  # run-0001.mcap becomes run-20261121-101500-0001.mcap
+            file.rename(aside.with_name(aside.stem + file.name.removeprefix(path.stem)))
     except OSError as error:
         raise Fault("LOG_WRITE", f"{path}: cannot be renamed: {error.strerror}; choose another --log") from None
-    say(f"kept     {aside} (the earlier {path.name})")
+    print_line(f"kept     {aside} (the earlier {path.name})")
 
 
 def about_run(scenario: Scenario, lockstep: bool) -> dict[str, object]:
@@ -70,46 +67,6 @@ def about_run(scenario: Scenario, lockstep: bool) -> dict[str, object]:
     }
 
 
-def _stamp(path: Path) -> tuple[int, int] | None:
-    """Time and size of a file, to detect a change; None if it does not exist."""
-    if not path.is_file():
-        return None
-    now = path.stat()
-    return now.st_mtime_ns, now.st_size
-
-
-class RunOutcome(NamedTuple):
-    """Verdict of a run, and its rig."""
-
-    verdict: "RunVerdict"
-    rig: str
-    effects: list[str]  # of the rig
-    loop: "Margins | None"  # only for a rig with effects, for which the loop was not designed
-    without: "Phase | None" = None  # the stretch `after`, simulated without the controller, with `--without`
-
-    def as_dict(self) -> dict[str, Any]:
-        """For `--json`."""
-        table = self.verdict.as_dict() | {"rig": self.rig}
-        if self.without is not None:
-            table["without"] = self.without.as_dict()
-        return table | {"effects": self.effects, "loop": self.loop} if self.loop is not None else table
-
-    def in_words(self, verbose: bool) -> list[str]:
-        """The verdict in six lines; with `verbose` all figures."""
-        from cockpit.judge.margins import margins_in_words
-        from cockpit.judge.verdict_words import in_words
-
-        lines = in_words(self.verdict, verbose, self.without)
-        if not verbose:
-            return lines
-        margins = margins_in_words(self.loop) if self.loop is not None else []
-        return [
-            *lines,
-            f"rig      {self.rig}" + (f", with {', '.join(self.effects)}" if self.effects else ""),
-            *margins,
-        ]
-
-
 def run_scenario(
     name: str,
     settings: list[str],
@@ -118,7 +75,7 @@ def run_scenario(
     log: Path | None,
     wait_s: float | None = None,
     without: bool = False,
-) -> RunOutcome:
+) -> "RunOutcome":
     """Run a scenario and judge it. Ctrl-C, SIGTERM or SIGHUP ends a run without an end, which is then judged like any other.
 
     Args:
@@ -132,21 +89,20 @@ def run_scenario(
     scenario = load_scenario(name, settings)
     path = log_path(log, scenario.name)
     check_output("--log", path, LOG)
-    before = _stamp(path)
+    before = stamp_of(path)
     endless = scenario.duration_s == 0.0
     if not (lockstep or in_process):
         refuse_short_blocks(scenario)
-        refuse_faults_of_processes(scenario)
         warn_without_priority()
-    if lockstep:
-        refuse_faults_that_take_time(scenario)
+    if lockstep or not in_process:
+        refuse_faults(scenario, lockstep)
     if not in_process:
         rig_security(scenario.bus)  # its warning is visible here, and its fault is raised before anything starts
     if endless and in_process:
         _refuse_little_room(path)
     if endless:
-        say(f"{'simulating' if in_process else 'running'} until Ctrl-C; log {path}")
-    interrupted, by, made = False, "Ctrl-C", _InProcessRun(None, None, [], stopped=False)
+        print_line(f"{'simulating' if in_process else 'running'} until Ctrl-C; log {path}")
+    interrupted, by, made = False, "Ctrl-C", _InProcessRun(None, [], stopped=False)
     try:
         if in_process:
             made = _in_process(scenario, path)
@@ -161,10 +117,10 @@ def run_scenario(
     except KeyboardInterrupt as ended:
         interrupted, by = True, str(ended) or by
     except Fault:
-        if in_process and _stamp(path) != before:
+        if in_process and stamp_of(path) != before:
             _say_verdict(path)
         raise
-    if interrupted and _stamp(path) == before:
+    if interrupted and stamp_of(path) == before:
         raise Fault("INTERRUPTED", f"stopped by {by} before anything was recorded")
     closed = f"stopped by {by}; {path} is closed"
     left = f"{closed} and not judged; `stickslip log info {path}` judges it"
@@ -177,7 +133,6 @@ class _InProcessRun(NamedTuple):
     """Results of a run in one process, in addition to its log."""
 
     judge: "RunJudge | None"  # has received every message; None if the log must be read
-    chain: "HashChain | None"
     events: list[str]  # not in the log
     stopped: bool  # by Ctrl-C or a signal
 
@@ -190,29 +145,31 @@ def _say_verdict(path: Path) -> None:
     with contextlib.suppress(Fault):
         verdict = judge(path)
         if verdict.blocks:
-            say("\n".join(in_words(verdict, verbose=False)))
+            print_line("\n".join(in_words(verdict, verbose=False)))
 
 
-def _judged(scenario: Scenario, path: Path, interrupted: str, without: bool, made: _InProcessRun) -> RunOutcome:
+def _judged(scenario: Scenario, path: Path, interrupted: str, without: bool, made: _InProcessRun) -> "RunOutcome":
     """Judge a run.
 
     Raises Fault INTERRUPTED with the line `interrupted`, if any, for a run that did not reach its end.
     """
     from bridge.log.damage import Damage
-    from bridge.log.storage.afterwards import add_table
+    from bridge.log.storage.checksums import checksums_of
+    from bridge.log.storage.verdict_file import write_verdict
     from cockpit.judge.judged import judge_log
     from cockpit.judge.setup import settled_from_s
-    from cockpit.judge.verdict_words import VERDICT, noted
+    from cockpit.judge.verdict_words import in_words, noted
+    from cockpit.run.outcome import RunOutcome
 
     if interrupted and scenario.duration_s:
         _say_verdict(path)
         raise Fault("INTERRUPTED", interrupted)
     effects = list(scenario.rig.effects)
-    if made.judge is not None and made.chain is not None:
+    if made.judge is not None:
         judge = made.judge
-        verdict = judge.result(Damage(0, 0, closed=True), made.chain, {})
+        verdict = judge.result(Damage(0, 0, closed=True), checksums_of(path), {})
     else:
-        verdict, _, judge = judge_log(path, margins=bool(effects))
+        verdict, _, judge = judge_log(path)
     if interrupted and not verdict.blocks:
         raise Fault("INTERRUPTED", f"{interrupted} and holds no block")
     margins = judge.margins() if effects else None
@@ -222,8 +179,13 @@ def _judged(scenario: Scenario, path: Path, interrupted: str, without: bool, mad
         from cockpit.run.open_loop_twin import without_controller
 
         alone = without_controller(scenario, settled_from_s(verdict.enabled_from_s), verdict.seconds)
-    fields = noted(verdict) | ({"without": alone.as_dict()} if alone is not None else {})
-    verdict = verdict._replace(chain=add_table(path, VERDICT, fields, verdict.chain))
+    fields = noted(verdict) | ({"without": strict_json(alone)} if alone is not None else {})
+    try:
+        write_verdict(path, verdict.checksums.sha256, fields)
+    except Fault:
+        print_line("\n".join(in_words(verdict, verbose=False, without=alone)))
+        raise
+    verdict = verdict._replace(checksums=verdict.checksums._replace(verdict="fits"))
     return RunOutcome(verdict, scenario.rig.name, effects, margins, alone)
 
 
@@ -240,21 +202,6 @@ def _refuse_little_room(path: Path) -> None:
         raise Fault(
             "LOG_WRITE", f"{line} {rule}; free space, choose another --log, or give it an end: --set duration_s=60"
         )
-
-
-class _Room:
-    """Checks every 0.5 s whether the disk of a log has room for more."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._look_s = time.monotonic() + _LOOK_S
-        self.is_over = False
-
-    def __call__(self) -> bool:
-        if time.monotonic() >= self._look_s:
-            self._look_s = time.monotonic() + _LOOK_S
-            self.is_over = _free_bytes(self._path) < _LEAST_FREE_BYTES
-        return self.is_over
 
 
 def _in_process(scenario: Scenario, path: Path) -> _InProcessRun:
@@ -275,23 +222,25 @@ def _in_process(scenario: Scenario, path: Path) -> _InProcessRun:
     )
     console = Console(stderr=True)
     if scenario.fault:
-        say("simulating with faults, message by message: 0.4 s per simulated second, longer on a busy computer")
-    judge, chain = RunJudge(path, {}, margins=bool(scenario.rig.effects)), None
+        print_line("simulating with faults, message by message: 0.4 s per simulated second, longer on a busy computer")
+    judge = None if scenario.fault else RunJudge(path, {})
     with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as bar:
         task = bar.add_task("simulating", total=scenario.duration_s or None)
         stop = stop_event()
         about = about_run(scenario, lockstep=True)
-        no_room = _Room(path)
+
+        def is_full() -> bool:
+            return scenario.duration_s == 0.0 and _free_bytes(path) < _LEAST_FREE_BYTES
 
         def stopped() -> bool:
-            return stop.is_set() or (scenario.duration_s == 0.0 and no_room())
+            return stop.is_set() or is_full()
 
         def progress(t_s: float) -> None:
             bar.update(task, completed=t_s)
 
-        if scenario.fault:
+        if judge is None:
             run_with_faults(scenario, path, about, progress, stopped)
         else:
-            chain = run_onboard(scenario, path, about, progress, stopped=stopped, judge=judge)
+            run_onboard(scenario, path, about, progress, stopped=stopped, judge=judge)
     events = [f"LOG_WRITE: ended, as less than {_LEAST_FREE_BYTES / 1e6:.0f} MB are free for {path}"]
-    return _InProcessRun(judge if chain is not None else None, chain, events if no_room.is_over else [], stop.is_set())
+    return _InProcessRun(judge, events if is_full() else [], stop.is_set())

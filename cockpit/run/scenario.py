@@ -2,13 +2,14 @@
 
 import json
 import platform
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, model_validator
 
-from bridge.config import Strict, blamed, read_toml, validate, with_overrides
+from bridge.config import Strict, made_with, read_toml, validate, with_overrides
 from bridge.faults import Fault
 from bridge.log.storage.log_files import Rotation
 from bridge.wire import stickslip_pb2 as wire
@@ -118,31 +119,26 @@ def refuse_short_blocks(scenario: Scenario) -> None:
         raise Fault("CONFIG", line)
 
 
-def refuse_faults_that_take_time(scenario: Scenario) -> None:
-    """Raise Fault CONFIG for faults of bus and processes in lockstep."""
-    for number, table in enumerate(scenario.fault):
-        if table.needs_time:
-            line = f"{scenario.name}: fault.{number}.target = {table.target}: needs a clock, which lockstep lacks"
-            raise Fault("CONFIG", f"{line}; use --in-process, or real time")
+def refuse_faults(scenario: Scenario, lockstep: bool) -> None:
+    """Raise Fault CONFIG for faults that several processes cannot have.
 
-
-def refuse_faults_of_processes(scenario: Scenario) -> None:
-    """Raise Fault CONFIG for faults of processes in real time: only the operator may end a process."""
+    In lockstep faults of bus and processes; in real time faults of processes, which only the operator may end.
+    """
     for number, table in enumerate(scenario.fault):
-        if table.group == PROCESS:
-            line = f"{scenario.name}: fault.{number}.target = {table.target}: a scenario cannot end real processes"
-            raise Fault("CONFIG", f"{line}; use --in-process, or `stickslip fault` during the run")
+        if lockstep and table.needs_time:
+            why = "needs a clock, which lockstep lacks; use --in-process, or real time"
+        elif not lockstep and table.group == PROCESS:
+            why = "a scenario cannot end real processes; use --in-process, or `stickslip fault` during the run"
+        else:
+            continue
+        raise Fault("CONFIG", f"{scenario.name}: fault.{number}.target = {table.target}: {why}")
 
 
 def load_rig(name: str, settings: list[str]) -> RigConfig:
     """A rig by name or path, with `key=value` settings applied. Raises Fault CONFIG."""
     path = find(name, "rigs")
     table = rig_table(path)
-    try:
-        return validate(RigConfig, with_overrides(table, settings), path.name)
-    except Fault as fault:
-        validate(RigConfig, table, path.name)  # without settings, so that a fault names the file
-        raise blamed(fault, path.name, settings) from None
+    return made_with(lambda given: validate(RigConfig, with_overrides(table, given), path.name), path.name, settings)
 
 
 def load_scenario(name: str, settings: list[str]) -> Scenario:
@@ -154,14 +150,13 @@ def load_scenario(name: str, settings: list[str]) -> Scenario:
     given = read_toml(path)
     if "contact" in given and "rig" not in given:
         raise Fault("CONFIG", f"{path}: is a rig, not a scenario; give it with --rig")
+
+    def table(settings: Sequence[str]) -> tuple[dict[str, Any], str]:
+        return with_rig(path, with_overrides({"name": path.stem} | given, settings))
+
     of_rig = [setting for setting in settings if setting.startswith(RIG_FILE)]
-    table, source = with_rig(path, with_overrides({"name": path.stem} | given, settings))
-    try:
-        return validate(_Runnable, table, source)
-    except Fault as fault:
-        table, source = with_rig(path, with_overrides({"name": path.stem} | given, of_rig))
-        validate(_Runnable, table, source)  # without other settings, so that a fault names the files
-        raise blamed(fault, source, [setting for setting in settings if setting not in of_rig]) from None
+    _, source = table(settings)
+    return made_with(lambda given: validate(_Runnable, *table(given)), source, settings, of_rig)
 
 
 def processor() -> str:

@@ -5,10 +5,11 @@ another table of the scenario is wrong.
 """
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from bridge.config import Strict, blamed, read_toml, validate, with_overrides
+from bridge.config import Strict, made_with, read_toml, validate, with_overrides
 from bridge.faults import Fault
 from bridge.wire.zenoh_link import BusConfig
 
@@ -80,11 +81,8 @@ def load_bus(name: str, settings: list[str]) -> BusConfig:
     path = find(name, "scenarios")
     given = read_toml(path)
 
-    def bus(table: dict[str, Any]) -> BusConfig:
+    def bus(settings: Sequence[str]) -> BusConfig:
+        table = with_overrides(given, settings)
         return validate(_BusTable, {key: table[key] for key in ("bus",) if key in table}, path.name).bus
 
-    try:
-        return bus(with_overrides(given, settings))
-    except Fault as fault:
-        bus(given)  # without settings, so that a fault names the file
-        raise blamed(fault, path.name, settings) from None
+    return made_with(bus, path.name, settings)

@@ -144,8 +144,7 @@ def _force(rig: RigConfig, needs: _Needs) -> None:
     if needs.fall_N == 0.0:
         return
     fall = f"the force falls by {needs.fall_N:.3g} N in a slip"
-    _noise(sensors, "force_noise_N", needs.fall_N / _NOISES_A_SLIP, fall)
-    _steps(sensors, "force_resolution_N", "force_noise_N", needs.fall_N, fall)
+    _resolves(sensors, "force", "N", needs.fall_N / _NOISES_A_SLIP, needs.fall_N, fall)
     _band(sensors, "force_bandwidth_Hz", needs.natural_Hz)
     most_s = 1.0 / (2.0 * math.pi * needs.natural_Hz)
     if (lag_s := float(rig.effects.get("force-sensor-lag", {}).get("lag_s", 0.0))) > most_s:
@@ -153,17 +152,17 @@ def _force(rig: RigConfig, needs: _Needs) -> None:
         _refuse("effects.force-sensor-lag.lag_s", lag_s, why, f"{_below(0.5 * most_s):g}")
 
 
-def _noise(sensors: SensorsConfig, name: str, most: float, signal: str) -> None:
-    if (value := getattr(sensors, name)) > most:
-        why = f"{signal}; noise above {most:.3g} {_unit(name)} hides it"
-        _refuse(f"sensors.{name}", value, why, f"{_below(0.5 * most):g}")
-
-
-def _steps(sensors: SensorsConfig, name: str, noise: str, size: float, signal: str) -> None:
-    most = max(size / _STEPS, _HIDDEN * getattr(sensors, noise))
-    if (value := getattr(sensors, name)) > most:
-        why = f"{signal}; steps above {most:.3g} {_unit(name)} distort it"
-        _refuse(f"sensors.{name}", value, why, f"{_below(0.25 * most):g}")
+def _resolves(sensors: SensorsConfig, channel: str, unit: str, most_noise: float, size: float, signal: str) -> None:
+    """Noise and resolution of a channel, against a signal of this size."""
+    noise, step = (getattr(sensors, f"{channel}_{word}_{unit}") for word in ("noise", "resolution"))
+    for word, value, most, harm, share in (
+        ("noise", noise, most_noise, "noise above {} hides it", 0.5),
+        ("resolution", step, max(size / _STEPS, _HIDDEN * noise), "steps above {} distort it", 0.25),
+    ):
+        if value > most:
+            limit = f"{most:.3g} {unit.replace('mps2', 'm/s2')}"
+            why = f"{signal}; {harm.format(limit)}"
+            _refuse(f"sensors.{channel}_{word}_{unit}", value, why, f"{_below(share * most):g}")
 
 
 def _band(sensors: SensorsConfig, name: str, natural_Hz: float) -> None:
@@ -175,8 +174,7 @@ def _band(sensors: SensorsConfig, name: str, natural_Hz: float) -> None:
 def _positions(sensors: SensorsConfig, slip_m: float, way_m: float, natural_Hz: float) -> None:
     slip = f"a slip is {slip_m:.3g} m long, " if slip_m else ""
     ways = f"{slip}the drive goes {way_m:.3g} m in {_WAY_S:g} s"
-    _noise(sensors, "position_noise_m", max(slip_m, way_m) / _NOISES_A_SLIP, ways)
-    _steps(sensors, "position_resolution_m", "position_noise_m", slip_m or way_m, ways)
+    _resolves(sensors, "position", "m", max(slip_m, way_m) / _NOISES_A_SLIP, slip_m or way_m, ways)
     if slip_m > 0.0:
         _band(sensors, "position_bandwidth_Hz", natural_Hz)
 
@@ -212,12 +210,7 @@ def _base(
         _refuse("sensors.accel_lowest_Hz", sensors.accel_lowest_Hz, why, f"{_below(0.1 * float(candidates_Hz[0])):g}")
     least_mps2, _ = accel_mps2(slowest_mps)
     least = f"the base vibrates with {least_mps2:.3g} m/s2 at {slowest_mps * 1e3:.3g} mm/s"
-    _noise(sensors, "accel_noise_mps2", least_mps2 / _NOISES_AN_AMPLITUDE, least)
-    _steps(sensors, "accel_resolution_mps2", "accel_noise_mps2", least_mps2, least)
-
-
-def _unit(name: str) -> str:
-    return name.rpartition("_")[2].replace("mps2", "m/s2")
+    _resolves(sensors, "accel", "mps2", least_mps2 / _NOISES_AN_AMPLITUDE, least_mps2, least)
 
 
 def _above(value: float) -> float:

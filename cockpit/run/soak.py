@@ -17,11 +17,12 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.faults import Fault
-from bridge.log.check.log_check import feed
 from bridge.log.damage import Damage
 from bridge.log.log_reader import LogReader
+from bridge.log.logfile import feed
 from bridge.log.storage.parts import parts_of
 from bridge.processes import pid_here
+from bridge.results import in_json
 from bridge.units import counted
 from bridge.wire.messages import Records
 from bridge.wire.zenoh_link import Bus, BusConfig
@@ -70,23 +71,13 @@ class Soaked(NamedTuple):
     verdict: RunVerdict
     memory: list[Memory]
     periods: list[Period]
+    JSON_MERGED = "verdict"
 
-    @property
+    @in_json
     def good(self) -> bool:
         """Whether it ran to its end and its log is complete."""
         v = self.verdict
         return not self.interrupted and v.blocks > 0 and v.lost_messages == 0 and v.all_losses_known
-
-    def as_dict(self) -> dict[str, Any]:
-        """For `--json`: the verdict and the fields of the soak."""
-        more = {
-            "scenario": self.scenario,
-            "wanted_s": self.wanted_s,
-            "interrupted": self.interrupted,
-            "good": self.good,
-        }
-        rows = {name: [row._asdict() for row in getattr(self, name)] for name in ("memory", "periods")}
-        return self.verdict.as_dict() | more | rows
 
     def in_words(self) -> list[str]:
         """Lines for an operator."""
@@ -188,7 +179,7 @@ class _Watch:
                     continue
                 reader = self._readers[file] = LogReader(file, alone=True)
                 self._judge.begin(reader.metadata)
-                self._chain = feed(reader, self)
+                self._checksums = feed(reader, self)
                 if self._thin_out and file != self.path:
                     file.unlink(missing_ok=True)
 
@@ -198,11 +189,11 @@ class _Watch:
         if topic == "applied":
             period = (records["t_ns"] - 1) // round(self._period_s * 1e9)
             for number in np.unique(period).tolist():
-                self._periods.setdefault(number, LatencyWatch()).applied(records[period == number])
+                self._periods.setdefault(number, LatencyWatch()).add(records[period == number])
 
-    def add_others(self, topic: str, payloads: Sequence[bytes]) -> None:
+    def add_others(self, topic: str, messages: Sequence[Any]) -> None:
         """Take messages of another topic."""
-        self._judge.add_others(topic, payloads)
+        self._judge.add_others(topic, messages)
 
     def result(self, scenario: str, interrupted: bool) -> Soaked:
         """The result, after the log is closed. Raises Fault INTERRUPTED if no log was written."""
@@ -211,7 +202,7 @@ class _Watch:
             raise Fault("INTERRUPTED", "stopped before anything was recorded")
         damages = (reader.damage for reader in self._readers.values() if not reader.damage.whole)
         damage = next(damages, Damage(0, 0, closed=True))
-        verdict = self._judge.result(damage, self._chain, {})
+        verdict = self._judge.result(damage, self._checksums, {})
         memory = [_memory(role, points) for role, points in self._memory.items() if points]
         periods = [
             Period(
@@ -243,7 +234,6 @@ def _memory(role: str, points: list[tuple[float, float]]) -> Memory:
     t_h, resident_MB = t_s[warm] / 3600.0, resident_MB[warm]
     slope = sigma = math.nan
     if len(t_h) > 2 and np.ptp(t_h) > 0.0:
-        slope, start = (float(coefficient) for coefficient in np.polyfit(t_h, resident_MB, 1))
-        rest = resident_MB - start - slope * t_h
-        sigma = math.sqrt(float(rest @ rest) / (len(t_h) - 2) / float(((t_h - t_h.mean()) ** 2).sum()))
+        line, spread = np.polyfit(t_h, resident_MB, 1, cov=True)
+        slope, sigma = float(line[0]), math.sqrt(float(spread[0, 0]))
     return Memory(role, float(resident_MB[0]), float(resident_MB[-1]), slope, sigma)

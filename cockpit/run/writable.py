@@ -1,13 +1,14 @@
 """Checks, at the start of a command, of the files that it writes at its end; one clear line if a write fails."""
 
 import os
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
 
 from bridge import files
 from bridge.faults import Fault
 from bridge.files import refuse_to_replace
+from bridge.log.storage.verdict_file import refuse_to_lose_json
 
 # suffixes of the files that commands write, by kind
 LOG = (".mcap",)
@@ -33,6 +34,8 @@ def check_output(option: str, path: Path, suffixes: tuple[str, ...]) -> None:
     for known, kind in _NEVER_LOST.items():
         if suffixes == known or path.suffix.lower() in known:
             refuse_to_replace(path, kind, f"{option} {path}")
+    if path.suffix.lower() in LOG:
+        refuse_to_lose_json(path)
     if path.is_dir():
         raise Fault("CONFIG", f"{option} {path}: must be a file, not a folder; choose another")
     if path.suffix.lower() not in suffixes:
@@ -64,6 +67,26 @@ def check_writable(option: str, path: Path) -> None:
     for place in needed:
         if not os.access(place, os.W_OK) or (place != path and not place.is_dir()):
             raise Fault("LOG_WRITE", f"{option} {path}: cannot be written: {place} is not writable; choose another")
+
+
+def written(write: Callable[[], None], refused: list[Fault]) -> bool:
+    """Write a file; True if it was written. A fault is added to `refused`, so that other files are still written."""
+    try:
+        with writing():
+            write()
+    except Fault as fault:
+        if fault.line not in {known.line for known in refused}:  # a file may be written many times
+            refused.append(fault)
+        return False
+    return True
+
+
+def stamp_of(path: Path) -> tuple[int, int] | None:
+    """Time and size of a file, to detect a change; None if it does not exist."""
+    if not path.is_file():
+        return None
+    now = path.stat()
+    return now.st_mtime_ns, now.st_size
 
 
 @contextmanager

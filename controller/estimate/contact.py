@@ -9,8 +9,9 @@ stick, the controller is blind and reports BLIND.
 
 import math
 
-from bridge.kernel import Record, kernel
-from controller.codes import CHECKING, SLIP, SMOOTH, STANDSTILL, STICK, UNKNOWN
+from bridge.kernel import kernel
+from bridge.layouts import ControllerMemory, ControllerParams
+from bridge.wire.stickslip_pb2 import CHECKING, SLIP, SMOOTH, STANDSTILL, STICK, UNKNOWN
 from controller.estimate.windows import BINS, DRIVE, FORCE, OF_STEP, SLIDE, WELL_KNOWN
 
 _SIGMAS = 6.0  # 1e-9 a window: less than one false announcement in 100 hours of windows of 1 ms
@@ -35,7 +36,7 @@ _EXCITER_PERIODS = 2.0  # least length of a window while vibrating
 
 
 @kernel
-def contact(p: Record, s: Record, force_N: float, tick_s: float) -> None:
+def contact(p: ControllerParams, s: ControllerMemory, force_N: float, tick_s: float) -> None:
     """Judge the contact after `tick_s` more seconds; `force_N` is the mean over them."""
     speed_mps = math.fabs(s.drive_velocity_mps)
     direction = float(s.direction)
@@ -94,7 +95,7 @@ def contact(p: Record, s: Record, force_N: float, tick_s: float) -> None:
 
 
 @kernel
-def _follow(s: Record, tick_s: float, slipping: bool, speed_mps: float) -> None:
+def _follow(s: ControllerMemory, tick_s: float, slipping: bool, speed_mps: float) -> None:
     """Go from one state of the contact to the next, and count."""
     vibrated = s.allowed_m > 0.0
     before = s.contact
@@ -135,7 +136,7 @@ def _follow(s: Record, tick_s: float, slipping: bool, speed_mps: float) -> None:
 
 
 @kernel
-def _stood(s: Record, before: int, tick_s: float) -> bool:
+def _stood(s: ControllerMemory, before: int, tick_s: float) -> bool:
     """Whether the slide has been at rest since the drive started or turned."""
     if s.moved_s > tick_s:
         return before == STICK
@@ -143,7 +144,7 @@ def _stood(s: Record, before: int, tick_s: float) -> bool:
 
 
 @kernel
-def _expect(p: Record, s: Record, force_N: float, tick_s: float, speed_mps: float) -> None:
+def _expect(p: ControllerParams, s: ControllerMemory, force_N: float, tick_s: float, speed_mps: float) -> None:
     """Estimate the length of a stick and the time to the slip, and whether a stick can be seen in time."""
     way = 0 if s.direction > 0 else 1
     along_N = s.direction * force_N
@@ -165,7 +166,7 @@ def _expect(p: Record, s: Record, force_N: float, tick_s: float, speed_mps: floa
 
 
 @kernel
-def _feeds_unseen(p: Record, s: Record) -> bool:
+def _feeds_unseen(p: ControllerParams, s: ControllerMemory) -> bool:
     """Whether the noise of the drive's position hides the least feed that counts as motion, even within a second.
 
     The noise is extrapolated from the best windows to one second as white noise, as a stop disturbs the long windows for seconds.

@@ -2,8 +2,9 @@
 
 import math
 
-from bridge.kernel import Record, kernel
-from controller.codes import SMOOTH, STICK
+from bridge.kernel import kernel
+from bridge.layouts import ControllerMemory, ControllerParams
+from bridge.wire.stickslip_pb2 import SMOOTH, STICK
 from controller.estimate.windows import BINS, DRIVE, FEWEST, FORCE, SLIDE
 
 # Elongation rate over its noise from which a window teaches. Smaller: the noise of the positions makes k_d too small, by
@@ -19,7 +20,7 @@ _SLIDING_S = 0.3  # time constant of the learnt sliding force
 
 
 @kernel
-def stiffness(p: Record, s: Record) -> None:
+def stiffness(p: ControllerParams, s: ControllerMemory) -> None:
     """Learn k_d, the force over the elongation of the drive: from rates, so that no offset matters.
 
     Learnt from the window with the best signal of the elongation. Without such a window, a climbing force bounds the configured
@@ -58,13 +59,13 @@ def stiffness(p: Record, s: Record) -> None:
 
 
 @kernel
-def _bounded(p: Record, stiffness_N_per_m: float) -> float:
+def _bounded(p: ControllerParams, stiffness_N_per_m: float) -> float:
     told_N_per_m = p.drive_stiffness_N_per_m
     return min(max(stiffness_N_per_m, told_N_per_m / _MOST_OFF), told_N_per_m * _MOST_OFF)
 
 
 @kernel
-def begin(p: Record, s: Record) -> None:
+def begin(p: ControllerParams, s: ControllerMemory) -> None:
     """Start from the configured stiffness."""
     s.stiffness_N_per_m = p.drive_stiffness_N_per_m
     s.stiffness_sigma = _TOLD_SIGMA
@@ -72,7 +73,7 @@ def begin(p: Record, s: Record) -> None:
 
 
 @kernel
-def spring(s: Record, elongation_m: float) -> float:
+def spring(s: ControllerMemory, elongation_m: float) -> float:
     """Force of the drive's spring from both positions [N], for a rig without a force sensor.
 
     The spring is taken to be relaxed at the start; once the slide was dragged both ways, half-way between the farthest
@@ -88,7 +89,7 @@ def spring(s: Record, elongation_m: float) -> float:
 
 
 @kernel
-def forces(s: Record, force_N: float, tick_s: float) -> None:
+def forces(s: ControllerMemory, force_N: float, tick_s: float) -> None:
     """Learn the breakaway force at slips, and the sliding force in smooth sliding, both without vibration."""
     way = 0 if s.direction > 0 else 1
     along_N = s.direction * force_N

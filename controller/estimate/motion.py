@@ -2,7 +2,8 @@
 
 import math
 
-from bridge.kernel import Record, kernel
+from bridge.kernel import kernel
+from bridge.layouts import ControllerMemory, ControllerParams
 from controller.estimate.windows import BINS, DRIVE, FORCE, SLIDE, WELL_KNOWN
 
 _SIGMAS = 6.0  # 1e-9 a window that a standing drive is called moving
@@ -30,7 +31,7 @@ _HOLD_S = 0.1  # in which the held velocity falls to a third, as a slide still m
 
 
 @kernel
-def drive_velocity(p: Record, s: Record, tick_s: float) -> None:
+def drive_velocity(p: ControllerParams, s: ControllerMemory, tick_s: float) -> None:
     """Measure v_d [m/s], positive and negative, and whether the drive moves.
 
     It moves if a window shows motion and no shorter window with enough resolution contradicts, as after a stop. From there on,
@@ -97,7 +98,7 @@ def drive_velocity(p: Record, s: Record, tick_s: float) -> None:
 
 
 @kernel
-def _rising(p: Record, s: Record, speed_mps: float, taken: int) -> float:
+def _rising(p: ControllerParams, s: ControllerMemory, speed_mps: float, taken: int) -> float:
     """Lower bound of |v_d| at the end of the windows [m/s]; `speed_mps` holds for the middle of level `taken`.
 
     At a constant acceleration v_d now = 2 slope - slope of the window twice as long. Short windows are noisy, long ones late: the
@@ -118,7 +119,7 @@ def _rising(p: Record, s: Record, speed_mps: float, taken: int) -> float:
 
 
 @kernel
-def _pulling(p: Record, s: Record) -> float:
+def _pulling(p: ControllerParams, s: ControllerMemory) -> float:
     """|v_d| at least, by the spring [m/s]: v_s of a longer window and F' / k_d of a shorter one, while the spring pulls.
 
     A slide that the vibration holds goes on at its v_s when the drive speeds up, and the spring winds up by the difference.
@@ -136,7 +137,7 @@ def _pulling(p: Record, s: Record) -> float:
 
 
 @kernel
-def _stopped(s: Record, level: int) -> bool:
+def _stopped(s: ControllerMemory, level: int) -> bool:
     """Whether a window shorter than `level` should have seen the velocity and did not: it is the tail of a stop."""
     for i in range(level):
         sigma = s.noise[DRIVE, i]
@@ -151,7 +152,7 @@ def _stopped(s: Record, level: int) -> bool:
 
 
 @kernel
-def _winds_up(s: Record, level: int) -> bool:
+def _winds_up(s: ControllerMemory, level: int) -> bool:
     """Whether the drive moves relative to the slide: true at a start, false for hum on both positions.
 
     Used only at the begin of the run, until some periods of the hum are in the measured noise.
@@ -161,7 +162,7 @@ def _winds_up(s: Record, level: int) -> bool:
 
 
 @kernel
-def _stands(p: Record, s: Record) -> bool:
+def _stands(p: ControllerParams, s: ControllerMemory) -> bool:
     """Whether some window since the start of the move would have seen half of the last velocity, and does not.
 
     A drive that starts is seen and lost in turns, as each window that reaches back before the start disagrees with the next.
@@ -177,7 +178,7 @@ def _stands(p: Record, s: Record) -> bool:
 
 
 @kernel
-def _climbing(p: Record, s: Record) -> float:
+def _climbing(p: ControllerParams, s: ControllerMemory) -> float:
     """Velocity of a drive that winds up its spring against a slide that sticks [m/s]; 0 where the positions exclude it."""
     for level in range(p.levels):
         if s.pushed[level] < BINS or p.window_s[level] > _BY_FORCE_S:

@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from bridge.kernel import Record, kernel
+from bridge.layouts import ControllerMemory, ControllerParams, SensorRow
 from controller.estimate.windows import DRIVE, FORCE, ROWS, SLIDE
 
 # Of the mean bend of white noise, times the root of the samples in a bin: the spike is then 6 sigma of the slope of four bins,
@@ -26,7 +27,7 @@ _GROWS = 2.0  # most by which the noise grows in one block
 
 
 @kernel
-def find_spikes(p: Record, s: Record, block: Record) -> bool:
+def find_spikes(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> bool:
     """Find the spikes of a block; false if a sample is NaN or infinite, which would stay in the filters for ever.
 
     Channels that the configuration leaves out are skipped.
@@ -44,7 +45,7 @@ def find_spikes(p: Record, s: Record, block: Record) -> bool:
 
 
 @kernel
-def sum_without(s: Record, row: int, samples: Record, first: int, count: int) -> float:
+def sum_without(s: ControllerMemory, row: int, samples: Record, first: int, count: int) -> float:
     """Sum of some samples, in which the mean of its neighbours takes the place of a spike."""
     total = 0.0
     for i in range(first, first + count):
@@ -53,7 +54,7 @@ def sum_without(s: Record, row: int, samples: Record, first: int, count: int) ->
 
 
 @kernel
-def learn_bends(p: Record, s: Record, look: int, block: Record) -> None:
+def learn_bends(p: ControllerParams, s: ControllerMemory, look: int, block: SensorRow) -> None:
     """Follow the noise of one channel in turn; `look` counts."""
     if look % ROWS == FORCE:
         _learn(p, s, FORCE, block.drive_force_N)
@@ -64,7 +65,7 @@ def learn_bends(p: Record, s: Record, look: int, block: Record) -> None:
 
 
 @kernel
-def _learn(p: Record, s: Record, row: int, samples: Record) -> None:
+def _learn(p: ControllerParams, s: ControllerMemory, row: int, samples: Record) -> None:
     """Follow the noise of a channel: its mean bend from sample to sample."""
     bend = 0.0
     for i in range(2, samples.shape[0]):
@@ -76,7 +77,7 @@ def _learn(p: Record, s: Record, row: int, samples: Record) -> None:
 
 
 @kernel
-def _look(p: Record, s: Record, row: int, samples: Record) -> int:
+def _look(p: ControllerParams, s: ControllerMemory, row: int, samples: Record) -> int:
     """Search one channel; return the number of NaN or infinite samples."""
     count, bad = samples.shape[0], 0
     if _count_far(s.tail[row, 1], samples, _NEAR * s.most_bend[row]) > 0:
@@ -88,7 +89,7 @@ def _look(p: Record, s: Record, row: int, samples: Record) -> int:
 
 
 @kernel
-def _look_closer(p: Record, s: Record, row: int, samples: Record) -> int:
+def _look_closer(p: ControllerParams, s: ControllerMemory, row: int, samples: Record) -> int:
     bad = 0
     if _count_bent(s.tail[row, 0], s.tail[row, 1], samples, s.most_bend[row]) > 0:
         bad = _not_finite(samples)
@@ -130,7 +131,7 @@ def _not_finite(samples: Record) -> int:
 
 
 @kernel
-def _search(p: Record, s: Record, row: int, samples: Record) -> None:
+def _search(p: ControllerParams, s: ControllerMemory, row: int, samples: Record) -> None:
     """Note the largest spike; without one, raise the noise."""
     count, largest, total = samples.shape[0], s.most_bend[row], 0.0
     steep = 0.0  # bend just before the bend of the last three samples
@@ -160,7 +161,7 @@ def _search(p: Record, s: Record, row: int, samples: Record) -> None:
 
 
 @kernel
-def _know(p: Record, s: Record, row: int, bend: float, value: float) -> None:
+def _know(p: ControllerParams, s: ControllerMemory, row: int, bend: float, value: float) -> None:
     """Set the mean bend of the noise, and from it the least bend of a spike; `value` is one of the samples."""
     s.bends[row] = bend
     floor = _STEPS * max(s.resolution[row], _ROUNDED * math.fabs(value))
@@ -168,7 +169,7 @@ def _know(p: Record, s: Record, row: int, bend: float, value: float) -> None:
 
 
 @kernel
-def _at(s: Record, row: int, samples: Record, i: int) -> float:
+def _at(s: ControllerMemory, row: int, samples: Record, i: int) -> float:
     """A sample of this block, or one of the two before it; no number where it is not known."""
     if i >= samples.shape[0]:
         return math.nan

@@ -16,6 +16,7 @@ import math
 import numpy as np
 
 from bridge.kernel import Record, kernel
+from bridge.layouts import ControllerMemory, ControllerParams
 
 BINS = 4  # in a window; a power of 2
 MOST_FRESH = 16  # bins added at once, at most
@@ -41,7 +42,7 @@ OF_STEP = 0.29
 
 
 @kernel
-def push(p: Record, s: Record, count: int, learn: bool) -> None:
+def push(p: ControllerParams, s: ControllerMemory, count: int, learn: bool) -> None:
     """Add `count` bins, whose means are in `fresh`, level by level; `learn`: their noise counts, as they are measured."""
     fresh, bins, slope = s.fresh, s.bins, s.slope
     per_s = 0.1 / p.bin_s
@@ -77,7 +78,7 @@ def push(p: Record, s: Record, count: int, learn: bool) -> None:
 
 
 @kernel
-def _note_window(p: Record, s: Record, level: int, learn: bool) -> None:
+def _note_window(p: ControllerParams, s: ControllerMemory, level: int, learn: bool) -> None:
     """Take the slopes of a window that begins where the last one ended: their differences give the noise."""
     slope, before, sigma = s.slope, s.slope_before, s.sigma
     if learn:
@@ -110,14 +111,14 @@ def _moved(sigma: float, apart: float, up: float, count: int) -> float:
 
 
 @kernel
-def clear_windows(s: Record) -> None:
+def clear_windows(s: ControllerMemory) -> None:
     """Empty the windows; the noise stays."""
     for level in range(LEVELS):
         s.pushed[level] = 0
 
 
 @kernel
-def _note_noise(p: Record, s: Record, level: int, both: bool) -> None:
+def _note_noise(p: ControllerParams, s: ControllerMemory, level: int, both: bool) -> None:
     """Set the noise of the slopes of a level, and of those longer windows whose own is not known yet."""
     for row in range(ROWS):
         for i in range(level, p.levels):
@@ -139,7 +140,7 @@ def _note_noise(p: Record, s: Record, level: int, both: bool) -> None:
 
 
 @kernel
-def note_steps(s: Record, row: int, samples: Record) -> None:
+def note_steps(s: ControllerMemory, row: int, samples: Record) -> None:
     """Learn the quantisation step of a row: the smallest change from sample to sample."""
     last = np.float64(samples[0])
     for i in range(1, samples.shape[0]):

@@ -6,15 +6,16 @@ faster than v_a can follow. Only if the vibration gains nothing `policy` ends it
 A first slip or surge under vibration raises the learnt need. A repeated one shows that the raised need is too small.
 """
 
-from bridge.kernel import Record, kernel
-from controller.codes import CANNOT_HELP, HELD
+from bridge.kernel import kernel
+from bridge.layouts import ControllerMemory
+from bridge.wire.stickslip_pb2 import CANNOT_HELP, HELD
 
 _FEWEST = 2  # slips until it is reported: one may be chance
 _REMEMBERED_S = 30.0  # since the last of them
 
 
 @kernel
-def note_failure(s: Record) -> None:
+def note_failure(s: ControllerMemory) -> None:
     """Count a slip that no more vibration could have prevented."""
     s.failed = s.failed + 1 if s.failed_left_s > 0.0 else 1
     s.failed_left_s = _REMEMBERED_S
@@ -23,7 +24,7 @@ def note_failure(s: Record) -> None:
 
 
 @kernel
-def note_lesson(s: Record) -> None:
+def note_lesson(s: ControllerMemory) -> None:
     """Count a slip or surge after which the ratio rises: the first is a lesson, a repeated one a failure."""
     if s.failed_left_s > 0.0:
         note_failure(s)
@@ -32,7 +33,7 @@ def note_lesson(s: Record) -> None:
 
 
 @kernel
-def forget_failures(s: Record, block_s: float) -> None:
+def forget_failures(s: ControllerMemory, block_s: float) -> None:
     """End CANNOT_HELP after a long time without a failure."""
     s.failed_left_s = max(s.failed_left_s - block_s, 0.0)
     if s.reason == CANNOT_HELP and s.failed_left_s == 0.0:

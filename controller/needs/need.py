@@ -6,7 +6,8 @@ above. So one speed each, for each direction, holds the verdicts; a later contra
 
 import math
 
-from bridge.kernel import Record, kernel
+from bridge.kernel import kernel
+from bridge.layouts import ControllerMemory, ControllerParams
 
 _STEP = 0.02  # of the ratio, as the edge is a cliff 0.02 to 0.04 wide
 _MARGIN = 1.5  # of the friction over that which its swing takes
@@ -18,26 +19,26 @@ _AROUND = 1.25  # factor up and down in speed for which a verdict holds
 
 
 @kernel
-def way_of(s: Record) -> int:
+def way_of(s: ControllerMemory) -> int:
     """The index of the drive's direction in what is learnt for each."""
     return 0 if s.direction > 0 else 1
 
 
 @kernel
-def is_needed(s: Record, speed_mps: float) -> bool:
+def is_needed(s: ControllerMemory, speed_mps: float) -> bool:
     """Whether vibration was found to be needed at this speed."""
     return speed_mps <= s.needed_to_mps[way_of(s)]
 
 
 @kernel
-def is_needless(s: Record, speed_mps: float) -> bool:
+def is_needless(s: ControllerMemory, speed_mps: float) -> bool:
     """Whether vibration was found not to be needed at this speed."""
     known_mps = needless_from_mps(s)
     return 0.0 < known_mps <= speed_mps
 
 
 @kernel
-def needless_from_mps(s: Record) -> float:
+def needless_from_mps(s: ControllerMemory) -> float:
     """From which speed on vibration is not needed; a direction of which nothing is known yet is taken to be as the other one."""
     way = way_of(s)
     unknown = s.needless_from_mps[way] == 0.0 and s.needed_to_mps[way] == 0.0
@@ -45,7 +46,7 @@ def needless_from_mps(s: Record) -> float:
 
 
 @kernel
-def note_needed(s: Record, speed_mps: float) -> None:
+def note_needed(s: ControllerMemory, speed_mps: float) -> None:
     """Remember that vibration is needed at this speed."""
     way = way_of(s)
     s.needed_to_mps[way] = max(s.needed_to_mps[way], _AROUND * speed_mps)
@@ -54,7 +55,7 @@ def note_needed(s: Record, speed_mps: float) -> None:
 
 
 @kernel
-def note_needless(s: Record, speed_mps: float) -> None:
+def note_needless(s: ControllerMemory, speed_mps: float) -> None:
     """Remember that vibration is not needed at this speed."""
     way = way_of(s)
     known_mps = s.needless_from_mps[way]
@@ -63,7 +64,7 @@ def note_needless(s: Record, speed_mps: float) -> None:
 
 
 @kernel
-def raise_ratio(p: Record, s: Record, by: float) -> None:
+def raise_ratio(p: ControllerParams, s: ControllerMemory, by: float) -> None:
     """The present v_a / v_d was too little: ask for more, and remember where the edge is."""
     way = way_of(s)
     before = s.ratio[way]
@@ -97,7 +98,7 @@ def swing_held(ratio: float) -> float:
 
 
 @kernel
-def settling_s(p: Record, s: Record, force_N: float, speed_mps: float) -> float:
+def settling_s(p: ControllerParams, s: ControllerMemory, force_N: float, speed_mps: float) -> float:
     """Time in which the spring takes up a change of the mean friction after a change of v_a.
 
     Under vibration the mean friction is the friction without it times v_s / <|v_r|>, where <|v_r|> is the mean relative speed
@@ -112,7 +113,7 @@ def settling_s(p: Record, s: Record, force_N: float, speed_mps: float) -> float:
 
 
 @kernel
-def is_wound_up(s: Record, settle_s: float) -> bool:
+def is_wound_up(s: ControllerMemory, settle_s: float) -> bool:
     """Whether the slide has followed evenly: before, it lags because the spring still takes up the friction.
 
     A feed so slow that the spring takes seconds does not wait for that.
@@ -121,7 +122,7 @@ def is_wound_up(s: Record, settle_s: float) -> bool:
 
 
 @kernel
-def follow_swing(p: Record, s: Record, tick_s: float, settle_s: float) -> None:
+def follow_swing(p: ControllerParams, s: ControllerMemory, tick_s: float, settle_s: float) -> None:
     """Bring the ratio to the value that the swing of the slide requires, never onto a known edge.
 
     The vibration damps the slide up to v_s = v_a. Friction that swings by a share of itself, while the spring's force stays,

@@ -8,8 +8,9 @@ vibration, one that follows down to nothing does not.
 
 import math
 
-from bridge.kernel import Record, kernel
-from controller.codes import EXCITE, HELD, NOT_NEEDED, PROBE, SMOOTH, STICK, STILL_NEEDED, WATCH
+from bridge.kernel import kernel
+from bridge.layouts import ControllerMemory, ControllerParams
+from bridge.wire.stickslip_pb2 import EXCITE, HELD, NOT_NEEDED, PROBE, SMOOTH, STICK, STILL_NEEDED, WATCH
 from controller.estimate.windows import BINS
 from controller.modes import enter, excite
 from controller.needs.need import is_needed, note_needed, note_needless, settling_s, swing_held
@@ -45,7 +46,7 @@ _ASKED_FASTER = 2.0  # speed of a fade after a wobble without a fall of friction
 
 
 @kernel
-def begin_probe(p: Record, s: Record, way: int, force_N: float, speed_mps: float) -> None:
+def begin_probe(p: ControllerParams, s: ControllerMemory, way: int, force_N: float, speed_mps: float) -> None:
     """Ask where a probe is due and the slide slides evenly; begin the fade after an answer that allows it."""
     s.unasked_s += p.block_s
     _note_swing(p, s, speed_mps)
@@ -78,7 +79,7 @@ def begin_probe(p: Record, s: Record, way: int, force_N: float, speed_mps: float
 
 
 @kernel
-def _fade(p: Record, s: Record, force_N: float, faster: float) -> None:
+def _fade(p: ControllerParams, s: ControllerMemory, force_N: float, faster: float) -> None:
     s.fade, s.fade_from_N = s.ratio_now, math.fabs(force_N)
     s.fade_per_s = faster * 0.5 / p.probe_fade_s
     # after an answer the slide may lag; this lag does not count as a swing
@@ -87,7 +88,7 @@ def _fade(p: Record, s: Record, force_N: float, faster: float) -> None:
 
 
 @kernel
-def _note_swing(p: Record, s: Record, speed_mps: float) -> None:
+def _note_swing(p: ControllerParams, s: ControllerMemory, speed_mps: float) -> None:
     """Follow the mean square of the swing of v_s, over v_d."""
     longer = s.level + _LONGER
     if s.level < 0 or longer >= p.levels or s.pushed[longer] < BINS:
@@ -97,14 +98,14 @@ def _note_swing(p: Record, s: Record, speed_mps: float) -> None:
 
 
 @kernel
-def _still_needed(p: Record, s: Record, way: int, speed_mps: float) -> None:
+def _still_needed(p: ControllerParams, s: ControllerMemory, way: int, speed_mps: float) -> None:
     note_needed(s, speed_mps)
     s.probe_s[way] = min(2.0 * max(s.probe_s[way], p.probe_every_s), p.probe_every_max_s)
     s.unasked_s = 0.0
 
 
 @kernel
-def probe(p: Record, s: Record, way: int, speed_mps: float, block_s: float) -> None:
+def probe(p: ControllerParams, s: ControllerMemory, way: int, speed_mps: float, block_s: float) -> None:
     """Fade out while the slide follows."""
     if s.steady_s < STEADY_S:
         enter(s, EXCITE, HELD)
@@ -130,7 +131,7 @@ def probe(p: Record, s: Record, way: int, speed_mps: float, block_s: float) -> N
 
 
 @kernel
-def _faded(s: Record, speed_mps: float, block_s: float) -> float:
+def _faded(s: ControllerMemory, speed_mps: float, block_s: float) -> float:
     """The next ratio to v_d of a vibration that fades.
 
     Down to 1 the mean friction grows as 1 / <|v_r|>, the mean relative speed between slide and base, so the ratio falls as the

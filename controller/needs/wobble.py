@@ -11,7 +11,8 @@ the frequency of the wobble alone, under a Hann window, so that a slow trend of 
 
 import math
 
-from bridge.kernel import Record, kernel
+from bridge.kernel import kernel
+from bridge.layouts import ControllerMemory, ControllerParams
 from controller.estimate.windows import BINS, FORCE, SLIDE
 
 TWO_PI = 2.0 * math.pi
@@ -33,13 +34,13 @@ _ASIDE = 0.25  # of v_s / v_a: largest answer a quarter period out of phase; abo
 
 
 @kernel
-def can_ask(p: Record, longest_s: float) -> bool:
+def can_ask(p: ControllerParams, longest_s: float) -> bool:
     """Whether a period of at most `longest_s` is long enough, however little the noise."""
     return max(_WINDOWS * p.window_s[0], _BLOCKS * p.block_s) <= longest_s
 
 
 @kernel
-def windows_for(p: Record, s: Record, speed_mps: float) -> int:
+def windows_for(p: ControllerParams, s: ControllerMemory, speed_mps: float) -> int:
     """The shortest windows that show v_s well enough; -1 for none."""
     for level in range(p.levels):
         if s.pushed[level] < BINS:
@@ -50,7 +51,7 @@ def windows_for(p: Record, s: Record, speed_mps: float) -> int:
 
 
 @kernel
-def begin_wobble(p: Record, s: Record, speed_mps: float, longest_s: float) -> bool:
+def begin_wobble(p: ControllerParams, s: ControllerMemory, speed_mps: float, longest_s: float) -> bool:
     """Begin to ask, if a period of at most `longest_s` holds windows that show v_s well enough."""
     level = windows_for(p, s, speed_mps)
     if level < 0:
@@ -65,13 +66,13 @@ def begin_wobble(p: Record, s: Record, speed_mps: float, longest_s: float) -> bo
 
 
 @kernel
-def wobble_factor(s: Record) -> float:
+def wobble_factor(s: ControllerMemory) -> float:
     """Of v_a, now."""
     return 1.0 + DEPTH * math.cos(TWO_PI * s.wobble_s / s.wobble_period_s) if s.wobbles == 1 else 1.0
 
 
 @kernel
-def wobble(p: Record, s: Record, speed_mps: float) -> bool:
+def wobble(p: ControllerParams, s: ControllerMemory, speed_mps: float) -> bool:
     """Add a block's v_a and v_s; return whether an answer is complete: after each `PERIODS`."""
     turn_rad = TWO_PI * s.wobble_s / s.wobble_period_s
     late_rad = math.pi * (p.window_s[s.wobble_level] - p.block_s) / s.wobble_period_s  # between the middles of both
@@ -89,7 +90,7 @@ def wobble(p: Record, s: Record, speed_mps: float) -> bool:
 
 
 @kernel
-def answer(s: Record) -> int:
+def answer(s: ControllerMemory) -> int:
     """Result of the wobble: FALLS if v_s follows by more than its share or follows something else; EVEN; or UNSURE: continue.
 
     The mass of the slide delays the answer by 1 / (1 + j x). Without mass the answer would be its squared size over its in-phase
@@ -113,14 +114,14 @@ def answer(s: Record) -> int:
 
 
 @kernel
-def slide_noise_mps(p: Record, s: Record, level: int) -> float:
+def slide_noise_mps(p: ControllerParams, s: ControllerMemory, level: int) -> float:
     """Noise of v_s in a window."""
     weight = _weight_by_place(p, s, level) + _weight_by_force(p, s, level)
     return 1.0 / math.sqrt(weight) if weight > 0.0 else math.inf
 
 
 @kernel
-def slide_mps(p: Record, s: Record, level: int, speed_mps: float) -> float:
+def slide_mps(p: ControllerParams, s: ControllerMemory, level: int, speed_mps: float) -> float:
     """v_s in a window, by position and force, each by its noise."""
     by_place, by_force = _weight_by_place(p, s, level), _weight_by_force(p, s, level)
     place_mps = s.direction * s.slope[SLIDE, level]
@@ -129,12 +130,12 @@ def slide_mps(p: Record, s: Record, level: int, speed_mps: float) -> float:
 
 
 @kernel
-def _weight_by_place(p: Record, s: Record, level: int) -> float:
+def _weight_by_place(p: ControllerParams, s: ControllerMemory, level: int) -> float:
     noise_mps = s.noise[SLIDE, level]
     return 1.0 / (noise_mps * noise_mps) if p.use_slide_position == 1 and noise_mps > 0.0 else 0.0
 
 
 @kernel
-def _weight_by_force(p: Record, s: Record, level: int) -> float:
+def _weight_by_force(p: ControllerParams, s: ControllerMemory, level: int) -> float:
     noise_mps = s.noise[FORCE, level] / s.stiffness_N_per_m
     return 1.0 / (noise_mps * noise_mps) if p.use_force == 1 and noise_mps > 0.0 else 0.0

@@ -9,7 +9,7 @@ confirmed  v_d as far as slide and force confirm it: POSITIONS_APART
 stall      after a stall of the computer or the link no doubt begins until v_a belongs to the command again
 age        how old the blocks are when they are answered
 jumps      a drive position that jumps: JUMPED
-anew       a reset forgets values learnt from a doubted force or position
+reset      a reset forgets values learnt from a doubted force or position
 noise      noise that grows many times, or too many slips: NOISE
 watch      all of them, once a block
 trip_events  trips and limits as events

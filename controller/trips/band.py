@@ -8,7 +8,8 @@ ever. So the stroke never exceeds the stroke for the wanted v_a at the known gai
 
 import math
 
-from bridge.kernel import Record, kernel
+from bridge.kernel import kernel
+from bridge.layouts import ControllerMemory, ControllerParams
 
 # Of even vibration that the known gain is a mean of; shorter: the noise of one fit; longer: later bounded
 KNOWN_S = 0.1
@@ -18,7 +19,7 @@ OTHER_REPORTED_S = 2.0  # for which GAIN_OTHER is reported: the check's gain dif
 
 
 @kernel
-def begin_known(p: Record, s: Record) -> None:
+def begin_known(p: ControllerParams, s: ControllerMemory) -> None:
     """Start from the configured gain alone."""
     for i in range(p.candidates):
         s.known_gain[i] = p.told_gain
@@ -26,7 +27,7 @@ def begin_known(p: Record, s: Record) -> None:
 
 
 @kernel
-def note_check(p: Record, s: Record, tone_Hz: float, gain: float) -> None:
+def note_check(p: ControllerParams, s: ControllerMemory, tone_Hz: float, gain: float) -> None:
     """Take a tone of the rig's loop check; from the tones beside a candidate its known gain is bounded.
 
     Between two tones a mount may resonate, so the gain there counts as known where the two are alike.
@@ -47,7 +48,7 @@ def note_check(p: Record, s: Record, tone_Hz: float, gain: float) -> None:
 
 
 @kernel
-def _use_check(p: Record, s: Record) -> None:
+def _use_check(p: ControllerParams, s: ControllerMemory) -> None:
     other = p.told_gain > 0.0
     for i in range(p.candidates):
         low, high = _checked(p, s, i)
@@ -59,7 +60,7 @@ def _use_check(p: Record, s: Record) -> None:
 
 
 @kernel
-def _checked(p: Record, s: Record, i: int) -> tuple[float, float]:
+def _checked(p: ControllerParams, s: ControllerMemory, i: int) -> tuple[float, float]:
     """The lowest and the highest gain that the check allows at a candidate: those at the tones beside it.
 
     Beyond the last tone the gain may go on to change by as much as between the last two.
@@ -77,14 +78,14 @@ def _checked(p: Record, s: Record, i: int) -> tuple[float, float]:
 
 
 @kernel
-def forget_check(s: Record) -> None:
+def forget_check(s: ControllerMemory) -> None:
     """Another loop check begins."""
     s.checked_blocks, s.gain_other_s = 0, 0.0
     s.tone_Hz[:, :], s.tone_gain[:, :] = 0.0, 0.0
 
 
 @kernel
-def note_known(p: Record, s: Record, i: int, gain: float) -> None:
+def note_known(p: ControllerParams, s: ControllerMemory, i: int, gain: float) -> None:
     """Learn the known gain of a candidate frequency, from the first even vibration alone."""
     if s.known_steps[i] < p.known_steps:
         s.known_steps[i] += 1
@@ -95,13 +96,13 @@ def note_known(p: Record, s: Record, i: int, gain: float) -> None:
 
 
 @kernel
-def is_known(p: Record, s: Record, i: int) -> bool:
+def is_known(p: ControllerParams, s: ControllerMemory, i: int) -> bool:
     """Whether the gain of a candidate is known well enough to judge by it."""
     return s.known_steps[i] >= p.known_steps
 
 
 @kernel
-def banded(p: Record, s: Record, wanted_m: float, model_m: float) -> float:
+def banded(p: ControllerParams, s: ControllerMemory, wanted_m: float, model_m: float) -> float:
     """The amplitude that the band allows [m]; sets whether it holds the amplitude back.
 
     Args:

@@ -8,8 +8,9 @@ the largest value learnt, as diverging positions look like an ever softer spring
 
 import math
 
-from bridge.kernel import Record, kernel
-from controller.codes import DRIVE_DOUBTED, FORCE_DOUBTED, POSITIONS_APART, SLIDE_DOUBTED
+from bridge.kernel import kernel
+from bridge.layouts import ControllerMemory, ControllerParams
+from bridge.wire.stickslip_pb2 import DRIVE_DOUBTED, FORCE_DOUBTED, POSITIONS_APART, SLIDE_DOUBTED
 from controller.estimate.windows import BINS, DRIVE, FORCE, SLIDE
 from controller.trips.delivered import SOME
 from controller.trips.doubts import CONTACT, trip
@@ -33,7 +34,7 @@ TRIP_S = 0.3  # for which they differ until it trips; longer than a reversing dr
 
 
 @kernel
-def watch_confirmed(p: Record, s: Record) -> None:
+def watch_confirmed(p: ControllerParams, s: ControllerMemory) -> None:
     """Follow the confirmed share of v_d; trip if nothing is confirmed for long. Once in SOME steps."""
     some_s = SOME * p.block_s
     vibrates = s.moving == 1 and (s.allowed_m > 0.0 or s.confirmed < 1.0)
@@ -76,7 +77,7 @@ def watch_confirmed(p: Record, s: Record) -> None:
 
 
 @kernel
-def _changed(s: Record, drive_mps: float, slide_mps: float) -> int:
+def _changed(s: ControllerMemory, drive_mps: float, slide_mps: float) -> int:
     """The row of the one signal that changed since all three agreed; _NONE where two did, or they never agreed."""
     if s.agreed_mps[DRIVE] == 0.0:
         return _NONE
@@ -90,7 +91,7 @@ def _changed(s: Record, drive_mps: float, slide_mps: float) -> int:
 
 
 @kernel
-def _level(p: Record, s: Record) -> int:
+def _level(p: ControllerParams, s: ControllerMemory) -> int:
     """The shortest windows under vibration in which both positions move by more than noise; -1 for none."""
     for level in range(p.confirm_level, min(p.confirm_level + _LONGER, p.levels)):
         window_s = p.window_s[level]

@@ -8,7 +8,8 @@ More than the band allows: RESONANCE, and the command is lowered, as a mount may
 import math
 
 from bridge.kernel import Record, kernel
-from controller.codes import CLIPPED, FROZEN, NOISE, OPEN_LOOP, SWAPPED
+from bridge.layouts import ControllerMemory, ControllerParams, SensorRow
+from bridge.wire.stickslip_pb2 import CLIPPED, FROZEN, NOISE, OPEN_LOOP, SWAPPED
 from controller.trips.band import is_known
 from controller.trips.doubts import ACCELEROMETER, OF_BASE, trip
 from controller.vibration import velocity_of
@@ -29,14 +30,14 @@ _MOST_OFF = 1.6  # factor by which the slide's accelerometer may miss the known 
 
 
 @kernel
-def note_command(s: Record, expected_mps: float) -> None:
+def note_command(s: ControllerMemory, expected_mps: float) -> None:
     """Count for how many steps the commanded v_a that is heard now has been even [m/s]."""
     apart_mps = math.fabs(expected_mps - s.expected_mps)
     s.even_steps = s.even_steps + 1 if expected_mps > 0.0 and apart_mps < _EVEN * expected_mps else 0
 
 
 @kernel
-def is_even(p: Record, s: Record) -> bool:
+def is_even(p: ControllerParams, s: ControllerMemory) -> bool:
     """Whether the measured v_a can be compared with the commanded one, whichever of the delays that were seen holds.
 
     Before the first of a vibration is heard, its delay may be any that the loop is made for.
@@ -47,7 +48,7 @@ def is_even(p: Record, s: Record) -> bool:
 
 
 @kernel
-def watch_delivered(p: Record, s: Record, block: Record) -> None:
+def watch_delivered(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> None:
     """Compare; trip where v_a is too little for its hold time, and count for how long it is too much."""
     i = s.candidate
     if s.followed != i or not is_known(p, s, i):
@@ -77,7 +78,7 @@ def watch_delivered(p: Record, s: Record, block: Record) -> None:
 
 
 @kernel
-def _cause(p: Record, s: Record, block: Record) -> int:
+def _cause(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> int:
     """What a block says of an accelerometer that shows too little: clipped, the slide's instead of the base's, or neither."""
     if clips(block.base_accel_mps2):
         return CLIPPED
@@ -100,7 +101,7 @@ def clips(samples: Record) -> bool:
 
 
 @kernel
-def watch_rest(p: Record, s: Record, block: Record) -> None:
+def watch_rest(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> None:
     """Trip where the acceleration is no sine any more, though it was: clipped, or drowned in noise. Once in SOME steps.
 
     The sine is that of the wanted v_a: noise that is far louder is taken for v_a, and less is commanded.
@@ -125,6 +126,6 @@ def watch_rest(p: Record, s: Record, block: Record) -> None:
 
 
 @kernel
-def is_loud(s: Record) -> bool:
+def is_loud(s: ControllerMemory) -> bool:
     """Whether more v_a is measured than the known gain gives, now or a moment ago."""
     return s.high_steps < 0

@@ -7,10 +7,12 @@ A trip lasts until the operator resets it or runs a new loop check of the rig.
 
 import math
 
-from bridge.kernel import Record, kernel
-from controller.codes import CHECKING, RESET
-from controller.trips.anew import forget_motion, forget_needs
+from bridge.kernel import kernel
+from bridge.layouts import ControllerMemory, ControllerParams
+from bridge.wire.messages import RESET
+from bridge.wire.stickslip_pb2 import CHECKING
 from controller.trips.band import begin_known, forget_check
+from controller.trips.reset import forget_motion, forget_needs
 from controller.trips.stall import is_judged
 
 ACCELEROMETER, CONTACT, DRIVE = 1, 2, 4  # bits of `s.doubted`
@@ -19,7 +21,7 @@ CHANNELS = 4
 
 
 @kernel
-def trip(s: Record, reason: int, doubts: int) -> None:
+def trip(s: ControllerMemory, reason: int, doubts: int) -> None:
     """Doubt signals; the first trip is reported until it ends, unless a later one ends the vibration.
 
     After a stall of the computer a doubt waits: a signal that is broken is still broken when the wait is over.
@@ -32,7 +34,7 @@ def trip(s: Record, reason: int, doubts: int) -> None:
 
 
 @kernel
-def end_trips(p: Record, s: Record, events: int) -> None:
+def end_trips(p: ControllerParams, s: ControllerMemory, events: int) -> None:
     """End all trips on the operator's reset or a loop check, which also restarts the known gain."""
     if events & RESET:
         if s.doubted & (CONTACT | DRIVE):
@@ -52,7 +54,7 @@ def end_trips(p: Record, s: Record, events: int) -> None:
 
 
 @kernel
-def _forget(s: Record) -> None:
+def _forget(s: ControllerMemory) -> None:
     s.trip, s.doubted = 0, 0
     s.low_steps, s.high_steps = 0, 0
     s.rest_steps, s.broken_steps = 0, 0

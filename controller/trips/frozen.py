@@ -8,7 +8,8 @@ one number for hours at rest.
 import math
 
 from bridge.kernel import Record, kernel
-from controller.codes import DRIVE_DOUBTED, FROZEN, LOOSE
+from bridge.layouts import ControllerMemory, ControllerParams, SensorRow
+from bridge.wire.stickslip_pb2 import DRIVE_DOUBTED, FROZEN, LOOSE
 from controller.estimate.spikes import sum_without
 from controller.estimate.windows import DRIVE as DRIVE_ROW
 from controller.trips.doubts import (
@@ -41,7 +42,7 @@ _SAME = 4  # equal samples in a row from which a look gives no information on th
 
 
 @kernel
-def watch_frozen(p: Record, s: Record, block: Record) -> None:
+def watch_frozen(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> None:
     """Count blocks that begin with the same number as the one before; trip where a channel that has noise shows none.
 
     A drive that is somewhere else from one block to the next has another unit, or another channel's wire.
@@ -73,7 +74,7 @@ def watch_frozen(p: Record, s: Record, block: Record) -> None:
 
 
 @kernel
-def _watch_drops(p: Record, s: Record, samples: Record) -> None:
+def _watch_drops(p: ControllerParams, s: ControllerMemory, samples: Record) -> None:
     """Count the times that a vibration ends in blocks of one number alone; trip where they are too many within a second."""
     s.drops *= 1.0 - min(p.block_s / _DROPS_S, 1.0)
     dropped = s.allowed_m > 0.0 and _is_one_number(samples)
@@ -94,7 +95,7 @@ def _is_one_number(samples: Record) -> bool:
 
 
 @kernel
-def _look_at_one(s: Record, block: Record) -> None:
+def _look_at_one(s: ControllerMemory, block: SensorRow) -> None:
     """Look at one channel in turn."""
     channel = s.looked % CHANNELS
     s.looked += 1
@@ -114,7 +115,7 @@ def _look_at_one(s: Record, block: Record) -> None:
 
 
 @kernel
-def _state(s: Record, channel: int) -> int:
+def _state(s: ControllerMemory, channel: int) -> int:
     """The condition that the noise of a channel depends on: whether the base vibrates, or the drive moves."""
     if channel == OF_BASE:
         return 1 if s.allowed_m > 0.0 else 0
@@ -133,20 +134,20 @@ def _goes_up_and_down(samples: Record) -> bool:
 
 
 @kernel
-def _repeats(p: Record, s: Record, channel: int, first: float) -> bool:
+def _repeats(p: ControllerParams, s: ControllerMemory, channel: int, first: float) -> bool:
     same = s.same_steps[channel] + 1 if first == s.first_sample[channel] else 0
     s.same_steps[channel], s.first_sample[channel] = same, first
     return same > p.frozen_steps and _has_noise(s, channel)
 
 
 @kernel
-def _has_noise(s: Record, channel: int) -> bool:
+def _has_noise(s: ControllerMemory, channel: int) -> bool:
     way = _state(s, channel)
     return s.looks[channel, way] == _LOOKS and s.lively[channel, way] > _LIVELY
 
 
 @kernel
-def _all_repeat(p: Record, s: Record) -> bool:
+def _all_repeat(p: ControllerParams, s: ControllerMemory) -> bool:
     """Whether all channels repeat their numbers, and the accelerometer of the base has noise: one without may stand."""
     fewest = min(s.same_steps[OF_BASE], s.same_steps[OF_DRIVE])
     if p.use_force == 1:

@@ -2,8 +2,9 @@
 
 import math
 
-from bridge.kernel import Record, kernel
-from controller.codes import DRIVE_DOUBTED
+from bridge.kernel import kernel
+from bridge.layouts import ControllerMemory, ControllerParams
+from bridge.wire.stickslip_pb2 import DRIVE_DOUBTED
 from controller.estimate.windows import BINS, clear_windows
 from controller.estimate.windows import DRIVE as DRIVE_ROW
 from controller.trips.doubts import DRIVE, OF_DRIVE, trip
@@ -19,7 +20,7 @@ FORGET_S = 1.0
 
 
 @kernel
-def watch_jumps(p: Record, s: Record, place_m: float, blocks: int) -> None:
+def watch_jumps(p: ControllerParams, s: ControllerMemory, place_m: float, blocks: int) -> None:
     """Take the first place of a block, and how many blocks it is after the last; judge the way before this one."""
     if s.jumped_s > 0.0:
         s.jumped_s = max(s.jumped_s - p.block_s, 0.0)
@@ -43,7 +44,7 @@ def watch_jumps(p: Record, s: Record, place_m: float, blocks: int) -> None:
 
 
 @kernel
-def _is_another_speed(p: Record, s: Record) -> bool:
+def _is_another_speed(p: ControllerParams, s: ControllerMemory) -> bool:
     """Whether the drive goes at another speed than before a jump."""
     level = max(s.spring_level, p.spring_level)
     if s.pushed[level] < BINS:

@@ -6,6 +6,7 @@ And more slips than the spring could wind up for: these are noise.
 import math
 
 from bridge.kernel import Record, kernel
+from bridge.layouts import ControllerMemory, ControllerParams
 from controller.estimate.windows import DRIVE, LEVELS
 from controller.trips.delivered import SOME
 
@@ -19,7 +20,7 @@ _TOLD_S = 2.0  # for which grown noise is reported
 
 
 @kernel
-def look_at_noise(s: Record, samples: Record) -> None:
+def look_at_noise(s: ControllerMemory, samples: Record) -> None:
     """Follow the second difference of the drive position within a block; restart the learning of noise after two large ones."""
     bend_m = 0.0
     for i in range(2, samples.shape[0]):
@@ -39,7 +40,7 @@ def look_at_noise(s: Record, samples: Record) -> None:
 
 
 @kernel
-def watch_slips(p: Record, s: Record) -> None:
+def watch_slips(p: ControllerParams, s: ControllerMemory) -> None:
     """Do not believe slips for a while where there are too many. Once in SOME steps."""
     some_s = SOME * p.block_s
     keep = 1.0 - min(some_s / _SLIPS_S, 1.0)

@@ -9,8 +9,9 @@ v_d keeps its value before the break, and slips do not count.
 
 import math
 
-from bridge.kernel import Record, kernel
-from controller.codes import DRIVE_DOUBTED, FORCE_DOUBTED, SLIDE_DOUBTED
+from bridge.kernel import kernel
+from bridge.layouts import ControllerMemory, ControllerParams
+from bridge.wire.stickslip_pb2 import DRIVE_DOUBTED, FORCE_DOUBTED, SLIDE_DOUBTED
 from controller.estimate.windows import BINS, DRIVE, FORCE, SLIDE, WELL_KNOWN
 from controller.trips.delivered import SOME
 from controller.trips.doubts import CONTACT, trip
@@ -29,7 +30,7 @@ _TWICE = 2.0  # change of v_d over the change of v_s from which the drive is dou
 
 
 @kernel
-def watch_spring(p: Record, s: Record) -> None:
+def watch_spring(p: ControllerParams, s: ControllerMemory) -> None:
     """Look at one window; trip where it has broken the law for too long. Once in SOME steps."""
     level = _level(p, s)
     if level < 0:
@@ -69,12 +70,12 @@ def watch_spring(p: Record, s: Record) -> None:
 
 
 @kernel
-def _largest_mps(p: Record, s: Record) -> float:
+def _largest_mps(p: ControllerParams, s: ControllerMemory) -> float:
     return max(math.fabs(s.kept_mps[DRIVE]), _HALF * math.fabs(s.drive_velocity_mps), p.least_feed_mps)
 
 
 @kernel
-def _level(p: Record, s: Record) -> int:
+def _level(p: ControllerParams, s: ControllerMemory) -> int:
     """The shortest windows in which half of v_d exceeds the noise; -1 for none. Once broken, the same as before."""
     if s.broken_steps > 0:
         return s.spring_level
@@ -92,6 +93,6 @@ def _level(p: Record, s: Record) -> int:
 
 
 @kernel
-def is_drive_off(s: Record) -> bool:
+def is_drive_off(s: ControllerMemory) -> bool:
     """Whether the law is broken now by a change of the drive position."""
     return s.broken_steps > 0 and s.broken_drive > 0

@@ -5,8 +5,9 @@ true: time, positions, force and slips count. But v_a against the command is no 
 is learnt, the piezo is not weak, no swing moves the ratio, and no signal is doubted until that time is over.
 """
 
-from bridge.kernel import Record, kernel
-from controller.codes import LATE, STALE
+from bridge.kernel import kernel
+from bridge.layouts import ControllerMemory, ControllerParams
+from bridge.wire.messages import LATE, STALE
 from controller.trips.age import MARGIN_NS
 
 # Time without a stall until v_a is compared with the command again. Of eight runs of a sound rig, one stall of 0.05 to 1 s in
@@ -20,7 +21,7 @@ MOST_S = 3.0
 
 
 @kernel
-def note_stall(p: Record, s: Record, events: int, gap_blocks: int) -> None:
+def note_stall(p: ControllerParams, s: ControllerMemory, events: int, gap_blocks: int) -> None:
     """Follow stalls: blocks that are late, that do not come, or that are lost for as long as a late one is late."""
     if events & (STALE | LATE) or gap_blocks * p.block_s > 1e-9 * MARGIN_NS:
         s.quiet_s = 0.0
@@ -30,6 +31,6 @@ def note_stall(p: Record, s: Record, events: int, gap_blocks: int) -> None:
 
 
 @kernel
-def is_judged(s: Record) -> bool:
+def is_judged(s: ControllerMemory) -> bool:
     """Whether v_a of a block may be compared with the command."""
     return s.stalling_s == 0.0 or s.stalling_s > MOST_S

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.event_codes import TRIPS, WEAK_REASONS
-from bridge.wire.words import words
+from bridge.wire.words import help_of, word_of
 
 _LIMITS: dict[int, str] = {wire.RANGE: "STROKE_MAX", wire.GAIN_LIMIT: "GAIN_LIMIT"}
 _HELD_S = 0.2  # of a limit until it is reported: every start of a vibration passes some limits
@@ -28,10 +28,9 @@ class TripEvents:
     """Turns trips and limits of the steps into events."""
 
     def __init__(self) -> None:
-        help_of = {(word.column, word.number): word.help for word in words()}
         names = {wire.Reason.Value(name): name for name in (*TRIPS, *WEAK_REASONS)}
-        self._reasons = {number: (name, help_of[("reason", number)]) for number, name in names.items()}
-        self._limits = {number: (name, help_of[("limit", number)]) for number, name in _LIMITS.items()}
+        self._reasons = {number: (name, help_of("reason", name)) for number, name in names.items()}
+        self._limits = {number: (name, help_of("limit", word_of("limit", number))) for number, name in _LIMITS.items()}
         self._reason = self._limit = 0
         self._open: list[str] = []  # trips since the last step without one; a trip may hide another
         self._limit_since_ns = 0

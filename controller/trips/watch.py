@@ -3,7 +3,8 @@
 import math
 
 from bridge.kernel import Record, kernel
-from controller.codes import GAIN_OTHER, JUMPED, NOISE, RESONANCE, TRAVEL_END
+from bridge.layouts import ControllerMemory, ControllerParams, SensorRow
+from bridge.wire.stickslip_pb2 import GAIN_OTHER, JUMPED, NOISE, RESONANCE, TRAVEL_END
 from controller.estimate.windows import DRIVE as DRIVE_ROW
 from controller.trips.confirmed import watch_confirmed
 from controller.trips.delivered import SOME, is_loud, watch_delivered, watch_rest
@@ -14,7 +15,7 @@ from controller.trips.spring import is_drive_off, watch_spring
 
 
 @kernel
-def watch(p: Record, s: Record, block: Record) -> None:
+def watch(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> None:
     """Look for faults in a block after its estimate, and hide doubted signals from the policy."""
     watch_frozen(p, s, block)
     watch_delivered(p, s, block)
@@ -43,7 +44,7 @@ def watch(p: Record, s: Record, block: Record) -> None:
 
 
 @kernel
-def _look_at_slide_accel(s: Record, samples: Record) -> None:
+def _look_at_slide_accel(s: ControllerMemory, samples: Record) -> None:
     total = 0.0
     for i in range(samples.shape[0]):
         total += float(samples[i])
@@ -51,7 +52,7 @@ def _look_at_slide_accel(s: Record, samples: Record) -> None:
 
 
 @kernel
-def restrain(p: Record, s: Record) -> None:
+def restrain(p: ControllerParams, s: ControllerMemory) -> None:
     """After the policy: no vibration without a v_d or outside of the travel, and no frequency whose gain is not known."""
     if s.doubted & DRIVE or s.outside == 1:
         s.wanted_velocity_mps = 0.0
@@ -64,7 +65,7 @@ def restrain(p: Record, s: Record) -> None:
 
 
 @kernel
-def reported_reason(s: Record) -> int:
+def reported_reason(s: ControllerMemory) -> int:
     """The reason that a command carries: first the trip, then passing conditions, then the policy's reason."""
     if s.trip > 0:
         return s.trip

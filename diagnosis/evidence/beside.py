@@ -3,12 +3,10 @@
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from bridge.arrays import Floats
 from bridge.faults import Fault
 from bridge.log.finding import Finding
 from diagnosis.evidence.manifest import MANIFEST, RigTable, RunTable
-
-Columns = dict[str, Floats]
+from diagnosis.evidence.manifest_keys import Columns
 
 
 def with_beside(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, list[Finding]]:

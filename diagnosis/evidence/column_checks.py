@@ -10,12 +10,13 @@ from bridge.arrays import Floats
 from bridge.faults import Fault
 from bridge.log.check.signal_range import look
 from bridge.log.finding import Finding
+from bridge.tables.one_clock import gaps_of
 from bridge.units import counted, percent
+from bridge.wire.channels import CHANNELS
 from diagnosis.evidence.manifest import RigTable, RunTable
-from diagnosis.evidence.manifest_keys import BESIDE
+from diagnosis.evidence.manifest_keys import FURTHER, STANDARD, VIBRATION, Columns
 from diagnosis.evidence.sign_and_unit import apparent_stiffness_N_per_m
 
-Columns = dict[str, Floats]
 Clipped = dict[str, tuple[float, float]]
 Note = Callable[[str, str, str], None]  # kind, column, text
 
@@ -24,9 +25,6 @@ Note = Callable[[str, str, str], None]  # kind, column, text
 _FEWEST_ROWS = 16
 _LARGEST_BAD_SHARE = 0.1  # of rows that cannot be used; with more, the file is refused
 _LARGEST_WILD_SHARE = 1e-3  # of samples that no rig can show: a loose contact, or a number that means "no value"
-_SENSORS = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m")
-_COMMANDED = ("vibration_frequency_Hz", "vibration_amplitude_m")
-_GAP_STEPS = 10.0  # times the median step between samples from which a step is a gap
 # Longest gap, and largest share of gaps in a run. In a longer gap the rig slips unseen, and the model goes on slipping.
 _LONGEST_GAP_S, _LARGEST_GAP_SHARE = 1.0, 0.1
 _VELOCITY_TOLERANCE = 0.1  # relative difference of the stated drive velocity and the drive position's slope
@@ -41,15 +39,6 @@ _FEWEST_IN_A_SLIP = 3.0  # samples
 _SHORTEST_S = 1.0  # of a run
 _QUICKEST_S = 2e-6  # between samples (500 kHz); a shorter step means that time is not in seconds
 _SLOWEST_S = 0.05  # between samples, with a force drive
-# Largest values that can be right, SI units. A factor of 1000, as between mm and m, exceeds one of them on a bench rig.
-_LARGEST = {
-    "mass_accel_mps2": 1e5,
-    "base_accel_mps2": 1e5,
-    "mass_position_m": 10.0,  # of travel
-    "drive_position_m": 10.0,
-    "vibration_frequency_Hz": 1e6,
-    "vibration_amplitude_m": 1e-3,  # piezo stacks move by a tenth of a millimetre
-}
 _MOST_TURNS = 1e4  # factor of the way of a rig that turns: rad of a spindle add up
 # a force sensor that never shows 1/300 of the static friction, or shows 300 times the static friction, has another unit
 _FORCE_FACTOR = 300.0
@@ -70,33 +59,27 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
     usable = dict(columns)
     for name in list(usable):
         bad = ~np.isfinite(usable[name])
-        if name in _COMMANDED and bad.any():  # the model would run without this vibration
+        if name in VIBRATION and bad.any():  # the model would run without this vibration
             where = f"{bad.sum()} of {counted(len(bad), 'row')}, first row {np.argmax(bad) + 1}"
             raise Fault(
                 "BAD_EVIDENCE",
                 f"{file}: {name}: no finite number in {where}: must be one in every row; write 0 where the vibration is off",
             )
         if name != "t_s" and bad.mean() > 0.5:
-            note(
-                "not-finite",
-                name,
-                f"no finite number in {bad.sum()} of {counted(len(bad), 'row')}; not used",
-                int(bad.sum()),
-            )
+            text = f"no finite number in {bad.sum()} of {counted(len(bad), 'row')}; not used"
+            note("not-finite", name, text, int(bad.sum()))
             del usable[name]
     usable, rows = _good_rows(usable, rig, file, findings)
     t_s = usable["t_s"]
     step_s = np.diff(t_s)
     usual_s = float(np.median(step_s))
     _check_length(float(t_s[-1] - t_s[0]) + usual_s, usual_s, file)
-    gaps = np.flatnonzero(step_s > _GAP_STEPS * usual_s)
+    gaps, text = gaps_of(t_s)
     if len(gaps):
-        at = gaps[0]
-        text = f"{counted(len(gaps), 'gap')} in time, first at {t_s[at]:.6g} s: {step_s[at]:.3g} s without a sample"
         longest_s, share = float(step_s.max()), float(step_s[gaps].sum() / (t_s[-1] - t_s[0]))
         if longest_s > _LONGEST_GAP_S or share > _LARGEST_GAP_SHARE:
             line = (
-                f"{file}: t_s: {text}, the longest {longest_s:.3g} s, {percent(share)} of the run in all: must be "
+                f"{file}: t_s: {text}, {percent(share)} of the run in all: must be "
                 f"{_LONGEST_GAP_S:g} s and {100 * _LARGEST_GAP_SHARE:g} % at most; split the file there into several runs"
             )
             raise Fault("BAD_EVIDENCE", line)
@@ -107,30 +90,24 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
         values = usable[name]
         seen = look(values, dwells=name.endswith("_m"))
         wrong = _wrong_unit(name, values, rig) or _too_far(name, usable, rig, table)
-        if wrong and name in _COMMANDED:
+        if wrong and name in VIBRATION:
             raise Fault("BAD_EVIDENCE", f"{file}: {name}: {wrong}; set channels.{name}.scale")
         if wrong:
             note("units", name, f"{wrong}; not used; else set channels.{name}.unit or scale")
             del usable[name]
-        elif seen.constant and not name.startswith("vibration") and name not in BESIDE:
-            used = "" if name == "drive_position_m" else "; not used"
+        elif seen.constant and not name.startswith("vibration") and name not in FURTHER:
+            used = "; not used" if name in CHANNELS and name != "drive_position_m" else ""
             note("constant", name, f"is {seen.lowest:g} in every row{used}", seen.samples)
-            if name in _SENSORS:
+            if used:
                 del usable[name]
-        elif (seen.clipped_high or seen.clipped_low) and name in (*_SENSORS, "drive_position_m"):
+        elif (seen.clipped_high or seen.clipped_low) and name in CHANNELS:
             for times, limit in ((seen.clipped_high, seen.highest), (seen.clipped_low, seen.lowest)):
                 if times:
                     row = int(rows[np.flatnonzero(values == limit)[0]]) + 1
-                    note(
-                        "clipped",
-                        name,
-                        f"{counted(times, 'sample')} at {limit:g}, first row {row}; so are the model's",
-                        times,
-                    )
-            clipped[name] = (
-                seen.lowest if seen.clipped_low else -math.inf,
-                seen.highest if seen.clipped_high else math.inf,
-            )
+                    text = f"{counted(times, 'sample')} at {limit:g}, first row {row}; so are the model's"
+                    note("clipped", name, text, times)
+            lowest = seen.lowest if seen.clipped_low else -math.inf
+            clipped[name] = lowest, seen.highest if seen.clipped_high else math.inf
     _compare_velocity(usable, rig, table, note)
     _check_moves(usable, rig, table, note)
     if (
@@ -157,10 +134,8 @@ def _check_rate(step_s: float, rig: RigTable, file: str) -> None:
     longest_s, why = _SLOWEST_S, ""
     if rig.drive_stiffness_N_per_m is not None:
         slip_s = math.pi * math.sqrt(rig.mass_kg / rig.drive_stiffness_N_per_m)
-        longest_s, why = (
-            slip_s / _FEWEST_IN_A_SLIP,
-            f", a third of a slip, pi sqrt(mass / drive stiffness) = {slip_s:.3g} s",
-        )
+        longest_s = slip_s / _FEWEST_IN_A_SLIP
+        why = f", a third of a slip, pi sqrt(mass / drive stiffness) = {slip_s:.3g} s"
     if step_s > longest_s:
         line = (
             f"{file}: t_s: a sample every {step_s:g} s: must be {longest_s:.3g} s at most{why}; is the column in ms? Then set "
@@ -200,7 +175,7 @@ def _good_rows(
             text = f"{counted(len(bad), 'sample is', 'samples are')} no finite number, first row {bad[0] + 1}; not used"
             new_findings.append(Finding("not-finite", f"{file}: {name}", text, len(bad)))
             good[bad] = False
-        limit = _FORCE_FACTOR * rig.static_force_N if name == "drive_force_N" else _LARGEST.get(name, math.inf)
+        limit = _FORCE_FACTOR * rig.static_force_N if name == "drive_force_N" else STANDARD[name].largest
         wild = np.flatnonzero(np.isfinite(values) & (np.abs(values) > limit))
         # a larger share of wild samples means a wrong unit: `_wrong_unit` reports it
         if not name.endswith("position_m") and 0 < len(wild) <= _LARGEST_WILD_SHARE * rows:
@@ -224,11 +199,9 @@ def _good_rows(
     lost = rows - int(good.sum())
     if lost > _LARGEST_BAD_SHARE * rows or rows - lost < _FEWEST_ROWS:
         worst = max(new_findings, key=lambda finding: finding.times)
-        few = (
-            f"{_FEWEST_ROWS} rows must be left"
-            if rows - lost < _FEWEST_ROWS
-            else f"must be below {100 * _LARGEST_BAD_SHARE:g} %"
-        )
+        few = f"must be below {100 * _LARGEST_BAD_SHARE:g} %"
+        if rows - lost < _FEWEST_ROWS:
+            few = f"{_FEWEST_ROWS} rows must be left"
         remedy = "repair the file, or cut it where the trouble begins"
         if len(back) and worst.kind == "time" and (np.diff(t_s[np.isfinite(t_s)]) >= 0.0).all():
             remedy = (
@@ -252,7 +225,7 @@ def _wrong_unit(name: str, values: Floats, rig: RigTable) -> str:
         return ""
     if name.endswith("position_m"):
         size = float(np.ptp(values))
-    limit = _LARGEST.get(name, math.inf)
+    limit = STANDARD[name].largest
     if rig.radius_m is not None and name.endswith("position_m"):
         limit *= _MOST_TURNS
     if size > limit:

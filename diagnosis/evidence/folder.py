@@ -15,13 +15,14 @@ from bridge.files import check_file
 from bridge.log.finding import Finding
 from bridge.tables.readers import Table, read_table
 from bridge.units import counted
+from bridge.wire.channels import SENSOR_CHANNELS
 from diagnosis.evidence.assumed import WIDE
 from diagnosis.evidence.beside import with_beside
-from diagnosis.evidence.column_checks import Columns, checked
+from diagnosis.evidence.column_checks import checked
 from diagnosis.evidence.exciter_harmonics import DISTORTED, distortion
 from diagnosis.evidence.force_pickup import PICK_UP, pick_up
 from diagnosis.evidence.manifest import MANIFEST, Manifest, RigTable, RunTable, described
-from diagnosis.evidence.manifest_keys import STANDARD, ChannelMap
+from diagnosis.evidence.manifest_keys import STANDARD, VIBRATION, ChannelMap, Columns
 from diagnosis.evidence.mapped import has_time, mapped
 from diagnosis.evidence.rotary import as_sliding, run_as_sliding, told
 from diagnosis.evidence.run import Evidence, MeasuredRun
@@ -35,18 +36,6 @@ _NEVER_EXACT = ("coulomb_force_N", "static_force_N", "stribeck_velocity_mps", "d
 # Too small: unrelated columns are offered. Too large: misspellings stay unseen.
 _SIMILAR = 0.85
 SHAKE_RATE_HZ = 8000.0  # lowest sampling rate at which the rms within 1 ms is compared; slower has too few samples
-# consequence of a missing column, by kind of drive
-_COST_SPRING = {
-    "drive_force_N": "slips are seen in the acceleration only, and no force level or drive stiffness can be judged",
-    "mass_accel_mps2": "mass, normal-load fluctuation and the fast part of a slip are judged from the force alone",
-    "base_accel_mps2": "the amplitude that the piezo delivers, and a base that gives way, cannot be seen",
-    "mass_position_m": "position-dependent friction and frame compliance are judged from the drive position only",
-    "drive_position_m": "the drive counts as perfectly even: no speed ripple can be seen",
-}
-_COST_FORCE = {
-    "mass_accel_mps2": "the acceleration is taken from the position, twice differentiated",
-    "mass_position_m": "the motion is taken from the acceleration: effects of place and slow drift cannot be judged",
-}
 
 
 def load_evidence(folder: Path) -> Evidence:
@@ -178,12 +167,10 @@ def examine(columns: Columns, rig: RigTable, table: RunTable) -> tuple[MeasuredR
         raise refuse(f'has {has}: with drive = "force" must have mass_accel_mps2 or mass_position_m; map one')
     if rig.drive == "spring" and "drive_position_m" not in usable and table.drive_velocity_mps is None:
         raise refuse("drive_velocity_mps: missing in [[run]]; without the column drive_position_m it is needed")
-    wanted = _COST_SPRING if rig.drive == "spring" else _COST_FORCE
-    findings += [
-        Finding("missing", f"{table.name}: {name}", f"not there: {cost}")
-        for name, cost in wanted.items()
-        if name not in usable
-    ]
+    for name, channel in SENSOR_CHANNELS.items():
+        consequence = channel.without if rig.drive == "spring" else channel.without_force_drive
+        if consequence and name not in usable:
+            findings.append(Finding("missing", f"{table.name}: {name}", f"not there: {consequence}"))
     t_s = usable.pop("t_s")
     findings += [Finding(kind, f"{table.name}: {name}", text) for kind, name, text in _vibration(usable, t_s)]
     vibrates = pick_up(rig, t_s, usable)
@@ -199,29 +186,18 @@ def examine(columns: Columns, rig: RigTable, table: RunTable) -> tuple[MeasuredR
 
 def _vibration(columns: Columns, t_s: Floats) -> Iterator[tuple[str, str, str]]:
     """Kind, column and text of each finding about the commanded vibration."""
-    given = [name for name in ("vibration_frequency_Hz", "vibration_amplitude_m") if name in columns]
+    given = [name for name in VIBRATION if name in columns]
     if len(given) == 1:
-        yield (
-            "missing",
-            given[0],
-            "is given alone: frequency and amplitude are needed, the run counts as one without vibration",
-        )
+        text = "is given alone: frequency and amplitude are needed, the run counts as one without vibration"
+        yield "missing", given[0], text
     for name in given:
         if negative := int((columns[name] < 0.0).sum()):
-            yield (
-                "sign",
-                name,
-                f"{counted(negative, 'sample is', 'samples are')} negative: must be 0 where it is off, above it else; not used",
-            )
+            many = counted(negative, "sample is", "samples are")
+            yield "sign", name, f"{many} negative: must be 0 where it is off, above it else; not used"
     rate_Hz = (len(t_s) - 1) / float(t_s[-1] - t_s[0])
     if len(given) == 2 and columns["vibration_amplitude_m"].any() and rate_Hz < SHAKE_RATE_HZ:
-        for name in ("mass_accel_mps2", "base_accel_mps2"):
-            if name in columns:
-                yield (
-                    "rate",
-                    name,
-                    f"{rate_Hz:.4g} Hz, below {SHAKE_RATE_HZ:g} Hz: how strongly it vibrates is not compared",
-                )
+        text = f"{rate_Hz:.4g} Hz, below {SHAKE_RATE_HZ:g} Hz: how strongly it vibrates is not compared"
+        yield from (("rate", name, text) for name in ("mass_accel_mps2", "base_accel_mps2") if name in columns)
 
 
 def read_columns(path: Path, channels: dict[str, ChannelMap], rotary: bool = False) -> tuple[Columns, list[Finding]]:

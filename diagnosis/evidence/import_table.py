@@ -16,8 +16,10 @@ from bridge.faults import Fault
 from bridge.files import LOG, folder_beside, followed, refuse_to_replace, replacing
 from bridge.log.finding import Finding
 from bridge.log.runlog import RunLog
+from bridge.log.storage.verdict_file import remove_verdict
 from bridge.tables.export import CHANNELS
 from bridge.tables.kinds import Kind
+from bridge.tables.one_clock import gaps_of
 from bridge.tables.readers import Dialect, read_table
 from bridge.tables.table import Table
 from bridge.tables.unit_words import known_unit
@@ -28,15 +30,13 @@ from diagnosis.evidence.assumed import with_assumed
 from diagnosis.evidence.beside import with_beside
 from diagnosis.evidence.folder import examine
 from diagnosis.evidence.manifest import MANIFEST, DriveVelocity, RigTable, RunTable, read_manifest
-from diagnosis.evidence.manifest_keys import USUAL, ChannelMap, check_channel_names
+from diagnosis.evidence.manifest_keys import USUAL, ChannelMap, Columns, check_channel_names
 from diagnosis.evidence.manifest_text import manifest_text
 from diagnosis.evidence.mapped import mapped
 from diagnosis.evidence.unknown_mass import shown_mass_kg
 
-Columns = dict[str, Floats]
 _AGAINST = 0.3  # share of all work that the drive would get back; a loaded spring gives back some at the end
 _BLOCK_SAMPLES = 20
-_GAP_STEPS = 10.0  # usual steps, beyond which nothing is interpolated
 _IRREGULAR_SHARE = 0.01  # of a step, up to which time counts as even: rounding of a printed column of a DAQ
 
 
@@ -105,11 +105,6 @@ class Imported(NamedTuple):
     missing: list[str]  # standard columns that the source does not have
     findings: list[Finding]
 
-    def as_dict(self) -> dict[str, Any]:
-        """For `--json`."""
-        table = self._asdict() | {"findings": [finding.as_dict() for finding in self.findings]}
-        return table | {"out": str(self.out)}
-
 
 def import_file(path: Path, map_path: Path, out: Path) -> Imported:
     """Import one file; `out` is an evidence folder, to which a run is added, or a .mcap file.
@@ -120,7 +115,8 @@ def import_file(path: Path, map_path: Path, out: Path) -> Imported:
     wanted = validate(ImportMap, read_toml(map_path), map_path.name)
     table = read_table(path, wanted.source.dialect, wanted.source.format)
     try:
-        columns, findings = mapped(table, wanted.channels, wanted.source.sample_rate_Hz, _turns(wanted.rig))
+        rotary = wanted.rig["drive"] == "torsion" if "drive" in wanted.rig else None
+        columns, findings = mapped(table, wanted.channels, wanted.source.sample_rate_Hz, rotary)
         if out.suffix == ".mcap":
             _check_free(out)
             done = _to_log(path, columns, out)
@@ -155,18 +151,10 @@ def _pulls_back(columns: Columns) -> bool:
     return float(work_J.sum()) < -_AGAINST * float(np.abs(work_J).sum())
 
 
-def _turns(rig: dict[str, Any]) -> bool | None:
-    return rig["drive"] == "torsion" if "drive" in rig else None
-
-
 def _check_free(out: Path) -> None:
     """Raise Fault CONFIG when `out` exists: it may be the measured file itself."""
     if out.exists():
         raise Fault("CONFIG", f"{out}: is there already; nothing was written; choose another --out")
-
-
-def _missing(columns: Columns) -> list[str]:
-    return [name for name in USUAL if name not in columns]
 
 
 def _rig(given: dict[str, Any], map_name: str, mass_kg: float | None = None) -> tuple[RigTable, list[str]]:
@@ -211,15 +199,21 @@ def _to_folder(path: Path, columns: Columns, wanted: ImportMap, map_name: str, o
     created = not out.exists()
     out.mkdir(parents=True, exist_ok=True)
     try:
-        fields = [pa.field(name, pa.float64(), nullable=False, metadata={"unit": unit_of(name)}) for name in columns]
-        # the manifest takes its place last: it names the table
-        with replacing(out / MANIFEST) as manifest, replacing(out / run.file) as file:
-            manifest.write(manifest_text(rig, runs, assumed).encode("utf-8"))
-            pq.write_table(pa.table(list(columns.values()), schema=pa.schema(fields)), file, use_dictionary=False)
+        write_run(out, columns, rig, runs, assumed)
     finally:
         if created and not any(out.iterdir()):
             out.rmdir()
-    return Imported(out, run.file, len(columns["t_s"]), list(columns), _missing(columns), findings)
+    missing = [name for name in USUAL if name not in columns]
+    return Imported(out, run.file, len(columns["t_s"]), list(columns), missing, findings)
+
+
+def write_run(folder: Path, columns: Columns, rig: RigTable, runs: list[RunTable], assumed: list[str]) -> None:
+    """Write the data file of the last of `runs` and the manifest of all."""
+    fields = [pa.field(name, pa.float64(), nullable=False, metadata={"unit": unit_of(name)}) for name in columns]
+    # the manifest takes its place last: it names the table
+    with replacing(folder / MANIFEST) as manifest, replacing(folder / runs[-1].file) as file:
+        manifest.write(manifest_text(rig, runs, assumed).encode("utf-8"))
+        pq.write_table(pa.table(list(columns.values()), schema=pa.schema(fields)), file, use_dictionary=False)
 
 
 def _even_clock(t_s: Floats, file: str) -> tuple[Floats, float, npt.NDArray[np.bool_], list[Finding]]:
@@ -227,26 +221,20 @@ def _even_clock(t_s: Floats, file: str) -> tuple[Floats, float, npt.NDArray[np.b
 
     Over a gap nothing is interpolated: the log lacks these blocks, as it does where a recorder lost them.
     """
-    steps_s = np.diff(t_s)
-    gaps = np.flatnonzero(steps_s > _GAP_STEPS * float(np.median(steps_s)))
+    gaps, gap_text = gaps_of(t_s)
     where = f"{file}: t_s"
     if not len(gaps):
         step_s = float(t_s[-1] - t_s[0]) / (len(t_s) - 1)
         even_s = t_s[0] + np.arange(len(t_s)) * step_s
         uneven = float(np.abs(t_s - even_s).max()) / step_s
         text = f"is uneven by up to {uneven:.2g} steps: the channels were interpolated to an even {1.0 / step_s:g} Hz"
-        return (
-            even_s,
-            step_s,
-            np.zeros(len(t_s), np.bool_),
-            [Finding("time", where, text)] if uneven > _IRREGULAR_SHARE else [],
-        )
-    step_s = float(np.delete(steps_s, gaps).mean())
+        notes = [Finding("time", where, text)] if uneven > _IRREGULAR_SHARE else []
+        return even_s, step_s, np.zeros(len(t_s), np.bool_), notes
+    step_s = float(np.delete(np.diff(t_s), gaps).mean())
     even_s = t_s[0] + np.arange(int(float(t_s[-1] - t_s[0]) / step_s) + 1) * step_s
-    before = np.clip(np.searchsorted(t_s, even_s, side="right") - 1, 0, len(steps_s) - 1)
+    before = np.clip(np.searchsorted(t_s, even_s, side="right") - 1, 0, len(t_s) - 2)
     gone = np.isin(before, gaps) & (even_s > t_s[before] + 0.5 * step_s)
-    first = f"{counted(len(gaps), 'gap')} in time, first at {t_s[gaps[0]]:.6g} s, the longest {steps_s.max():.3g} s"
-    text = f"{first}: the log has no block there; the rest is on an even clock of {1.0 / step_s:g} Hz"
+    text = f"{gap_text}: the log has no block there; the rest is on an even clock of {1.0 / step_s:g} Hz"
     return even_s, step_s, gone, [Finding("time-gap", where, text, len(gaps))]
 
 
@@ -304,11 +292,6 @@ def _to_log(path: Path, columns: Columns, out: Path) -> Imported:
             log.write(SENSORS, message.tobytes())
         log.close()
         log.path.replace(followed(out))
-    return Imported(
-        out,
-        out.name,
-        int((~lacking).sum()) * _BLOCK_SAMPLES,
-        [name for name in CHANNELS if name in columns],
-        missing,
-        findings,
-    )
+    remove_verdict(out)
+    logged = [name for name in CHANNELS if name in columns]
+    return Imported(out, out.name, int((~lacking).sum()) * _BLOCK_SAMPLES, logged, missing, findings)

@@ -18,21 +18,8 @@ FORMAT = "evidence/1"
 MANIFEST = "manifest.toml"
 # of runs, in upper or lower case; the first bytes of a table give its format
 RUN_SUFFIXES = (
-    ".parquet",
-    ".csv",
-    ".txt",
-    ".dat",
-    ".lvm",
-    ".tsv",
-    ".asc",
-    ".mat",
-    ".tdms",
-    ".xlsx",
-    ".xls",
-    ".ods",
-    ".h5",
-    ".mcap",
-)
+    ".parquet", ".csv", ".txt", ".dat", ".lvm", ".tsv", ".asc", ".mat", ".tdms", ".xlsx", ".xls", ".ods", ".h5", ".mcap",
+)  # fmt: skip
 _SPRING_ONLY = ("drive_stiffness_N_per_m", "drive_damping_Ns_per_m")
 
 # Highest natural frequency of the mass on a stiffness. Larger: the plant's step becomes unstable in fits, which vary mass and

@@ -4,22 +4,26 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
+from bridge.arrays import Floats
 from bridge.config import Strict
 from bridge.tables.unit_words import known_unit
+from bridge.wire.channels import SENSOR_CHANNELS, Channel
 
-USUAL = (
-    "t_s",
-    "drive_force_N",
-    "mass_accel_mps2",
-    "base_accel_mps2",
-    "mass_position_m",
-    "drive_position_m",
-    "vibration_frequency_Hz",
-    "vibration_amplitude_m",
-)
-# further columns that some rigs measure
-BESIDE = ("mass_velocity_mps", "drive_velocity_mps", "normal_load_N", "other_force_N", "motor_current_A")
-STANDARD = (*USUAL, *BESIDE)
+Columns = dict[str, Floats]  # [samples] by standard name
+VIBRATION = {  # as commanded
+    "vibration_frequency_Hz": Channel("vibration_frequency_Hz", "frequency", "frequency", 0, 1e6, has_spikes=True),
+    # piezo stacks move by a tenth of a millimetre
+    "vibration_amplitude_m": Channel("vibration_amplitude_m", "length", "angle", 1, 1e-3, has_spikes=True),
+}
+USUAL = {"t_s": Channel("t_s", "time", "time", 0, has_spikes=True), **SENSOR_CHANNELS, **VIBRATION}
+FURTHER = {  # measured on some rigs
+    "mass_velocity_mps": Channel("mass_velocity_mps", "velocity", "angular velocity", 1, has_spikes=True),
+    "drive_velocity_mps": Channel("drive_velocity_mps", "velocity", "angular velocity", 1, has_spikes=True),
+    "normal_load_N": Channel("normal_load_N", "force", "force", 0),
+    "other_force_N": Channel("other_force_N", "force", "torque", -1),
+    "motor_current_A": Channel("motor_current_A", "current", "current", 0, has_spikes=True),
+}
+STANDARD = USUAL | FURTHER
 # The upper limit is far above any rig, and low enough that no product of such numbers overflows.
 Positive = Annotated[float, Field(gt=0, lt=1e12)]
 NotNegative = Annotated[float, Field(ge=0, lt=1e12)]

@@ -8,17 +8,7 @@ from diagnosis.evidence.manifest import FORMAT, RigTable, RunTable
 
 def manifest_text(rig: RigTable, runs: list[RunTable], assumed: list[str]) -> str:
     """Text of a `manifest.toml` with this rig and these runs; rig numbers in `assumed` get the remark that they are assumed."""
-    lines = [f"format = {_value(FORMAT)}", "", "[rig]", f"drive = {_value(rig.drive)}"]
-    if rig.radius_m is not None:
-        lines.append(f"radius_m = {_value(rig.radius_m)}")
-    for name, value in rig.values().items():
-        if value is not None:
-            lines.append(f"{name} = {_value(value)}" + ("  # assumed, not measured" if name in assumed else ""))
-    if rig.force_per_current_N_per_A is not None:
-        lines.append(f"force_per_current_N_per_A = {_value(rig.force_per_current_N_per_A)}")
-    if rig.tolerance:
-        lines += ["", "[rig.tolerance]"]
-        lines += [f"{name} = {_value(value)}" for name, value in rig.tolerance.items()]
+    lines = [f"format = {_value(FORMAT)}", "", *rig_lines(rig, assumed)]
     for run in runs:
         lines += ["", "[[run]]"]
         plain = run.model_dump(exclude={"channels"})
@@ -28,6 +18,18 @@ def manifest_text(rig: RigTable, runs: list[RunTable], assumed: list[str]) -> st
             keys = [f"{key} = {_value(value)}" for key, value in channel.model_dump(exclude_defaults=True).items()]
             lines.append(f"channels.{name} = {{ {', '.join(keys)} }}")
     return "\n".join(lines) + "\n"
+
+
+def rig_lines(rig: RigTable, assumed: list[str]) -> list[str]:
+    """The lines of [rig] and [rig.tolerance]."""
+    lines = ["[rig]", f"drive = {_value(rig.drive)}"]
+    numbers = {"radius_m": rig.radius_m, **rig.values(), "force_per_current_N_per_A": rig.force_per_current_N_per_A}
+    for name, value in numbers.items():
+        if value is not None:
+            lines.append(f"{name} = {_value(value)}" + ("  # assumed, not measured" if name in assumed else ""))
+    if rig.tolerance:
+        lines += ["", "[rig.tolerance]", *(f"{name} = {_value(value)}" for name, value in rig.tolerance.items())]
+    return lines
 
 
 def _value(value: Any) -> str:

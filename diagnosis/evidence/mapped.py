@@ -11,26 +11,9 @@ from bridge.tables.one_clock import Sampled, on_one_clock, own_rows, with_own_ro
 from bridge.tables.table import Table
 from bridge.tables.unit_words import in_brackets, known_unit, si_unit, weight_unit
 from bridge.units import counted
-from diagnosis.evidence.manifest_keys import STANDARD, ChannelMap
-from diagnosis.evidence.sentinels import SMOOTH, without_sentinels
+from diagnosis.evidence.manifest_keys import STANDARD, ChannelMap, Columns
+from diagnosis.evidence.sentinels import without_sentinels
 
-Columns = dict[str, Floats]
-# quantity of each standard column: on a sliding rig, and on a rig that turns
-_MEASURES = {
-    "t_s": ("time", "time"),
-    "drive_force_N": ("force", "torque"),
-    "mass_accel_mps2": ("acceleration", "angular acceleration"),
-    "base_accel_mps2": ("acceleration", "angular acceleration"),
-    "mass_position_m": ("length", "angle"),
-    "drive_position_m": ("length", "angle"),
-    "vibration_frequency_Hz": ("frequency", "frequency"),
-    "vibration_amplitude_m": ("length", "angle"),
-    "mass_velocity_mps": ("velocity", "angular velocity"),
-    "drive_velocity_mps": ("velocity", "angular velocity"),
-    "normal_load_N": ("force", "force"),
-    "other_force_N": ("force", "torque"),
-    "motor_current_A": ("current", "current"),
-}
 # Values from which a column of times without a unit counts calendar time, not time of the run, with its unit [s]
 _SINCE_1970 = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3), (1e8, 1.0))
 # Days from 2000 to 2100 as spreadsheets and MATLAB's datenum count them. As seconds they are known by their steps: shorter ones
@@ -115,7 +98,7 @@ def _same_length(table: Table, channels: dict[str, ChannelMap], values: Columns,
 def _in_si(table: Table, name: str, channel: ChannelMap, findings: list[Finding], rotary: bool | None) -> Floats:
     """A channel in its SI unit: by its scale, by the unit of the map, or by the unit of the file."""
     values, outliers = without_sentinels(
-        table.column(channel.column), f"{table.path.name}: column {channel.column}", name in SMOOTH
+        table.column(channel.column), f"{table.path.name}: column {channel.column}", not STANDARD[name].has_spikes
     )
     findings += outliers
     return values * _factor(table, name, channel, findings, rotary) + channel.offset
@@ -125,7 +108,7 @@ def _factor(table: Table, name: str, channel: ChannelMap, findings: list[Finding
     if channel.scale is not None:
         return channel.scale
     unit = channel.unit or table.unit(channel.column)
-    known = None if not unit else weight_unit(unit) if _MEASURES[name][0] == "force" else known_unit(unit)
+    known = None if not unit else weight_unit(unit) if STANDARD[name].quantity == "force" else known_unit(unit)
     if known is None:
         column = table.find(channel.column)
         stated = in_brackets(column)
@@ -134,11 +117,12 @@ def _factor(table: Table, name: str, channel: ChannelMap, findings: list[Finding
             findings.append(Finding("units", f"{table.path.name}: {name}", text))
         return 1.0
     what, factor = known
-    if rotary is False and what == _MEASURES[name][1] != _MEASURES[name][0]:
+    if rotary is False and what == STANDARD[name].turning != STANDARD[name].quantity:
         line = f"{table.path.name}: column {channel.column}: is in {unit}, a {what}, and the rig slides"
         raise Fault("BAD_TABLE", f'{line}; a rig that turns has drive = "torsion" under [rig]')
-    if what not in _MEASURES[name]:
-        line = f"{table.path.name}: column {channel.column}: is in {unit}, a {what}: must be a {_MEASURES[name][0]}, as {name}"
+    if what not in (STANDARD[name].quantity, STANDARD[name].turning):
+        line = f"{table.path.name}: column {channel.column}: is in {unit}, a {what}"
+        line += f": must be a {STANDARD[name].quantity}, as {name}"
         raise Fault("BAD_TABLE", f"{line}; name another column, or give channels.{name}.scale")
     if factor != 1.0 and not channel.unit:
         text = f"column {channel.column} is in {unit}: times {factor:g} to be in {si_unit(what)}"

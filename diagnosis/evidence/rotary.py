@@ -3,12 +3,11 @@
 At a radius of 1 m every number keeps its digits.
 """
 
-from bridge.arrays import Floats
 from bridge.log.finding import Finding
 from diagnosis.evidence.manifest import MANIFEST, RigTable, RunTable
+from diagnosis.evidence.manifest_keys import STANDARD, Columns
 
-Columns = dict[str, Floats]
-# power of the radius by which a number of a rig that turns is multiplied
+# power of the radius by which a number of [rig] is multiplied where the rig turns
 _POWERS = {
     "mass_kg": -2,
     "drive_stiffness_N_per_m": -2,
@@ -19,15 +18,6 @@ _POWERS = {
     "coulomb_force_N": -1,
     "static_force_N": -1,
     "stribeck_velocity_mps": 1,
-    "drive_force_N": -1,
-    "mass_accel_mps2": 1,
-    "base_accel_mps2": 1,
-    "mass_position_m": 1,
-    "drive_position_m": 1,
-    "vibration_amplitude_m": 1,
-    "mass_velocity_mps": 1,
-    "other_force_N": -1,
-    "drive_velocity_mps": 1,
     "force_per_current_N_per_A": -1,
 }
 
@@ -46,7 +36,7 @@ def run_as_sliding(rig: RigTable, columns: Columns, table: RunTable) -> tuple[Co
     if rig.drive != "torsion":
         return columns, table
     radius_m = rig.radius_m or 1.0
-    moved = {name: values * radius_m ** _POWERS.get(name, 0) for name, values in columns.items()}
+    moved = {name: values * radius_m ** STANDARD[name].radius_power for name, values in columns.items()}
     velocity = table.drive_velocity_mps
     return moved, table if velocity is None else table.model_copy(update={"drive_velocity_mps": velocity * radius_m})
 

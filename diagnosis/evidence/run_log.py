@@ -10,8 +10,7 @@ from bridge.log.damage import damage_findings
 from bridge.log.finding import Finding
 from bridge.log.logfile import RunData, block_period_ns, read_run, sample_times_s
 from bridge.tables.export import CHANNELS
-
-Columns = dict[str, Floats]
+from diagnosis.evidence.manifest_keys import Columns
 
 
 def columns_of_log(path: Path) -> tuple[Columns, list[Finding]]:

@@ -14,8 +14,6 @@ from bridge.units import counted
 _FAR, _FAR_ALIKE = 1000.0, 20.0
 _LARGEST = 1e20  # 1e30 and the largest float32 mean "no value"
 _NINES = re.compile(r"0*9{3,}0*")
-# columns without spikes. An acceleration has spikes, and at rest its spread is only noise
-SMOOTH = ("drive_force_N", "mass_position_m", "drive_position_m", "normal_load_N", "other_force_N")
 
 
 def without_sentinels(values: Floats, where: str, smooth: bool) -> tuple[Floats, list[Finding]]:

@@ -5,9 +5,9 @@ from scipy.signal import savgol_filter
 
 from bridge.arrays import Floats
 from diagnosis.evidence.manifest import RigTable, RunTable
+from diagnosis.evidence.manifest_keys import Columns
 from diagnosis.look.look import RecordFacts, look
 
-Columns = dict[str, Floats]
 _WINDOW_S = 0.03  # of the cubic that smooths a position before it is differentiated twice
 _SLOW = 0.1  # of the fastest speed: below it the friction turns, and no line explains the force
 

@@ -2,8 +2,7 @@
 
 grid                        a run on the 1 ms grid
 segments                    commands of a run, and the segments in which the commands are constant
-cycles, slips               slips, breakaways and re-sticks of a force record; the shape around a slip
-falls                       turning points of a record, compiled, and when a fall is half done
+slips                       the slips of a segment, with weights, and when a fall is half done
 feature                     definition of a feature
 spring_drive, force_drive   the features of a run with a spring drive, and with a force drive
 axis_motion                 the measured motion along which a force-driven model is led

@@ -16,7 +16,7 @@ HIGH: Band = (50.0, 500.0)
 # features that are mean squares: noise and roughness add to them
 POWERS = frozenset({"scatter", "ring", "ripple", "rest", "spring rest"})
 DRIVE_WAVES = 24  # waves of the drive position over a run; more waves show shorter ripples and cost time
-RESOLVED_M = 1e-9  # least noise of a drive position; a commanded one that was logged as measured has only rounding
+RESOLVED_M = 1e-9  # least noise of a drive position; a commanded position that was logged as measured has only rounding
 
 
 class Feature(NamedTuple):

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.arrays import Floats
-from bridge.wire.messages import CHANNELS
+from bridge.wire.channels import CHANNELS
 from diagnosis.evidence.folder import SHAKE_RATE_HZ, MeasuredRun
 
 BLOCK_S = 1e-3
@@ -33,18 +33,14 @@ def reduce_run(run: MeasuredRun) -> dict[str, Floats]:
     A block without a sample (in a gap, or between slow samples) is interpolated.
     """
     index = _index(run)
-    blocks = int(index[-1]) + 1
-    count = np.bincount(index, minlength=blocks)
-    empty = np.flatnonzero(count == 0)
-    filled = np.flatnonzero(count)
+    count = np.bincount(index)
     reduced = block_means(run, MEANS)
-    per_block = len(run.t_s) / max(len(filled), 1)
-    if per_block >= SHAKE_RATE_HZ * BLOCK_S:
+    if len(run.t_s) / np.count_nonzero(count) >= SHAKE_RATE_HZ * BLOCK_S:
         for name, source in SHAKEN.items():
             if source in reduced:
                 about = run.columns[source] - reduced[source][index]
-                power = np.bincount(index, about * about, blocks) / np.maximum(count, 1)
-                power[empty] = np.median(power)
+                power = np.bincount(index, about * about) / np.maximum(count, 1)
+                power[count == 0] = np.median(power)
                 reduced[name] = np.sqrt(power)
     return reduced
 
@@ -52,13 +48,12 @@ def reduce_run(run: MeasuredRun) -> dict[str, Floats]:
 def block_means(run: MeasuredRun, names: Sequence[str]) -> dict[str, Floats]:
     """Means of the columns `names` that the run has, [blocks] each; a block without a sample is interpolated."""
     index = _index(run)
-    blocks = int(index[-1]) + 1
-    count = np.bincount(index, minlength=blocks)
+    count = np.bincount(index)
     empty, filled = np.flatnonzero(count == 0), np.flatnonzero(count)
     reduced: dict[str, Floats] = {}
     for name in names:
         if name in run.columns:
-            mean = np.bincount(index, run.columns[name], blocks) / np.maximum(count, 1)
+            mean = np.bincount(index, run.columns[name]) / np.maximum(count, 1)
             if len(empty):
                 mean[empty] = np.interp(empty, filled, mean[filled])
             reduced[name] = mean
@@ -80,7 +75,7 @@ class Averaged(NamedTuple):
 
 
 def averaged(frequency_Hz: Floats) -> Averaged:
-    """The blocks to average under a vibration of `frequency_Hz` [blocks], 0 where there is none.
+    """The blocks to average under a vibration of `frequency_Hz` [blocks], 0 without a vibration.
 
     A block holds 4.5 periods of 4.5 kHz. Its mean keeps up to 7 % of the amplitude, with a sign that depends on the phase of the
     exciter, and no log holds this phase. So every block is averaged with one before and one after it. The distance is chosen so

@@ -24,12 +24,9 @@ _WINDOW = 100
 _SMALLEST_CHANGE = 0.35
 SHORTEST_S = 0.3  # of a segment; shorter stretches of constant command are not compared
 _SHORTEST_WINDOWS = 3  # of a piece of constant velocity; with fewer windows a ripple counts as a change
-_SLOWEST = (
-    0.01  # share of the run's fastest speed below which a drive counts as at rest: its slope is the sensor's noise
-)
-_STILL_M = (
-    1e-9  # travel of a whole run below which a drive counts as at rest (or its noise, if larger): less is rounding
-)
+# A drive counts as at rest below this share of the run's fastest speed, where its slope is the sensor's noise; and below this
+# travel in a whole run, which is rounding (or below its noise, if larger).
+_SLOWEST, _STILL_M = 0.01, 1e-9
 # Deviation of a window from the velocity of its piece, as a share of the change of speed, up to which the drive has arrived.
 # Too small: noise and ripple count as a drive under way. Too large: the end of a ramp counts as constant speed.
 _ON_THE_WAY = 0.1

@@ -4,14 +4,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.signal import lfilter
 
-from bridge.arrays import Floats
-from diagnosis.features.falls import half_fallen, turning_points
+from bridge.arrays import Floats, Indices
+from bridge.kernel import kernel
 from diagnosis.features.feature import Scales, Signals
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.features.segments import Segment
+from diagnosis.slips import turns
 
 # instants at which the shape of a slip is read, in slip durations (half periods of the mass on its spring) after mid-fall
 SHAPE_AT = np.array([-1.5, -1.0, -0.75, -0.5, -0.35, -0.2, 0.0, 0.2, 0.35, 0.5, 0.75, 1.0, 1.5, 2.0])
@@ -24,6 +24,7 @@ _LEVEL = 0.15
 # Share of a segment, from either end, over which the weight of a slip grows from 0 to 1.
 # Too small: features jump when a slip enters the segment. Too large: slips are wasted.
 _TAPER = 0.12
+_turns = kernel(turns)  # thousands of records are searched
 
 
 class SegmentSlips(NamedTuple):
@@ -33,8 +34,8 @@ class SegmentSlips(NamedTuple):
     changes then does not make the features jump, and a fit can follow their slope.
     """
 
-    tops: npt.NDArray[np.int64]  # breakaways
-    bottoms: npt.NDArray[np.int64]  # re-sticks
+    tops: Indices  # breakaways
+    bottoms: Indices  # re-sticks
     middles: Floats  # instants at which half of the fall is done
     weights: Floats  # 0 to 1
 
@@ -90,20 +91,35 @@ def find_slips(cut: Signals, scales: Scales) -> SegmentSlips:
 
     """
     if "drive_force_N" in cut:
-        falling = cut["drive_force_N"]
-        tops, bottoms = turning_points(falling, scales.drop_N)
+        falling, drop = cut["drive_force_N"], scales.drop_N
     else:
         # Without a force: the velocity of the slide (the acceleration integrated with a leak over two slip durations) rises
         # and falls once a slip.
         keep = math.exp(-BLOCK_S / (2.0 * scales.slip_s))
         falling = -np.asarray(lfilter([BLOCK_S], [1.0, -keep], cut["mass_accel_mps2"]))
         swing_mps = scales.drop_N * math.pi / (scales.stiffness_N_per_m * scales.slip_s)  # over sqrt(stiffness x mass)
-        tops, bottoms = turning_points(falling, max(0.3 * float(np.ptp(falling)), swing_mps))
-    tops = tops[: len(bottoms)]
+        drop = max(0.3 * float(np.ptp(falling)), swing_mps)
+    at = np.empty(len(falling), np.int64)
+    count = _turns(falling, drop, at) // 2 * 2  # without a fall that does not end
+    tops, bottoms = at[:count:2], at[1:count:2]
     # a fall that takes ten times as long as a slip is a change of level
     quick = (bottoms - tops) * BLOCK_S < 10.0 * scales.slip_s
     tops, bottoms = tops[quick], bottoms[quick]
-    middles = half_fallen(falling, tops, bottoms)
+    middles = _half_fallen(falling, tops, bottoms)
     width = scales.slip_s / BLOCK_S
     margin = np.minimum(middles + SHAPE_AT[0] * width, len(falling) - 1 - middles - SHAPE_AT[-1] * width)
     return SegmentSlips(tops, bottoms, middles, np.clip(margin / (_TAPER * len(falling)), 0.0, 1.0))
+
+
+@kernel
+def _half_fallen(falling: Floats, tops: Indices, bottoms: Indices) -> Floats:
+    """Instant, in samples, at which half of each fall is done, [falls]; interpolated between two samples."""
+    middles = np.empty(len(tops))
+    for fall in range(len(tops)):
+        half = 0.5 * (falling[tops[fall]] + falling[bottoms[fall]])
+        under = tops[fall]
+        while falling[under] > half:
+            under += 1
+        step = falling[under - 1] - falling[under]
+        middles[fall] = under - (half - falling[under]) / step if step > 0.0 else under
+    return middles

@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from bridge.arrays import Floats
-from diagnosis.features.falls import turning_points
 from diagnosis.features.feature import Scales
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.gap.prepare import Prepared
 from diagnosis.model.per_run import phase_of
+from diagnosis.slips import turning_points
 
 _GRID = 1500  # periods that are tried for a wave
 _LOBES = 2  # peaks in every range: pieces of track apart from each other leave the period ambiguous
@@ -108,13 +108,13 @@ def friction_series(runs: list[Prepared], scales: Scales, over: str) -> list[Wav
         for segment in run.commands.segments:
             inside = slice(segment.first, segment.last)
             cut = segment.sign * force[inside]
-            tops, bottoms = turning_points(cut, scales.drop_N)
-            if len(bottoms) >= 2:
-                at = tops[: len(bottoms)]
+            turned = turning_points(cut, scales.drop_N)
+            at = turned[: len(turned) // 2 * 2 : 2]  # breakaways
+            if len(at) >= 2:
                 series.append(
                     WaveSeries(coordinate[inside][at], cut[at] / cut[at].mean() - 1.0, run=run.file, of_slips=True)
                 )
-            elif len(tops) == 0 and len(cut) > 500:
+            elif len(turned) == 0 and len(cut) > 500:
                 # where nothing slips the slide moves evenly, once the climb to that level is over
                 even = cut[len(cut) // 3 :]
                 level = even[: len(even) // 20 * 20].reshape(-1, 20).mean(axis=1)

@@ -1,8 +1,8 @@
-"""Latent friction: what the level of the friction goes with, as shares of its variance, without a formula and a simulation.
+"""Latent friction: shares of place, direction, time, speed and load in the friction, without a formula and a simulation.
 
-Rows are breakaways and sliding friction (`rows`). One mixed model splits them into processes over speed, place, time, direction,
-load and run, with variances and lengths by REML (`components`, `reml`); `shares` says what each explains on the held-out runs.
 answer           the latent friction of an evidence
-axis_rows        friction of a force-driven axis
-spring_rows      friction of a slide on a spring
+rows             breakaway levels and sliding friction as rows; spring_rows: of a slide on a spring, axis_rows: of an axis
+components       the processes of the mixed model, each with a covariance: a new share is a process here
+reml             variances and lengths of the processes
+shares           the part of each process in the held-out runs
 """

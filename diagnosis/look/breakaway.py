@@ -12,7 +12,6 @@ import numpy as np
 from bridge.arrays import Floats
 from diagnosis.look.numbers import Number, mean_of
 from diagnosis.look.record import smoothed
-from diagnosis.look.slip_shape import half_done
 from diagnosis.look.slips import RecordSlips
 
 _FEWEST = 4  # tops: two for each half
@@ -52,11 +51,10 @@ def breakaway_of(slips_of_parts: list[RecordSlips], each: Number) -> Number:
 def _tops_of(slips: RecordSlips) -> _Tops | None:
     """The tops of a part; None for too few."""
     force_N, width = slips.part.force_N, slips.width | 1
-    whole = min(len(slips.tops), len(slips.bottoms))
-    tops, bottoms = slips.tops[1:whole], slips.bottoms[1:whole]
+    tops, bottoms = (ends[1:] for ends in slips.falls)
     if len(tops) < _FEWEST or width < _SMOOTHED:
         return None
-    middles = np.array([half_done(force_N, int(a), int(b), slips.width) for a, b in zip(tops, bottoms, strict=True)])
+    middles = slips.middles(tops, bottoms)
     usual = float(np.median(bottoms - tops))
     before = int(max(0.5 * usual, _BEYOND * width)) + _BEYOND * width
     around = np.arange(-before, before - int(0.25 * usual) + 1)

@@ -70,24 +70,20 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
         chosen["force"] = chosen.pop("load")  # testing machines call their measured force the load
         reasons = [reason for reason in reasons if not reason.startswith("load = ")]
         reasons.append(f"force = {chosen['force']!r}, as no other column is one")
+    left = [name for name in numeric if name not in chosen.values()]
     if "time" not in chosen and not table.clocks:
-        dated = next((name for name in table.columns if name not in numeric and _has_dates(table, name)), "")
-        if dated:
-            chosen["time"] = dated
-            reasons.append(f"time = {dated!r}, which holds times")
-    if "time" not in chosen and not table.clocks:
-        left = [name for name in numeric if name not in chosen.values()]
-        by_unit = next((name for name in left if _in(table, name, "time") and _rises(table, name)), "")
-        if by_unit:
-            chosen["time"] = by_unit
-            reasons.append(f"time = {by_unit!r}, which rises in even steps of a unit of time")
-    if "time" not in chosen and not table.clocks:
-        left = [name for name in numeric if name not in chosen.values()]
-        rising = next((name for name in left if _is_clock(table, name)), "")
         # with a column that numbers the rows, an evenly rising one may be the position of an even drive
-        if rising and not any(_numbers_rows(table, name) for name in left):
-            chosen["time"] = rising
-            reasons.append(f"time = {rising!r}, which rises in even steps")
+        clocks = [] if any(_numbers_rows(table, name) for name in left) else left
+        clues = (
+            ([name for name in table.columns if name not in numeric], _has_dates, "holds times"),
+            (left, _rises_in_time, "rises in even steps of a unit of time"),
+            (clocks, _rises, "rises in even steps"),
+        )
+        for names, shows_time, why in clues:
+            if name := next((name for name in names if shows_time(table, name)), ""):
+                chosen["time"] = name
+                reasons.append(f"time = {name!r}, which {why}")
+                break
     left = [name for name in numeric if name not in chosen.values()]
     if "force" not in chosen and "coefficient" not in chosen:
         by_unit = [name for name in left if _in(table, name, "force")]
@@ -222,9 +218,8 @@ def _has_dates(table: Table, name: str) -> bool:
         return False
 
 
-def _is_clock(table: Table, name: str) -> bool:
-    """Whether a column rises from row to row in even steps, and is not the number of the row."""
-    return _rises(table, name) and not _numbers_rows(table, name)
+def _rises_in_time(table: Table, name: str) -> bool:
+    return _in(table, name, "time") and _rises(table, name)
 
 
 def _rises(table: Table, name: str) -> bool:

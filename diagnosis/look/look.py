@@ -2,29 +2,21 @@
 
 import math
 import re
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from bridge.arrays import Floats
+from bridge.results import in_json
 from diagnosis.look.breakaway import breakaway_of
-from diagnosis.look.numbers import Number, groups_of, jackknifed, mean_of
+from diagnosis.look.numbers import Number, jackknifed, mean_of
 from diagnosis.look.record import OneWayPart, parts_of
-from diagnosis.look.slip_shape import LESS, Shape, StackedFalls, falls_of, fit_from_rest, fit_shape
+from diagnosis.look.slip_shape import Shape, falls_of, shape_of
 from diagnosis.look.slip_times import with_slip_times
 from diagnosis.look.slips import RecordSlips, find_slips
 from diagnosis.look.speeds import AtSpeed, over_dwell, over_speed
 from diagnosis.look.sticks import Cycle, cycles_of
 
-_FEWEST_FOR_SCATTER = 3
-_SURE = 1.2  # half intervals of 90 % from which a decay counts
-_ALIKE = (
-    0.1  # largest difference, as a share, between the shifts that a decay causes in the level and in the ends of a fall
-)
-# A swing from rest: half intervals from which its decay counts; least decay over frequency, as creep and slowly falling friction
-# look like a decay of up to 0.041 on 127 rigs; and the share of it by which the middle of the fall is lifted: 0.16 in theory.
-_SURER, _LEAST_DECAY, _LIFT = 1.6, 0.05, (0.1, 0.25)
-_LARGEST_DECAY = 2.5  # over a fall: a decay near the bound of the fit does not count
 # names of numbers of a force, where a coefficient is looked at
 _MU = {
     "static_force_N": "mu_s",
@@ -72,32 +64,17 @@ class LookResult(NamedTuple):
     parts: list[OneWayPart]
     known: RecordFacts
     mean_force_N: float
+    JSON_HIDDEN = "cycles", "sticks", "parts", "known"
 
-    @property
+    @in_json
+    def swings_without_stick(self) -> int:
+        """Number of swings of the force in a record without sticks."""
+        return 0 if self.sticks else len(self.cycles)
+
+    @in_json
     def slips(self) -> int:
         """How many slips began."""
         return len(self.cycles) if self.sticks else 0
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON, without the samples."""
-        return {
-            "seconds": self.seconds,
-            "rate_Hz": self.rate_Hz,
-            "noise_N": self.noise_N,
-            "slips": self.slips,
-            "swings_without_stick": len(self.cycles) if not self.sticks else 0,
-            "mean_force_N": self.mean_force_N,
-            "numbers": {name: number.as_dict() for name, number in self.numbers.items()},
-            "at_speeds": [
-                {
-                    "speed_mps": at_speed.speed_mps,
-                    "times": at_speed.times,
-                    "mean_N": at_speed.mean_N.as_dict(),
-                    "breakaway_N": None if at_speed.breakaway_N is None else at_speed.breakaway_N.as_dict(),
-                }
-                for at_speed in self.at_speeds
-            ],
-        }
 
 
 def look(
@@ -220,7 +197,7 @@ def _of_falls(slips_of_parts: list[RecordSlips], numbers: dict[str, Number]) -> 
     if not stacks:
         return {"kinetic_force_N": guess}
     falls = max(stacks, key=lambda stack: stack.slips)
-    shape, others, more = _shape(falls)
+    shape, others, more = shape_of(falls)
     if shape is None:
         return {"kinetic_force_N": guess}
     kinetic = jackknifed(shape.force_N, [other.force_N for other in others], "N")
@@ -261,42 +238,3 @@ def _between_samples(numbers: dict[str, Number], step_s: float) -> dict[str, Num
     return {
         name: numbers[name]._replace(low=numbers[name].low - more, high=numbers[name].high + more) for name in wanted
     }
-
-
-def _shape(falls: StackedFalls) -> tuple[Shape | None, list[Shape], Shape | None]:
-    """The swing, the swings without one group of falls each, and the swing of a longer part of the falls; damped where sure.
-
-    A fall hardly separates level and decay, so a false decay spoils the level: friction that falls slowly and a contact that
-    creeps bend a fall much as a decay does. But a true decay also shifts the level from the middle of the ends, by as much.
-    """
-    groups = groups_of(falls.slips) if falls.slips >= _FEWEST_FOR_SCATTER else []
-    fitted: dict[bool, tuple[Shape | None, list[Shape]]] = {}
-    for damped in (True, False):
-        whole = fit_shape(falls, damped)
-        without = [fit_shape(falls.without(group), damped, whole) for group in groups] if whole is not None else []
-        fitted[damped] = whole, [other for other in without if other is not None]
-    shape, others = fitted[True]
-    damped = False
-    if shape is not None and len(others) == len(groups) >= _FEWEST_FOR_SCATTER:
-        decay = jackknifed(shape.decay_per_s, [other.decay_per_s for other in others], "1/s")
-        decays = decay.value > _SURE * (decay.high - decay.value) and decay.value * falls.length_s < _LARGEST_DECAY
-        level = (shape.force_N - falls.bottom_N) / (falls.top_N - falls.bottom_N)
-        damped = decays and abs((0.5 - level) / (0.5 - shape.level_of_ends()) - 1.0) < _ALIKE
-    shape, others = fitted[damped]
-    if shape is not None and not damped and (rest := fit_from_rest(falls)) is not None:
-        again = [fit_from_rest(falls.without(group), rest) for group in groups]
-        without = [other for other in again if other is not None]
-        if _swings_from_rest(falls, shape, rest, without):
-            return rest, without, fit_from_rest(falls, rest, LESS)
-    return shape, others, fit_shape(falls, damped, shape, LESS) if shape is not None else None
-
-
-def _swings_from_rest(falls: StackedFalls, undamped: Shape, rest: Shape, without: list[Shape]) -> bool:
-    """Whether a swing from rest to rest decays beyond its interval, and the middle of the undamped fit is lifted accordingly."""
-    if len(without) < _FEWEST_FOR_SCATTER:
-        return False
-    ratio = rest.decay_per_s / rest.omega_rad_per_s
-    half = jackknifed(ratio, [other.decay_per_s / other.omega_rad_per_s for other in without], "1")
-    lift = (undamped.force_N - falls.bottom_N) / (falls.top_N - falls.bottom_N) - 0.5
-    sure = ratio > _LEAST_DECAY and ratio > _SURER * (half.high - half.value)
-    return sure and _LIFT[0] * ratio < lift < _LIFT[1] * ratio

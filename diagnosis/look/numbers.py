@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from bridge.arrays import Floats
+from bridge.results import in_json
 
 _GROUPS = 10  # of slips, of which one after the other is left out
 # Student's t for 90 %, two sides, by degrees of freedom; 1.645 beyond the table
@@ -21,6 +22,12 @@ class Number(NamedTuple):
     low: float
     high: float
     unit: str
+    JSON_HIDDEN = "low", "high"
+
+    @in_json
+    def interval_90(self) -> tuple[float, float]:
+        """Both ends of the interval."""
+        return self.low, self.high
 
     def times(self, factor: float, unit: str) -> "Number":
         """The number in another unit, or per something that is known exactly."""
@@ -31,10 +38,6 @@ class Number(NamedTuple):
         """The number with an independent error of `more` added to its interval, both ways."""
         low, high = (math.hypot(end - self.value, more) for end in (self.low, self.high))
         return self._replace(low=self.value - low, high=self.value + high)
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return {"value": self.value, "interval_90": [self.low, self.high], "unit": self.unit}
 
 
 def quantile_t(free: int) -> float:

@@ -1,25 +1,33 @@
 """Sliding friction and frequency of the swing, from all falls of a record laid over each other.
 
 While the slide slips, m x'' = F - F_k and F = k (s - x), so F = F_k + A cos(w t + phase): the middle of the fall lies at F_k, for
-any start and end of the slip. A decay represents damping.
+any start and end of the slip. Damping lets it decay.
 """
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
 
 from bridge.arrays import Floats
+from diagnosis.look.numbers import groups_of, jackknifed
 from diagnosis.look.slips import RecordSlips
 
-# Share of the fall at either end that is not fitted: it belongs to breakaway and re-stick. No other share was counted.
-FIRST, LESS = 0.12, 0.06
+# Share of the fall at either end that is not fitted: it belongs to breakaway and re-stick. The smaller shows its influence.
+_FIRST, _LESS = 0.12, 0.06
 _MOST_SAMPLES = 4000  # that are fitted
 _FEWEST = 5  # samples of a fall
-# of level and size over the fall, and of frequency, instant and decay over its length
-_LOWEST, _HIGHEST = [0.0, 0.2, 1.0, -0.5, -3.0], [1.0, 2.0, 6.0, 0.5, 3.0]
+# Bounds and scales of the fits: level and size over the fall, frequency and instant over its length; decay over frequency,
+# frequency and instant.
+_EVEN = [0.0, 0.2, 1.0, -0.5], [1.0, 2.0, 6.0, 0.5], [0.1, 0.1, 1.0, 0.1]
+_DECAYING = [-0.5, 1.0, -0.5], [1.5, 6.0, 0.5], [0.1, 1.0, 0.1]
+# A decay counts from this share of the frequency, as creep and slowly falling friction look like a decay of up to 0.041 on 127
+# rigs, and from so many half intervals of 90 %.
+_LEAST_DECAY, _SURE = 0.05, 1.6
+_FEWEST_FOR_SCATTER = 3
 
 
 class Shape(NamedTuple):
@@ -27,12 +35,8 @@ class Shape(NamedTuple):
 
     force_N: float  # of sliding
     omega_rad_per_s: float  # of the slide on the drive's spring
-    decay_per_s: float
-    found: tuple[float, ...]  # from which another fit begins
-
-    def level_of_ends(self) -> float:
-        """Where the level lies between the lower and the upper end of a swing with this decay, at rest at both; 0.5 without."""
-        return 1.0 / (1.0 + math.exp(math.pi * self.decay_per_s / self.omega_rad_per_s))
+    ratio: float  # of decay and frequency
+    parameters: tuple[float, ...]  # from which another fit begins
 
 
 class StackedFalls(NamedTuple):
@@ -45,7 +49,6 @@ class StackedFalls(NamedTuple):
     length_s: float  # of the usual fall, from breakaway to re-stick
     top_N: float  # mean
     bottom_N: float
-    step_s: float
 
     def without(self, group: npt.NDArray[np.int64]) -> "StackedFalls":
         """Those that do not belong to some slips."""
@@ -55,102 +58,108 @@ class StackedFalls(NamedTuple):
 
 def falls_of(slips: RecordSlips, top_N: float, bottom_N: float) -> StackedFalls | None:
     """The falls of a part, whose mean forces at breakaway and re-stick are known; None where they are too quick to be seen."""
-    part, tops, bottoms = slips.part, slips.tops, slips.bottoms
-    whole = min(len(tops), len(bottoms))
-    lengths = bottoms[:whole] - tops[:whole]
-    if not whole or float(np.median(lengths)) < _FEWEST:
+    part, (tops, bottoms) = slips.part, slips.falls
+    lengths = bottoms - tops
+    if not len(lengths) or float(np.median(lengths)) < _FEWEST:
         return None
     usual = float(np.median(lengths))
-    good = np.flatnonzero((lengths > 0.5 * usual) & (lengths < 2.0 * usual))
-    every = max(1, int(usual * len(good) / _MOST_SAMPLES))
-    since: list[Floats] = []
-    force: list[Floats] = []
-    number: list[npt.NDArray[np.int64]] = []
-    for count, i in enumerate(good.tolist()):
-        top, bottom = int(tops[i]), int(bottoms[i])
-        middle = half_done(part.force_N, top, bottom, slips.width)
-        first, last = max(int(middle - 0.5 * usual), 0), min(int(middle + 0.5 * usual) + 1, len(part.force_N))
-        at = np.arange(first + count % every, last, every)
-        since.append(((at - middle) * part.step_s).astype(np.float64))
-        force.append(part.force_N[at])
-        number.append(np.full(len(at), count, np.int64))
+    good = (lengths > 0.5 * usual) & (lengths < 2.0 * usual)
+    middles = slips.middles(tops[good], bottoms[good])
+    reach = math.ceil(0.5 * usual)
+    at = middles.astype(np.int64)[:, None] + np.arange(-reach, reach + 1)
+    every = max(1, int(usual * len(middles) / _MOST_SAMPLES))
+    kept = (
+        (at >= 0) & (at < len(part.force_N)) & ((np.arange(2 * reach + 1) - np.arange(len(at))[:, None]) % every == 0)
+    )
+    since_s, number = (at - middles[:, None]) * part.step_s, np.nonzero(kept)[0]
     return StackedFalls(
-        np.concatenate(since), np.concatenate(force), np.concatenate(number), len(good), usual * part.step_s, top_N, bottom_N,
-        part.step_s,
-    )  # fmt: skip
+        since_s[kept], part.force_N[at[kept]], number, len(middles), usual * part.step_s, top_N, bottom_N
+    )
 
 
-def half_done(force_N: Floats, top: int, bottom: int, width: int) -> float:
-    """The instant, in samples, at which half of a fall is done, from a line through the samples around it."""
-    around = slice(max(top - width, 0), top + width + 1), slice(max(bottom - width, 0), bottom + width + 1)
-    half = 0.5 * (float(force_N[around[0]].mean()) + float(force_N[around[1]].mean()))
-    inside = np.arange(top, bottom + 1)
-    near = inside[np.abs(force_N[inside] - half) < 0.25 * abs(force_N[top] - force_N[bottom])]
-    if len(near) < 2:
-        near = inside
-    x = near - near.mean()
-    y = force_N[near]
-    slope = float(x @ (y - y.mean())) / max(float(x @ x), 1e-300)
-    return float(near.mean()) + (half - float(y.mean())) / slope if slope < 0.0 else float(near.mean())
+def shape_of(falls: StackedFalls) -> tuple[Shape | None, list[Shape], Shape | None]:
+    """The swing, the swings without one group of falls each, and another swing that may be as good; None: no fit.
+
+    The swing decays where the falls show a decay beyond its interval. Then the other one is the swing without a decay, as
+    friction that falls slowly and a contact that creeps bend a fall alike; else it is the swing of a longer part of the falls.
+    """
+    groups = groups_of(falls.slips) if falls.slips >= _FEWEST_FOR_SCATTER else []
+
+    def fitted(fit: Callable[[StackedFalls, Shape | None], Shape | None]) -> tuple[Shape | None, list[Shape]]:
+        whole = fit(falls, None)
+        without = [fit(falls.without(group), whole) for group in groups] if whole is not None else []
+        return whole, [other for other in without if other is not None]
+
+    (even, others), (decaying, without) = fitted(_even), fitted(_decaying)
+    if even is None:
+        return None, [], None
+    if decaying is not None and len(without) >= _FEWEST_FOR_SCATTER and decaying.ratio > _LEAST_DECAY:
+        ratio = jackknifed(decaying.ratio, [other.ratio for other in without], "1")
+        if ratio.value > _SURE * (ratio.high - ratio.value):
+            return decaying, without, even
+    return even, others, _even(falls, even, _LESS)
 
 
-def fit_from_rest(falls: StackedFalls, near: Shape | None = None, first: float = FIRST) -> Shape | None:
+def _decaying(falls: StackedFalls, near: Shape | None) -> Shape | None:
     """The swing with a decay that begins at rest at the mean breakaway and ends at rest at the mean re-stick; None: no fit.
 
-    These ends tie the level and the size to the decay, which is seen through more noise then. Friction that falls slowly after
-    the breakaway does not swing from rest, and gives no decay here or one below 0.
+    These ends tie the level and the size to the decay, which is seen through more noise then.
     """
-    t, y = _inside(falls, first)
 
-    def rest(p: Floats) -> Floats:
-        ratio, w, middle = p
-        level = 1.0 / (1.0 + math.exp(math.pi * ratio))
+    def swing(t: Floats, ratio: float, w: float, middle: float) -> Floats:
+        level = _level(ratio)
         phase = w * (t - middle) + 0.5 * math.pi
-        return level + (1.0 - level) * np.exp(-ratio * phase) * (np.cos(phase) + ratio * np.sin(phase)) - y
+        return level + (1.0 - level) * np.exp(-ratio * phase) * (np.cos(phase) + ratio * np.sin(phase))
 
-    if len(t) < 6:
+    fitted = _fitted(falls, swing, [0.05, math.pi, 0.0], _DECAYING, near, _FIRST)
+    if fitted is None or fitted.active_mask.any():  # at a bound the falls do not determine it
         return None
-    start = list(near.found) if near is not None else [0.05, math.pi, 0.0]
-    ends = [-0.5, 1.0, -0.5], [1.5, 6.0, 0.5]
-    fitted = least_squares(rest, start, bounds=ends, x_scale=[0.1, 1.0, 0.1], xtol=1e-6, ftol=1e-8)
-    ratio, w, _ = (float(parameter) for parameter in fitted.x)
-    level = 1.0 / (1.0 + math.exp(math.pi * ratio))
-    force_N = falls.bottom_N + (falls.top_N - falls.bottom_N) * level
-    return Shape(force_N, w / falls.length_s, ratio * w / falls.length_s, tuple(fitted.x)) if fitted.success else None
+    ratio, w, _ = fitted.x.tolist()
+    return _shape(falls, _level(ratio), w, ratio, fitted)
 
 
-def _inside(falls: StackedFalls, first: float) -> tuple[Floats, Floats]:
-    """Times over the length of a fall and forces over its height, without a share `first` of the height at either end."""
-    reach_s = math.acos(1.0 - 2.0 * first) / math.pi  # of the fall before its ends
-    inside = np.abs(falls.since_s) < (0.5 - reach_s) * falls.length_s
+def _level(ratio: float) -> float:
+    """Where the level lies between the lower and the upper end of a swing with a decay, at rest at both; 0.5 without."""
+    return 1.0 / (1.0 + math.exp(math.pi * ratio))
+
+
+def _even(falls: StackedFalls, near: Shape | None, first: float = _FIRST) -> Shape | None:
+    """The swing without a decay; None where it does not fit. `first`: share of the fall at either end that is not fitted."""
+
+    def swing(t: Floats, level: float, size: float, w: float, middle: float) -> Floats:
+        return level - size * np.sin(w * (t - middle))
+
+    fitted = _fitted(falls, swing, [0.5, 0.5, math.pi, 0.0], _EVEN, near, first)
+    if fitted is None or not 0.05 < fitted.x[0] < 0.95:
+        return None
+    return _shape(falls, float(fitted.x[0]), float(fitted.x[2]), 0.0, fitted)
+
+
+def _fitted(
+    falls: StackedFalls,
+    swing: Callable[..., Floats],
+    start: Sequence[float],
+    bounds: Any,
+    near: Shape | None,
+    first: float,
+) -> Any:
+    """SciPy's fit of a swing to the falls; None without a fit."""
     drop_N = falls.top_N - falls.bottom_N
-    return falls.since_s[inside] / falls.length_s, (falls.force_N[inside] - falls.bottom_N) / drop_N
-
-
-def fit_shape(falls: StackedFalls, damped: bool, near: Shape | None = None, first: float = FIRST) -> Shape | None:
-    """The swing in all falls, with a decay or without, fitted from the shape `near`; None where it does not fit.
-
-    `first`: share of the fall at either end that is not fitted.
-    """
-    drop_N, length_s = falls.top_N - falls.bottom_N, falls.length_s
     if drop_N <= 0.0:
         return None
-    t, y = _inside(falls, first)
-    count = 5 if damped else 4
-    if len(t) < 2 * count:
+    reach_s = math.acos(1.0 - 2.0 * first) / math.pi  # of the fall before its ends
+    inside = np.abs(falls.since_s) < (0.5 - reach_s) * falls.length_s
+    t, y = falls.since_s[inside] / falls.length_s, (falls.force_N[inside] - falls.bottom_N) / drop_N
+    if len(t) < 2 * len(start):
         return None
+    lowest, highest, scale = bounds
+    begin = start if near is None else near.parameters
+    fitted = least_squares(
+        lambda p: swing(t, *p) - y, begin, bounds=(lowest, highest), x_scale=scale, xtol=1e-6, ftol=1e-8
+    )
+    return fitted if fitted.success else None
 
-    def rest(p: Floats) -> Floats:
-        level, size, w, middle = p[:4]
-        decay = p[4] if damped else 0.0
-        u = t - middle
-        return level - size * np.exp(-decay * u) * np.sin(w * u) - y
 
-    start = list(near.found) if near is not None else [0.5, 0.5, math.pi, 0.0, 0.0][:count]
-    scale = [0.1, 0.1, 1.0, 0.1, 1.0][:count]
-    fitted = least_squares(rest, start, bounds=(_LOWEST[:count], _HIGHEST[:count]), x_scale=scale, xtol=1e-6, ftol=1e-8)
-    level, size, w = (float(parameter) for parameter in fitted.x[:3])
-    decay = float(fitted.x[4]) if damped else 0.0
-    sound = fitted.success and size > 0.0 and 0.05 < level < 0.95
-    parameters = tuple(float(parameter) for parameter in fitted.x)
-    return Shape(falls.bottom_N + drop_N * level, w / length_s, decay / length_s, parameters) if sound else None
+def _shape(falls: StackedFalls, level: float, w: float, ratio: float, fitted: Any) -> Shape:
+    force_N = falls.bottom_N + (falls.top_N - falls.bottom_N) * level
+    return Shape(force_N, w / falls.length_s, ratio, tuple(fitted.x.tolist()))

@@ -11,7 +11,6 @@ import numpy as np
 
 from bridge.arrays import Floats
 from diagnosis.look.numbers import Number, groups_of, jackknifed
-from diagnosis.look.slip_shape import half_done
 from diagnosis.look.slips import RecordSlips
 
 _FEWEST_SLIPS, _FEWEST_SAMPLES = 3, 5  # of a fall
@@ -75,15 +74,11 @@ class _Falls(NamedTuple):
 
 def _falls_of(slips: RecordSlips) -> _Falls | None:
     """The falls of a part; None for too few slips or samples."""
-    part = slips.part
-    whole = min(len(slips.tops), len(slips.bottoms))
-    tops, bottoms = slips.tops[:whole], slips.bottoms[:whole]
-    if whole < _FEWEST_SLIPS or float(np.median(bottoms - tops)) < _FEWEST_SAMPLES:
+    part, (tops, bottoms) = slips.part, slips.falls
+    if len(tops) < _FEWEST_SLIPS or float(np.median(bottoms - tops)) < _FEWEST_SAMPLES:
         return None
     usual = float(np.median(bottoms - tops))
-    middles = np.array(
-        [half_done(part.force_N, int(a), int(b), slips.width) for a, b in zip(tops, bottoms, strict=True)]
-    )
+    middles = slips.middles(tops, bottoms)
     reach = int((_REACH + _MOST) * usual) + 2
     at = np.round(middles).astype(np.int64)[:, None] + np.arange(-reach, reach + 1)
     inside = (at[:, 0] >= 0) & (at[:, -1] < len(part.force_N))

@@ -10,10 +10,8 @@ import numpy as np
 
 from bridge.arrays import Floats, Indices
 from diagnosis.look.record import OneWayPart, smoothed
-from diagnosis.look.turns import long_turns
+from diagnosis.slips import NOISE_SPANS, turning_points
 
-# Smallest fall, in standard deviations of the smoothed noise: white noise spans 8 to 9 of them in 10^5 samples.
-_NOISE_SPANS = 10.0
 # Smallest fall as a share of the range between the 1st and the 99th percentile. Smaller: ripple counts; larger: small slips of a
 # record with large ones are lost.
 _SHARE = 0.04
@@ -45,6 +43,17 @@ class RecordSlips(NamedTuple):
         """Whether the climbs are straight, as a spring loads on a slide at rest."""
         return self.straight >= _LEAST_STRAIGHT
 
+    @property
+    def falls(self) -> tuple[Indices, Indices]:
+        """Begin and end of each fall that ends, [falls]."""
+        whole = min(len(self.tops), len(self.bottoms))
+        return self.tops[:whole], self.bottoms[:whole]
+
+    def middles(self, tops: Indices, bottoms: Indices) -> Floats:
+        """The instants, in samples, at which half of each fall is done, from lines through the samples around them."""
+        falls = zip(tops.tolist(), bottoms.tolist(), strict=True)
+        return np.array([_half_done(self.part.force_N, top, bottom, self.width) for top, bottom in falls])
+
 
 def find_slips(part: OneWayPart) -> RecordSlips | None:
     """The slips of a part; None where nothing falls by more than noise does."""
@@ -74,10 +83,10 @@ def _turning(force_N: Floats, width: int, noise_N: float) -> tuple[Indices, Indi
     """Maxima and minima that alternate and differ by more than noise does, of the smoothed force."""
     smooth = smoothed(force_N, width)
     low, high = np.quantile(smooth, (0.01, 0.99))
-    drop_N = max(_NOISE_SPANS * noise_N / (width | 1) ** 0.5, _SHARE * float(high - low))
+    drop_N = max(NOISE_SPANS * noise_N / (width | 1) ** 0.5, _SHARE * float(high - low))
     if drop_N <= 0.0:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    at = long_turns(smooth, drop_N)
+    at = turning_points(smooth, drop_N)
     return at[::2], at[1::2]
 
 
@@ -126,3 +135,16 @@ def _falls_straight(smooth: Floats, tops: Indices, bottoms: Indices) -> bool:
     ]
     mean = np.mean(shares, axis=0)
     return float(np.abs(mean - np.linspace(mean[0], mean[-1], _POINTS)).max()) < _STRAIGHTER
+
+
+def _half_done(force_N: Floats, top: int, bottom: int, width: int) -> float:
+    around = slice(max(top - width, 0), top + width + 1), slice(max(bottom - width, 0), bottom + width + 1)
+    half = 0.5 * (float(force_N[around[0]].mean()) + float(force_N[around[1]].mean()))
+    inside = np.arange(top, bottom + 1)
+    near = inside[np.abs(force_N[inside] - half) < 0.25 * abs(force_N[top] - force_N[bottom])]
+    if len(near) < 2:
+        near = inside
+    x = near - near.mean()
+    y = force_N[near]
+    slope = float(x @ (y - y.mean())) / max(float(x @ x), 1e-300)
+    return float(near.mean()) + (half - float(y.mean())) / slope if slope < 0.0 else float(near.mean())

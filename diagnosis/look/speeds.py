@@ -30,6 +30,7 @@ class AtSpeed(NamedTuple):
     mean_N: Number
     breakaway_N: Number | None  # None: it slides evenly
     sliding: bool
+    JSON_HIDDEN = ("sliding",)
 
 
 def over_speed(parts: list[OneWayPart], cycles: list[Cycle], unit: str = "N") -> list[AtSpeed]:

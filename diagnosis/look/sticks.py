@@ -1,22 +1,23 @@
 """Values of each slip and of each stick before it: breakaway force, re-stick force, dwell, slope, speed of the drive."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
-from bridge.arrays import Floats, Indices
-from diagnosis.look.record import OneWayPart, smoothed
-from diagnosis.look.slips import RecordSlips
+from bridge.arrays import Floats
+from diagnosis.look.record import OneWayPart, parts_of, smoothed
+from diagnosis.look.slips import RecordSlips, find_slips
 
-_FROM, _TO = (
-    0.25,
-    0.9,
-)  # share of a stick in which its slope is read: a re-stick rings, and before a breakaway it creeps
+# Share of a stick in which its slope is read: a re-stick rings, and before a breakaway it creeps.
+_FROM, _TO = 0.25, 0.9
 _FEWEST = 5  # samples of that
 _EVEN = 0.5  # share of its way that an even drive goes in that
 _LEVELS = (0.5, 0.6, 0.7, 0.8, 0.9)  # of the climb
-_UNKNOWN = (np.nan, np.nan, np.nan, np.nan, np.nan)
 _DEGREE = 4  # of the smooth curve through a stick: a contact that gives way bends it once
+# Speed in a stick over the mean speed around it: 1 for a drive; for a slide 0, and a few hundredths where its contact gives way.
+_LEAST_OF_DRIVE = 0.5
+_ENOUGH = 1 << 20  # samples that are searched: a hundred slips of a slow rig at 10 kHz
 _HALVES = 4  # samples of a smoothing from which every other one finds a peak and the others measure it
 
 
@@ -25,53 +26,60 @@ class Cycle(NamedTuple):
 
     breakaway_t_s: float
     breakaway_force_N: float
-    restick_t_s: float
-    restick_force_N: float
-    dwell_s: float  # of the stick before
-    slope_N_per_s: float  # of that stick
-    loading_N_per_s: float  # of its last half, where the force climbs fastest: without a halt of the drive
-    speed_mps: float  # of the drive in that stick
-    stiffness_N_per_m: float  # of that stick, over the way of the drive: of drive and contact in series
-    drive_m_per_N: float  # compliance of the drive in that stick
-    contact_m_per_N: float  # compliance of the contact, before it nears its breakaway
-    mean_force_N: float  # from this breakaway to the next
-    sign: float  # of the force as measured
+    restick_t_s: float = math.nan
+    restick_force_N: float = math.nan
+    dwell_s: float = math.nan  # of the stick before
+    slope_N_per_s: float = math.nan  # of that stick
+    loading_N_per_s: float = math.nan  # of its last half, where the force climbs fastest: without a halt of the drive
+    speed_mps: float = math.nan  # of the drive in that stick
+    stiffness_N_per_m: float = math.nan  # of that stick, over the way of the drive: of drive and contact in series
+    drive_m_per_N: float = math.nan  # compliance of the drive in that stick
+    contact_m_per_N: float = math.nan  # compliance of the contact, before it nears its breakaway
+    mean_force_N: float = math.nan  # from this breakaway to the next
+    sign: float = 1.0  # of the force as measured
 
 
 def cycles_of(slips: RecordSlips, speed_mps: float | None) -> list[Cycle]:
     """Every slip of a part. `speed_mps` is the drive's speed, used where its position was not measured."""
     part = slips.part
     top_N, bottom_N = _peaks(slips)
+    tops, bottoms = slips.tops.tolist(), slips.bottoms.tolist()
     cycles: list[Cycle] = []
-    for i, top in enumerate(slips.tops.tolist()):
-        bottom = int(slips.bottoms[i]) if i < len(slips.bottoms) else -1
-        began = int(slips.bottoms[i - 1]) if i else -1
-        following = int(slips.tops[i + 1]) if i + 1 < len(slips.tops) else -1
-        slope, speed, stiffness, drive, contact = (
-            _stick(part, began, top, float(top_N[i]), speed_mps, slips.width) if i else _UNKNOWN
-        )
-        loading = _loading(part, began, top, slips.width) if i else np.nan
-        cycles.append(
-            Cycle(
-                float(part.t_s[top]),
-                float(top_N[i]),
-                float(part.t_s[bottom]) if bottom >= 0 else np.nan,
-                float(bottom_N[i]) if bottom >= 0 else np.nan,
-                float(part.t_s[top] - part.t_s[began]) if began >= 0 else np.nan,
-                slope,
-                loading,
-                speed,
-                stiffness,
-                drive,
-                contact,
-                float(part.force_N[top:following].mean()) if following >= 0 else np.nan,
-                part.sign,
-            )
-        )
+    for i, top in enumerate(tops):
+        known: dict[str, float] = {}
+        if i:
+            began = bottoms[i - 1]
+            known = _stick(part, began, top, float(top_N[i]), speed_mps, slips.width)
+            known["dwell_s"] = float(part.t_s[top] - part.t_s[began])
+            known["loading_N_per_s"] = _loading(part, began, top, slips.width)
+        if i < len(bottoms):
+            known |= {"restick_t_s": float(part.t_s[bottoms[i]]), "restick_force_N": float(bottom_N[i])}
+        if i + 1 < len(tops):
+            known["mean_force_N"] = float(part.force_N[top : tops[i + 1]].mean())
+        cycles.append(Cycle(float(part.t_s[top]), float(top_N[i]), sign=part.sign, **known))
     return cycles
 
 
-def _peaks(slips: RecordSlips) -> tuple[Floats, Floats]:
+def is_of_slide(t_s: Floats, force_N: Floats, position_m: Floats) -> bool:
+    """Whether a position belongs to the slide, which rests in the sticks while the drive moves; [samples] each, SI units.
+
+    False where no stick shows it.
+    """
+    few = slice(_ENOUGH)
+    shares: list[float] = []
+    for part in parts_of(t_s[few], force_N[few], position_m[few]):
+        slips = find_slips(part)
+        if slips is None or not slips.sticks or part.position_m is None:
+            continue
+        tops = slips.tops.tolist()
+        for first, last, cycle in zip(tops[:-1], tops[1:], cycles_of(slips, None)[1:], strict=True):
+            mean_mps = float(part.position_m[last] - part.position_m[first]) / ((last - first) * part.step_s)
+            if mean_mps > 0.0 and np.isfinite(cycle.speed_mps):
+                shares.append(cycle.speed_mps / mean_mps)
+    return bool(shares) and float(np.median(shares)) < _LEAST_OF_DRIVE
+
+
+def _peaks(slips: RecordSlips) -> list[Floats]:
     """Forces at breakaways and at re-sticks, [slips] each.
 
     The largest of several noisy samples is too large. So one half of the samples finds the peak, and the other half measures it.
@@ -79,46 +87,40 @@ def _peaks(slips: RecordSlips) -> tuple[Floats, Floats]:
     force_N, noise_N, width = slips.part.force_N, slips.part.noise_N, slips.width | 1
     if width < _HALVES or noise_N == 0.0:
         smooth = smoothed(force_N, min(width, 3) if noise_N > 0.0 else 1)
-        reach = max(width // 2, 1)
-        return _extremes(smooth, slips.tops, reach, 1.0), _extremes(smooth, slips.bottoms, reach, -1.0)
-    halves = force_N[: len(force_N) // 2 * 2].reshape(-1, 2)
-    even, other = (smoothed(np.ascontiguousarray(halves[:, i]), width // 2) for i in (0, 1))
+        courses, thinned, reach = [(smooth, smooth)], 1, max(width // 2, 1)
+    else:
+        halves = force_N[: len(force_N) // 2 * 2].reshape(-1, 2)
+        even, other = (smoothed(np.ascontiguousarray(halves[:, i]), width // 2) for i in (0, 1))
+        courses, thinned, reach = [(even, other), (other, even)], 2, width
     result: list[Floats] = []
-    for at, sign in ((slips.tops // 2, 1.0), (slips.bottoms // 2, -1.0)):
-        values = np.empty(len(at))
-        for i, middle in enumerate(np.minimum(at, len(even) - 1)):
-            near = slice(max(middle - width, 0), middle + width + 1)
-            first, second = even[near], other[near]
-            values[i] = 0.5 * (second[np.argmax(sign * first)] + first[np.argmax(sign * second)])
-        result.append(values)
-    return result[0], result[1]
-
-
-def _extremes(smooth: Floats, at: Indices, reach: int, sign: float) -> Floats:
-    return np.array([sign * (sign * smooth[max(i - reach, 0) : i + reach + 1]).max() for i in at.tolist()])
+    for ends, sign in ((slips.tops, 1.0), (slips.bottoms, -1.0)):
+        at = np.minimum(ends // thinned, len(courses[0][0]) - 1).tolist()
+        near = [slice(max(i - reach, 0), i + reach + 1) for i in at]
+        values = [[measures[span][np.argmax(sign * finds[span])] for finds, measures in courses] for span in near]
+        result.append(np.array(values).reshape(-1, len(courses)).mean(axis=1))
+    return result
 
 
 def _stick(
     part: OneWayPart, began: int, top: int, breakaway_N: float, speed_mps: float | None, width: int
-) -> tuple[float, float, float, float, float]:
-    """Slope of the force, speed of the drive, slope over its way, compliances of drive and contact, in the middle of a stick.
-
-    NaN where the stick is too short or the speed is not known.
-    """
+) -> dict[str, float]:
+    """The numbers of the middle of a stick, by their names in `Cycle`; none for a short stick, the slope for an unknown speed."""
     first, last = began + int(_FROM * (top - began)), began + int(_TO * (top - began))
     if last - first < _FEWEST:
-        return _UNKNOWN
+        return {}
     t_s, force_N = part.t_s[first:last], part.force_N[first:last]
     slope = _slope(t_s, force_N)
     if part.position_m is None:
         speed = speed_mps if speed_mps is not None else np.nan
     else:
         speed = _slope(t_s, part.position_m[first:last])
+    known = {"slope_N_per_s": slope, "speed_mps": speed}
     if not speed > 0.0 or (part.position_m is not None and _halted(part.position_m, began, top, first, last)):
-        return slope, speed, np.nan, np.nan, np.nan
+        return known
     # a breakaway is known to the width of the smoothing that found it: nearer to it the slip may have begun
     whole = slice(0, max(min(last, top - width) - first, 0))
-    return slope, speed, slope / speed, *_both(speed * (t_s - t_s[0])[whole], force_N[whole], breakaway_N)
+    drive, contact = _both(speed * (t_s - t_s[0])[whole], force_N[whole], breakaway_N)
+    return known | {"stiffness_N_per_m": slope / speed, "drive_m_per_N": drive, "contact_m_per_N": contact}
 
 
 def _halted(position_m: Floats, began: int, top: int, first: int, last: int) -> bool:

@@ -76,7 +76,7 @@ def sentences(seen: LookResult) -> list[str]:
     for name, (symbol, meaning) in TITLES.items():
         if name in seen.numbers:
             lines.append(f"{symbol:<10} {with_interval(seen.numbers[name])}: {meaning}")
-    lines += [f"{'':<10} {text}" for text in cannot_tell(seen)]
+    lines += [f"{'':<10} {text}" for text in limits_of_look(seen)]
     for at_speed in seen.at_speeds:
         top = "" if at_speed.breakaway_N is None else f", breakaway {with_interval(at_speed.breakaway_N)}"
         lines.append(
@@ -85,7 +85,7 @@ def sentences(seen: LookResult) -> list[str]:
     return lines
 
 
-def cannot_tell(seen: LookResult) -> list[str]:
+def limits_of_look(seen: LookResult) -> list[str]:
     """A line for each missing number: the reason, and the option to add."""
     lines: list[str] = []
     if not seen.sticks:

@@ -16,8 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.arrays import Floats
-from bridge.kernel import Record, kernel
-from bridge.wire.messages import CHANNELS
+from bridge.kernel import kernel
+from bridge.layouts import PlantMemory, PlantParams
+from bridge.wire.channels import CHANNELS
 from diagnosis.features.grid import BLOCK_S, SIGNALS
 from diagnosis.features.segments import CommandedRun
 from diagnosis.model.rig import Rig, Start, StartState, built
@@ -131,7 +132,7 @@ def _predict(
     truth: Floats,
     out: Floats,
 ) -> None:
-    p: Record = params[0]
+    p: PlantParams = params[0]
     channels, truths = analogue.shape[0], truth.shape[0]
     for block in range(drive.shape[0]):
         samples = steps[block]
@@ -173,7 +174,7 @@ def _follow(
     damping: float,
 ) -> None:
     """As `_predict`, along a measured motion; the force in `out` is the force that keeps the model on this motion."""
-    s: Record = state[0]
+    s: PlantMemory = state[0]
     column = np.empty((out.shape[0], 1))
     force = np.empty(1)
     ahead_before_m = position_m[0] - s.x

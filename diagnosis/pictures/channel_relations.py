@@ -18,13 +18,13 @@ from diagnosis.features.grid import BLOCK_S
 from diagnosis.gap.prepare import Prepared
 from diagnosis.pictures.derivatives import (
     derivative,
-    kept_blocks,
     motion,
     second_derivative,
     smoothing_blocks,
     with_drive_path,
     without_slow,
 )
+from diagnosis.relations.relation import kept_blocks
 
 # Error that an ordinary measuring chain makes in each relation, as a share of the signal in the relation (rms, or peak to peak in
 # `_spring`). Too small: good sensors stand out; too large: an effect does not. Displacement sensors are linear to 0.2 to 0.4 % in

@@ -50,10 +50,6 @@ def most_telling(run: Prepared, versions: tuple[Version, ...], scales: Scales) -
     return best
 
 
-def _mean_of(cycles: int) -> str:
-    return f"mean of {cycles} cycles" if cycles > 1 else "one cycle"
-
-
 def _cycles_there(signals: Signals, segment: Segment, scales: Scales) -> bool:
     """Whether the segment has no slip, or two or more."""
     return "drive_force_N" not in signals or len(slips_of(signals, segment, scales).tops) != 1
@@ -85,13 +81,13 @@ def force_picture(shown: ShownSegment, scales: Scales) -> Picture:
     # with a force drive the force is not a saw tooth, and its phase follows the measured motion
     if name == "drive_force_N" and shown.segment.drive_velocity_mps != 0.0:
         slips = [slips_of(version.signals, shown.segment, scales) for version in shown.versions]
-        if all(len(slip.middles) >= 2 for slip in slips):
+        counts = [len(slip.middles) for slip in slips]
+        if min(counts) >= 2:
             curves = [_whole_cycle(version, slips_of) for version, slips_of in zip(shown.versions, slips, strict=True)]
-            title = f"{_place(shown)}: {_mean_of(len(slips[0].middles) - 1)} from slip to slip"
+            cycles = f"mean of {counts[0] - 1} cycles" if counts[0] > 2 else "one cycle"
+            title = f"{_place(shown)}: {cycles} from slip to slip"
             return Picture("cycle", title, "time after the middle of the slip [ms]", _AXES[name], tuple(curves))
-        if all(len(slip.middles) == 1 for slip in slips) or (
-            shown.segment.first and all(len(slip.middles) for slip in slips)
-        ):
+        if max(counts) == min(counts) == 1 or (shown.segment.first and min(counts)):
             # the phase of stick-slip is chance, so the first slips are aligned
             zeros = [float(slip.middles[0]) for slip in slips]
             title = f"{_place(shown)}: first slips laid on each other"

@@ -1,8 +1,7 @@
 """Motion of the mass and the spring of a reduced run, from the channels that it has; smooth derivatives on the 1 ms grid."""
 
 import numpy as np
-import numpy.typing as npt
-from scipy.ndimage import gaussian_filter1d, maximum_filter1d
+from scipy.ndimage import gaussian_filter1d
 
 from bridge.arrays import Floats
 from diagnosis.evidence.manifest import RigTable
@@ -16,8 +15,6 @@ from diagnosis.model.sensor_chain import low_pass
 _SMOOTH_SHARE = 0.14
 _SMOOTH_FREE = 5.0  # blocks, with a force drive, where no slip gives a time scale
 _FIRST_SHARE = 0.4  # share of this smoothing for a first derivative, which needs less
-_EDGE_BLOCKS = 100  # left out around a change of command, while drive and piezo settle
-_END_BLOCKS = 20  # left out at the ends of a run
 _SLOW_S = 0.08  # time constant of a high-pass at 2 Hz: accelerometers show nothing slower than 0.5 Hz
 _MOVES_MPS = 2e-3  # speed above which the mass has moved; a slip of the paper's rig reaches 22 mm/s
 
@@ -48,18 +45,6 @@ def second_derivative(values: Floats, smooth_blocks: float) -> Floats:
 def without_slow(values: Floats) -> Floats:
     """`values` [blocks] without the part slower than 2 Hz."""
     return values - low_pass(values, _SLOW_S)
-
-
-def kept_blocks(run: Prepared) -> npt.NDArray[np.bool_]:
-    """Marks the blocks away from changes of command and from the ends of the run, [blocks]."""
-    commands = run.commands
-    changes = np.zeros(len(commands.drive))
-    if any(segment.drive_velocity_mps != 0.0 for segment in commands.segments):
-        for command in (commands.drive, commands.frequency_Hz, commands.amplitude_m):
-            changes[1:] += np.diff(command) != 0.0
-    kept = maximum_filter1d(changes, 2 * _EDGE_BLOCKS + 1) == 0.0
-    kept[:_END_BLOCKS] = kept[-_END_BLOCKS:] = False
-    return kept
 
 
 def with_drive_path(run: Prepared) -> Signals:

@@ -64,7 +64,7 @@ def assembled(
     verdict, best, _, held_out = outcome
     nuisances = fitter.nuisances
     cells = _in_time(lambda: _cells_left(fitter, baseline), [])
-    judged = Gap(DEFINITION, (), math.nan, math.nan, math.nan, 1.0, None, None, ())
+    judged = Gap(DEFINITION)
     if held_out is not None:
         gap = held_out
         cells += _in_time(
@@ -79,7 +79,8 @@ def assembled(
         by_effect |= dict.fromkeys(verdict.named.hypothesis.effects, verdict.named)
     elif verdict.ranked and is_random(verdict.ranked[0].fit.hypothesis):
         by_effect[verdict.ranked[0].fit.hypothesis.effects[0]] = verdict.ranked[0].fit
-    alone = {"none": baseline.chi2} | {fit.hypothesis.effects[0]: fit.chi2 for fit in reversed(contest.singles)}
+    singles = {fit.hypothesis.effects[0]: fit for fit in reversed(contest.singles)}
+    alone = {name: round(fit.chi2, 2) for name, fit in ({"none": baseline} | singles).items()}
     candidates = tuple(
         _candidate(name, probability, by_effect.get(name))._replace(chi2=alone.get(name))
         for name, probability in verdict.probabilities.items()
@@ -112,7 +113,7 @@ def assembled(
         findings=(*evidence.findings, *_changing(runs)),
         pictures=_in_time(lambda: pictures(shown, described, refitted, named, effects), ()),
         compared_features=len(baseline.residual),
-        elapsed_s=time.monotonic() - began,
+        elapsed_s=round(time.monotonic() - began, 2),
     )
 
 
@@ -147,11 +148,10 @@ def _judged(contest: Contest, outcome: Confirmation, held_out: HeldOut, tried: l
     named = verdict.named is not None
     return Gap(
         definition=DEFINITION,
-        runs=tuple(run.file for run in held_out.problem.runs),
+        files=tuple(run.file for run in held_out.problem.runs),
         nominal=held_out.nominal,
         retuned=held_out.retuned,
         with_effect=closed.gap,
-        floor=1.0,
         shrinkage=closed.shrinkage if named else None,
         interval_90=closed.interval_90 if named else None,
         compared=tuple(compared),

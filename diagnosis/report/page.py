@@ -7,10 +7,11 @@ from typing import Any, Final, NamedTuple
 
 from bridge import units
 from bridge.files import write_whole
+from bridge.pages import filled_page
 from bridge.provenance import provenance
 from diagnosis.report import relation_words, words
-from diagnosis.report.page_plots import STYLES, draw
-from diagnosis.result import Candidate, Cell, Diagnosis, Gap, RigNumber
+from diagnosis.report.page_plots import draw
+from diagnosis.result import Cell, Diagnosis, Gap, RigNumber
 
 _REGIMES = ("stick", "breakaway", "slip", "restick", "steady")
 # Share of the gap below which a row of the map is left out and only counted. Smaller: a long map. Larger: rows are missed.
@@ -31,7 +32,7 @@ class GapBar(NamedTuple):
     label: str
     value: float
     width: float
-    colour: str
+    style: str  # of `diagnosis.report.page_plots`
 
 
 class MapRow(NamedTuple):
@@ -66,34 +67,21 @@ def write_report(diagnosis: Diagnosis, evidence_name: str, path: Path, files: It
 
 def report_page(diagnosis: Diagnosis, evidence_name: str, footer: str = "") -> str:
     """The report as the text of an HTML file; `footer` is HTML."""
-    from jinja2 import Environment, StrictUndefined  # noqa: PLC0415
-
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters |= {
-        "percent": units.percent,
-        "times": units.times,
-        "who": words.who_in_words,
-        "closed": words.closed_in_words,
-        "closed_between": words.closed_between,
-        "sizes": relation_words.sizes_in_words,
-        "remainder": relation_words.remainder_in_words,
-        "relation_number": relation_words.number_in_words,
-        "between": units.interval,
-        "sd": lambda shift: f"{shift:+.1f}",
-    }
-    template = Path(__file__).with_name("page.html.j2").read_text(encoding="utf-8")
+    answer = words.answer(diagnosis)
     shown = [candidate for candidate in diagnosis.candidates if not candidate.probability < _SMALL_PROBABILITY]
     runs, rows, left_out = where_map(diagnosis.where)
-    return environment.from_string(template).render(
+    return filled_page(
+        Path(__file__).with_name("page.html.j2"),
+        f"{evidence_name}: {diagnosis.verdict}, {answer}",
+        footer,
         diagnosis=diagnosis,
         evidence_name=evidence_name,
-        footer=footer,
         banner=_BANNERS[diagnosis.verdict],
-        answer=words.answer(diagnosis),
+        answer=answer,
         shown=shown,
         hidden=[candidate.effect for candidate in diagnosis.candidates if candidate.probability < _SMALL_PROBABILITY],
-        estimates=_estimates,
-        meaning=_meaning,
+        estimate=words.estimate_in_words,
+        meanings=words.EFFECT_WORDS,
         gap_bars=gap_bars(diagnosis.gap, bool(diagnosis.effects)),
         floor_at=_floor_at(diagnosis.gap),
         runs=runs,
@@ -103,18 +91,17 @@ def report_page(diagnosis: Diagnosis, evidence_name: str, footer: str = "") -> s
         largest=_cell_in_words(diagnosis.where[0]) if diagnosis.where else "",
         drawn=draw(diagnosis.pictures),
         rig=[rig_row(parameter) for parameter in diagnosis.rig],
+        percent=units.percent,
+        width=_width,
+        times=units.times,
+        who=words.who_in_words,
+        closed=words.closed_in_words,
+        closed_between=words.closed_between,
+        sizes=relation_words.sizes_in_words,
+        remainder=relation_words.remainder_in_words,
+        relation_number=relation_words.number_in_words,
+        between=units.interval,
     )
-
-
-def _estimates(candidate: Candidate) -> list[str]:
-    return [
-        words.estimate_in_words(candidate.effect, name, estimate) for name, estimate in candidate.parameters.items()
-    ]
-
-
-def _meaning(effect: str) -> str:
-    """An effect in plain words; empty for an effect without words."""
-    return words.EFFECT_WORDS.get(effect, "")
 
 
 def gap_bars(gap: Gap, named: bool) -> list[GapBar]:
@@ -124,9 +111,14 @@ def gap_bars(gap: Gap, named: bool) -> list[GapBar]:
         bars.append(("with the best explanation", gap.with_effect, "effect"))
     widest = _widest(gap)
     return [
-        GapBar(label, value, 100.0 * max(value, 0.0) / widest if math.isfinite(value) else 0.0, STYLES[style]["color"])
+        GapBar(label, value, 100.0 * max(value, 0.0) / widest if math.isfinite(value) else 0.0, style)
         for label, value, style in bars
     ]
+
+
+def _width(share: float) -> float:
+    """Width of the bar of a share in percent; 0 for NaN."""
+    return min(max(100.0 * share, 0.0), 100.0) if math.isfinite(share) else 0.0
 
 
 def _floor_at(gap: Gap) -> float | None:
@@ -140,11 +132,11 @@ def _widest(gap: Gap) -> float:
 
 def where_map(cells: tuple[Cell, ...]) -> tuple[list[str], list[MapRow], float]:
     """The runs, the rows above `_SMALL`, and the summed share of the rows that were left out."""
-    runs = sorted({cell.run for cell in cells})
+    runs = sorted({cell.file for cell in cells})
     table: dict[tuple[str, str, tuple[float, float]], dict[str, float]] = {}
     for cell in cells:
         shares = table.setdefault((cell.signal, cell.regime, cell.band_Hz), {})
-        shares[cell.run] = shares.get(cell.run, 0.0) + cell.share
+        shares[cell.file] = shares.get(cell.file, 0.0) + cell.share
     rows: list[MapRow] = []
     left_out = 0.0
     for key in sorted(table, key=lambda key: (key[0], _place(key[1]), key[2])):
@@ -159,7 +151,7 @@ def where_map(cells: tuple[Cell, ...]) -> tuple[list[str], list[MapRow], float]:
 
 
 def _cell_in_words(cell: Cell) -> str:
-    place = f"{units.signal_name(cell.signal)}, {cell.regime}, {units.band(cell.band_Hz)}, {cell.run}"
+    place = f"{units.signal_name(cell.signal)}, {cell.regime}, {units.band(cell.band_Hz)}, {cell.file}"
     return f"{units.percent(cell.share)} in {place}"
 
 

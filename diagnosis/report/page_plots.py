@@ -1,12 +1,11 @@
 """The pictures of a diagnosis as PNG inside the page, together small enough for a mail."""
 
-import base64
-import io
 import math
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
+from bridge.pages import png
 from diagnosis.result import Curve, Picture
 
 if TYPE_CHECKING:
@@ -15,8 +14,8 @@ if TYPE_CHECKING:
 _DPI = 110.0
 # Bytes of base64 for all pictures. Larger: the page grows beyond 5 MB and mail servers refuse it. Smaller: coarse pictures.
 _ALL_BYTES = 3_500_000
-# the same colours everywhere in the page; line styles differ as well, for readers who do not see the colours
-STYLES: Final[dict[str, dict[str, Any]]] = {
+# the bars in page.css have the same colours; line styles differ as well, for readers who do not see the colours
+_STYLES: Final[dict[str, dict[str, Any]]] = {
     "measured": {"color": "#1c2833", "linewidth": 1.6},
     "nominal": {"color": "#808b96", "linewidth": 1.2, "linestyle": ":"},
     "retuned": {"color": "#ca6f1e", "linewidth": 1.2, "linestyle": "--"},
@@ -37,7 +36,7 @@ def draw(pictures: tuple[Picture, ...]) -> list[Drawn]:
     """Draw every picture; all together take at most 3.5 MB, so many pictures are drawn with fewer pixels."""
     dpi = _DPI
     while True:
-        drawn = [Drawn(picture.title, picture.kind, _png(_figure(picture), dpi)) for picture in pictures]
+        drawn = [Drawn(picture.title, picture.kind, png(_figure(picture), dpi)) for picture in pictures]
         size = sum(len(picture.png) for picture in drawn)
         if size <= _ALL_BYTES:
             return drawn
@@ -52,7 +51,7 @@ def _figure(picture: Picture) -> "Figure":
     axis = figure.subplots()
     for curve in picture.curves:
         x, y = _finite(curve)
-        axis.plot(x, y, label=_plain(curve.label), **STYLES[curve.style])
+        axis.plot(x, y, label=_plain(curve.label), **_STYLES[curve.style])
     axis.set_xlabel(_plain(picture.x_label), fontsize=9)
     axis.set_ylabel(_plain(picture.y_label), fontsize=9)
     axis.tick_params(labelsize=8)
@@ -74,9 +73,3 @@ def _finite(curve: Curve) -> tuple[Any, Any]:
 def _plain(text: str) -> str:
     """A label as plain text: `$` would begin a formula, and a legend leaves out labels that begin with `_`."""
     return text.replace("$", r"\$").removeprefix("_")
-
-
-def _png(figure: "Figure", dpi: float) -> str:
-    memory = io.BytesIO()
-    figure.savefig(memory, format="png", dpi=dpi)
-    return base64.b64encode(memory.getvalue()).decode()

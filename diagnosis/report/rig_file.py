@@ -84,7 +84,7 @@ def _comment(diagnosis: Diagnosis, evidence: Evidence) -> str:
     else:
         lines.append("Verdict: no gap: the rig as described, refitted inside its tolerances.")
     gap = diagnosis.gap
-    if gap.runs and math.isfinite(gap.with_effect):
+    if gap.files and math.isfinite(gap.with_effect):
         lines.append(
             f"Gap on held-out runs, in noise floors: {gap.nominal:.3g} as described, {gap.with_effect:.3g} so."
         )

@@ -8,7 +8,7 @@ from diagnosis.evidence.force_pickup import PICK_UP
 from diagnosis.model.per_run import has_own_phases
 from diagnosis.report.latent_block import latent_answer, latent_sentences
 from diagnosis.report.relation_words import remainder_in_words
-from diagnosis.report.words import EFFECT_WORDS, cannot_tell, closed_between, closed_in_words, estimate_in_words
+from diagnosis.report.words import EFFECT_WORDS, closed_between, closed_in_words, estimate_in_words, is_undecided
 from diagnosis.result import Diagnosis
 from diagnosis.verdict.held_out import MORE_THAN_RIGHT
 
@@ -21,7 +21,7 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
     gap, unexplained = diagnosis.gap, diagnosis.verdict == "unexplained"
     sentences: list[str] = []
     if diagnosis.verdict == "no-gap":
-        if cannot_tell(diagnosis):
+        if is_undecided(diagnosis):
             sentences.append(
                 "These runs do not decide: the fitted runs stay within the stated tolerances, but the held-out runs are "
                 f"{times(gap.retuned)} noise floors off."
@@ -39,7 +39,7 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
             with_it = next(row.gap for row in gap.compared if row.who == names)
             explain, it = ("explains", "it") if len(gap.refuted) == 1 else ("explain", "them")
             sentences.append(
-                f"{names} {explain} the runs that were fitted, but not {', '.join(gap.runs)}, held out: "
+                f"{names} {explain} the runs that were fitted, but not {', '.join(gap.files)}, held out: "
                 f"there the gap is {times(with_it)} noise floors with {it}, {times(gap.retuned)} for the baseline."
             )
         nearest = next(
@@ -56,7 +56,7 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
             f"{' and '.join(diagnosis.effects)} explains a part of the difference, more than chance would; the rest is not "
             "explained."
         )
-    kept = f" on {', '.join(gap.runs)}, held out," if gap.runs else ""
+    kept = f" on {', '.join(gap.files)}, held out," if gap.files else ""
     sentences += latent_sentences(diagnosis, kept)
     if diagnosis.remainder is not None and diagnosis.remainder.what:
         sentences.append(f"{remainder_in_words(diagnosis.remainder)}.")
@@ -68,9 +68,9 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
         first, *more = (finding for finding in vibrating if finding.kind == kind)
         others = ", ".join(finding.where.partition(":")[0] for finding in more)
         sentences.append(f"{first.where} {first.text}." + (f" So in {others}." if others else ""))
-    if gap.runs and math.isfinite(gap.nominal):
+    if gap.files and math.isfinite(gap.nominal):
         sentences.append(
-            f"On {', '.join(gap.runs)}, held out, rig and model are {times(gap.nominal)} noise floors apart as described, and "
+            f"On {', '.join(gap.files)}, held out, rig and model are {times(gap.nominal)} noise floors apart as described, and "
             f"{times(gap.retuned)} for the baseline, which is refitted inside its tolerances; 1 is a perfect model."
             + (
                 " So the gap shows in the fitted runs alone."
@@ -78,7 +78,7 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
                 else ""
             )
         )
-    if gap.runs and gap.retuned > _WORSE * gap.nominal:
+    if gap.files and gap.retuned > _WORSE * gap.nominal:
         sentences.append(
             "The refit makes the held-out runs worse: take the numbers of the description, not the refitted ones."
         )
@@ -104,8 +104,8 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
         if has_own_phases(candidate.parameters):
             sentences.append("Its phase differs from run to run, so on a run of unknown phase it counts as scatter.")
     sentences += [f"These runs cannot separate: {', '.join(group)}." for group in diagnosis.not_distinguishable]
-    if gap.runs and math.isfinite(gap.retuned):
-        kept = ", ".join(gap.runs)
+    if gap.files and math.isfinite(gap.retuned):
+        kept = ", ".join(gap.files)
         if gap.shrinkage is not None and gap.with_effect > gap.retuned:
             sentences.append(
                 f"On {kept}, held out, the gap grows from {times(gap.retuned)} to {times(gap.with_effect)} noise floors: "
@@ -127,7 +127,7 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
                 "a surface rougher than ground steel, or the cause is another one."
             )
     else:
-        why = f"In {', '.join(gap.runs)}, held out, nothing can be compared" if gap.runs else "No run was held out"
+        why = f"In {', '.join(gap.files)}, held out, nothing can be compared" if gap.files else "No run was held out"
         sentences.append(f"{why}: how far the gap closes on new data is not known.")
     if diagnosis.verdict != "no-gap" or diagnosis.next_experiment.gain is not None:
         sentences.append(f"Next: {diagnosis.next_experiment.what}")

@@ -21,16 +21,16 @@ def headline(diagnosis: Diagnosis) -> str:
     return f"{diagnosis.verdict}: {answer(diagnosis)}"
 
 
-def cannot_tell(diagnosis: Diagnosis) -> bool:
+def is_undecided(diagnosis: Diagnosis) -> bool:
     """Whether the fitted runs show no gap and the held-out runs do."""
     gap = diagnosis.gap
-    return diagnosis.verdict == "no-gap" and bool(gap.runs) and gap.retuned > FAR_FOR_NO_GAP
+    return diagnosis.verdict == "no-gap" and bool(gap.files) and gap.retuned > FAR_FOR_NO_GAP
 
 
 def answer(diagnosis: Diagnosis) -> str:
     """The answer in one line, without the word of the verdict."""
     if diagnosis.verdict == "no-gap":
-        if cannot_tell(diagnosis):
+        if is_undecided(diagnosis):
             return f"the fitted runs show no gap, but the held-out runs are {times(diagnosis.gap.retuned)} noise floors off"
         return "the rig as described explains these runs"
     most = mostly(diagnosis)

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.arrays import Floats
-from bridge.wire.messages import CHANNELS
+from bridge.wire.channels import CHANNELS
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.synthetic.protocols import AxisPlan, RunPlan
 from diagnosis.synthetic.sensors import DrawnChain, measured

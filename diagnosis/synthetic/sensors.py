@@ -15,7 +15,7 @@ _REFERENCE_HZ = 20_000.0  # the noise levels are rms values of 20 kHz records
 
 
 class DrawnChain(NamedTuple):
-    """One measuring chain; arrays have one value for each of `plant.records.CHANNELS`."""
+    """One measuring chain; arrays have one value for each of `bridge.wire.channels.CHANNELS`."""
 
     sensors: SensorsConfig  # bandwidths, range and resolution
     noise: Floats  # rms [unit of the channel]

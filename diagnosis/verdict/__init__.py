@@ -5,6 +5,5 @@ judge, probabilities     one judgement over fits; scores as probabilities
 lookalikes               which effects these runs cannot tell apart
 held_out, confirmation   how far the gap closes on held-out runs; which named effects these runs refute
 blend                    how far a blend of all effects closes the gap, for comparison
-by_latent                a verdict of the contest in view of the latent friction, which gives a part of the gap a name where
-by_relations             a verdict of the contest in view of the relations, which decide what they can
+by_latent, by_relations  the verdict of the fits, corrected by latent friction and by the relations
 """

@@ -9,7 +9,8 @@ F_d c s 2 pi / wavelength: it grows with the load, and an unloaded drive runs ev
 import math
 from typing import Any, Final
 
-from bridge.kernel import Record, kernel
+from bridge.kernel import kernel
+from bridge.layouts import PlantParams
 from plant.effects.row import WAVE_SHAPE, Effect, Formula, Parameter, one_form, ratio, wave_shape
 from plant.effects.waves import TWO_PI, wave
 
@@ -42,14 +43,14 @@ def yield_m(hardening_per_m2: float) -> float:
 
 
 @kernel
-def spring_N(p: Record, extension_m: float) -> float:
+def spring_N(p: PlantParams, extension_m: float) -> float:
     """Force of the drive's spring."""
     most_m = yield_m(p.hardening_per_m2)
     return spring_law_N(p.k_d, 0.5 * p.gap_m, most_m, p.hardening_per_m2, p.knee_m, p.knee_ratio, extension_m)
 
 
 @kernel
-def extension_m(p: Record, force_N: float) -> float:
+def extension_m(p: PlantParams, force_N: float) -> float:
     """Extension of the drive's spring at a force: by bisection, to 1e-12 of the extension of a linear spring.
 
     The softest spring, bilinear with a ratio of -0.9, is extended ten times as far.
@@ -64,7 +65,7 @@ def extension_m(p: Record, force_N: float) -> float:
 
 
 @kernel
-def unevenness(p: Record, t_s: float, even_m: float, force_N: float) -> float:
+def unevenness(p: PlantParams, t_s: float, even_m: float, force_N: float) -> float:
     """Velocity of an uneven drive under a drive force, over the velocity of an even drive that is at `even_m`."""
     turns = p.ripple_frequency_Hz * t_s
     if p.ripple_wavelength_m > 0.0:
@@ -75,7 +76,7 @@ def unevenness(p: Record, t_s: float, even_m: float, force_N: float) -> float:
 
 
 @kernel
-def even_m(p: Record, drive_m: float) -> float:
+def even_m(p: PlantParams, drive_m: float) -> float:
     """Position of an even drive when a drive with a screw's lead errors is at `drive_m`.
 
     The errors are the integral of the velocity's ripple over the even position, without a mean. Those under load depend on the

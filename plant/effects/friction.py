@@ -3,13 +3,14 @@
 import math
 from typing import Any, Final
 
-from bridge.kernel import Record, kernel
+from bridge.kernel import kernel
+from bridge.layouts import PlantParams
 from plant.effects.row import TURN_RAD, WAVE_SHAPE, Effect, Formula, Parameter, one_form, ratio, wave_shape
 from plant.effects.waves import TWO_PI, smooth_noise, wave, with_second
 
 
 @kernel
-def level(p: Record, t_s: float, x: float, v_r: float, load_sin: float, load_cos: float) -> float:
+def level(p: PlantParams, t_s: float, x: float, v_r: float, load_sin: float, load_cos: float) -> float:
     """Factor of the friction at the present position and time; sine and cosine give the phase of the load's wave."""
     result = 1.0 + p.drift_per_s * t_s
     if p.drift_settling_s > 0.0:
@@ -30,7 +31,7 @@ def level(p: Record, t_s: float, x: float, v_r: float, load_sin: float, load_cos
 
 
 @kernel
-def _along_track(p: Record, x: float) -> float:
+def _along_track(p: PlantParams, x: float) -> float:
     """The shape of the friction along the track: a wave, two waves, bumps, or noise."""
     if p.position_seed >= 0.0:
         return smooth_noise(2.0 * x / p.position_wavelength_m, p.position_seed)

@@ -8,7 +8,8 @@ state variables; log and power ageing as in Armstrong-Helouvry, Dupont & Canudas
 import math
 from typing import Any, Final
 
-from bridge.kernel import Record, kernel
+from bridge.kernel import kernel
+from bridge.layouts import PlantMemory, PlantParams
 from plant.effects.row import Effect, Formula, Parameter, ratio
 
 LONGEST_LAG_S: Final = 0.025  # longest dead time of friction behind the velocity
@@ -17,7 +18,7 @@ _LAG_LINE = round(LONGEST_LAG_S / LAG_CELL_S) + 2  # the cells of the longest la
 
 
 @kernel
-def ageing_N(p: Record, age_s: float) -> float:
+def ageing_N(p: PlantParams, age_s: float) -> float:
     """Excess of the static friction over F_s at this age of the contact."""
     if p.age_exponent > 0.0:
         return p.age_growth_N * age_s**p.age_exponent - p.age_rested_N
@@ -27,7 +28,7 @@ def ageing_N(p: Record, age_s: float) -> float:
 
 
 @kernel
-def late_mps(p: Record, s: Record, t_s: float, speed_mps: float) -> float:
+def late_mps(p: PlantParams, s: PlantMemory, t_s: float, speed_mps: float) -> float:
     """The speed `lag_dead_s` ago; 0 before t = 0.
 
     Cell k of a line holds the speed at time k LAG_CELL_S. From the last filled cell to the present the speed is interpolated

@@ -6,12 +6,13 @@ Source: a mode that takes part by a share: Ewins, Modal Testing, 2000.
 import math
 from typing import Any, Final
 
-from bridge.kernel import Record, kernel
+from bridge.kernel import kernel
+from bridge.layouts import PlantParams
 from plant.effects.row import Effect, Formula, Parameter, ratio
 
 
 @kernel
-def roll_off(p: Record, frequency_Hz: float) -> float:
+def roll_off(p: PlantParams, frequency_Hz: float) -> float:
     """Divisor of the amplitude at this frequency."""
     r = frequency_Hz / p.rolloff_Hz
     return math.sqrt(1.0 + r * r) if p.rolloff_order == 1.0 else 1.0 + r * r
@@ -31,7 +32,7 @@ def mode_gain(mode_ratio: float, r: float, damped: float, squared: float) -> flo
 
 
 @kernel
-def heat_share(p: Record, vibrating_s: float) -> float:
+def heat_share(p: PlantParams, vibrating_s: float) -> float:
     """Remaining share of the amplitude after this time of vibration."""
     return 1.0 - p.sag_ratio * (1.0 - math.exp(-vibrating_s / p.sag_settling_s))
 

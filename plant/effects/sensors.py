@@ -3,7 +3,8 @@
 import math
 from typing import Any, Final
 
-from bridge.kernel import Record, kernel
+from bridge.kernel import kernel
+from bridge.layouts import PlantMemory, PlantParams
 from plant.effects.row import Effect, Formula, Parameter, one_form, ratio
 
 LONGEST_DELAY: Final = 254  # samples; 12.7 ms at 20 kHz
@@ -12,7 +13,7 @@ _DELAY_LINE = LONGEST_DELAY + 2  # the delayed sample, the previous and the pres
 
 
 @kernel
-def force_reading_N(p: Record, s: Record, force_N: float, t_s: float) -> float:
+def force_reading_N(p: PlantParams, s: PlantMemory, force_N: float, t_s: float) -> float:
     """The signal of the force sensor with its faults; call it once per sample."""
     if p.force_lag_s > 0.0:
         share = 1.0 - math.exp(-p.dt_s * p.steps_per_sample / p.force_lag_s)

@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from bridge.wire.messages import CHANNELS
+from bridge.wire.channels import CHANNELS
 
 SENSORS, EXCITER, CLOCK, BUS, PROCESS = "sensors", "exciter", "clock", "bus", "process"
 ALL_SENSORS = "sensors"

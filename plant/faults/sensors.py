@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from bridge.arrays import Floats
-from bridge.wire.messages import CHANNELS
+from bridge.wire.channels import CHANNELS
 from plant.faults.kinds import ALL_SENSORS, LARGEST
 from plant.faults.table import FaultTable
 
@@ -64,24 +64,6 @@ class _Channel:
         self.line: list[Floats] = []
         self.is_off = False
 
-    def off(self, samples: Floats, _s: float) -> Floats:
-        return np.full_like(samples, self.size)
-
-    def stuck(self, samples: Floats, _s: float) -> Floats:
-        return np.full_like(samples, self.before[-1])
-
-    def frozen(self, samples: Floats, _s: float) -> Floats:
-        return np.resize(self.before, samples.shape)
-
-    def garbage(self, samples: Floats, _s: float) -> Floats:
-        return self.random.uniform(-self.size, self.size, samples.shape)
-
-    def scaled(self, samples: Floats, _s: float) -> Floats:
-        return samples * self.size
-
-    def offset(self, samples: Floats, _s: float) -> Floats:
-        return samples + self.size
-
     def delayed(self, samples: Floats, _s: float) -> Floats:
         """By whole samples; until the first has arrived, the channel holds its last value."""
         count = round(self.size / self.sample_s)
@@ -92,28 +74,6 @@ class _Channel:
         self.line = [self.line[0][len(samples) - len(held) :]]
         return shown
 
-    def clipped(self, samples: Floats, _s: float) -> Floats:
-        return np.clip(samples, -self.size, self.size)
-
-    def nan(self, samples: Floats, _s: float) -> Floats:
-        return np.full_like(samples, math.nan) if self.random.random() < self.size else samples
-
-    def huge(self, samples: Floats, _s: float) -> Floats:
-        samples[len(samples) // 2] = self.size
-        return samples
-
-    def drifting(self, samples: Floats, since_s: float) -> Floats:
-        return samples + self.size * (since_s + self.sample_s * np.arange(len(samples)))
-
-    def fading(self, samples: Floats, since_s: float) -> Floats:
-        return samples * max(1.0 + self.size * since_s, 0.0)
-
-    def jumping(self, samples: Floats, since_s: float) -> Floats:
-        return samples if int(since_s / _JUMP_S) % 2 else samples + self.size
-
-    def noise(self, samples: Floats, _s: float) -> Floats:
-        return samples + self.size * self.random.standard_normal(samples.shape)
-
     def loose(self, samples: Floats, _s: float) -> Floats:
         """Alternating between two states, so that it is off for `size` of the time."""
         share = min(max(self.size, 1e-6), 1.0 - 1e-6)
@@ -121,9 +81,6 @@ class _Channel:
         if self.random.random() < odds / (_LOOSE_BLOCKS * max(share, 1.0 - share)):
             self.is_off = not self.is_off
         return np.zeros_like(samples) if self.is_off else samples
-
-    def coarse(self, samples: Floats, _s: float) -> Floats:
-        return np.round(samples / self.size) * self.size if self.size > 0.0 else samples
 
     def flipped(self, samples: Floats, _s: float) -> Floats:
         """As on the wire: in a 4-byte number."""
@@ -133,16 +90,34 @@ class _Channel:
             return carried.astype(np.float64)
         return samples
 
-    def hum(self, samples: Floats, since_s: float) -> Floats:
-        t_s = since_s + self.sample_s * np.arange(len(samples))
-        return samples + self.size * np.sin(2.0 * math.pi * _HUM_HZ * t_s)
+    def huge(self, samples: Floats, _s: float) -> Floats:
+        """In the middle of the block."""
+        samples[len(samples) // 2] = self.size
+        return samples
+
+    def times_s(self, samples: Floats, since_s: float) -> Floats:
+        """Times of the samples since the begin of the fault."""
+        return since_s + self.sample_s * np.arange(len(samples))
 
 
+# the samples shown, from the channel, the true samples and the time since the begin of the fault
 _KINDS: dict[str, Callable[[_Channel, Floats, float], Floats]] = {
-    made.__name__: made
-    for made in (
-        *(_Channel.off, _Channel.stuck, _Channel.frozen, _Channel.garbage, _Channel.scaled, _Channel.offset),
-        *(_Channel.delayed, _Channel.clipped, _Channel.nan, _Channel.huge, _Channel.drifting, _Channel.fading),
-        *(_Channel.jumping, _Channel.noise, _Channel.loose, _Channel.coarse, _Channel.hum, _Channel.flipped),
-    )
+    "off": lambda of, true, _: np.full_like(true, of.size),
+    "stuck": lambda of, true, _: np.full_like(true, of.before[-1]),
+    "frozen": lambda of, true, _: np.resize(of.before, true.shape),
+    "garbage": lambda of, true, _: of.random.uniform(-of.size, of.size, true.shape),
+    "scaled": lambda of, true, _: true * of.size,
+    "offset": lambda of, true, _: true + of.size,
+    "delayed": _Channel.delayed,
+    "clipped": lambda of, true, _: np.clip(true, -of.size, of.size),
+    "nan": lambda of, true, _: np.full_like(true, math.nan) if of.random.random() < of.size else true,
+    "huge": _Channel.huge,
+    "drifting": lambda of, true, since_s: true + of.size * of.times_s(true, since_s),
+    "fading": lambda of, true, since_s: true * max(1.0 + of.size * since_s, 0.0),
+    "jumping": lambda of, true, since_s: true if int(since_s / _JUMP_S) % 2 else true + of.size,
+    "noise": lambda of, true, _: true + of.size * of.random.standard_normal(true.shape),
+    "loose": _Channel.loose,
+    "coarse": lambda of, true, _: np.round(true / of.size) * of.size if of.size > 0.0 else true,
+    "hum": lambda of, true, since_s: true + of.size * np.sin(2.0 * math.pi * _HUM_HZ * of.times_s(true, since_s)),
+    "flipped": _Channel.flipped,
 }

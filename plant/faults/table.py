@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from bridge.config import Strict
-from bridge.wire.messages import CHANNELS
+from bridge.wire.channels import CHANNELS
 from plant.faults.kinds import BUS, KINDS, LARGEST, PROCESS, SENSORS, TARGETS, group_of
 
 _LONGEST_S = 1e9  # 30 years; a far longer time overflows the count of blocks

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cockpit.run.child_process import end_like_ctrl_c, guarded
+from cockpit.run.child_process import end_like_ctrl_c, exit_status_of
 from cockpit.run.writable import check_writable, writing
 
 app = typer.Typer(
@@ -45,7 +45,7 @@ def make(
     ] = GeneratorName.independent,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes to use; all cores if not given.")] = None,
 ) -> None:
-    """Make evidence folders whose names tell nothing, and a key with the answers.
+    """Make evidence folders with random names, and a key with the answers.
 
     That takes half a minute to a minute a case and core. It can be stopped and taken up again.
     """
@@ -62,7 +62,7 @@ def make(
             make_set(out, key, generator.value, cases, seed, jobs or cpu_count(), progress)
         print(f"{cases} cases    {out}\nkey         {key}\nnext        python -m bench blind run {out}")
 
-    sys.exit(guarded(work))
+    sys.exit(exit_status_of(work))
 
 
 if __name__ == "__main__":

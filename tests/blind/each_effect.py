@@ -16,10 +16,9 @@ from bench.blind.oracle import shrinkage_with
 from bench.blind.outcomes import Opened
 from bench.blind.scoring import score
 from bench.blind.table import TOOL, table
-from bridge.files import write_json
+from bridge.results import strict_json, write_json
 from diagnosis.diagnose import diagnose
 from diagnosis.evidence.folder import load_evidence
-from diagnosis.result import to_json
 from diagnosis.version import tool_version
 from tests.blind.generators import Plan
 from tests.blind.plant_cases import Plant, PlantEffect, drawn
@@ -56,7 +55,7 @@ def _one(kind: str, random: np.random.Generator, ask_oracle: bool) -> dict[str, 
         case = made("case", Plan(tuple(effects)))
         bench = Bench(made("rough", Plan()), made("smooth", Plan(smooth=True))) if effects else None
         limits = [bench.detectability(made(one.name, Plan((one,), smooth=True))) for one in effects] if bench else []
-        said = to_json(diagnose(load_evidence(case), lambda *_: None))
+        said = strict_json(diagnose(load_evidence(case), lambda *_: None))
         oracle = shrinkage_with(case, names) if ask_oracle else None
     answer = {
         "stratum": kind if kind in {NONE, TWO} else "one-effect",

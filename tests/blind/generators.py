@@ -1,4 +1,4 @@
-"""The generators of rigs for a blind set: one that shares nothing with the plant, and the plant itself."""
+"""The generators of rigs for a blind set: a generator that shares nothing with the plant, and the plant itself."""
 
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -42,7 +42,7 @@ class Generator(Protocol):
         ...
 
     def formula(self, effect: Any) -> str:
-        """An effect's formula and its numbers, for a person who reads the key."""
+        """An effect's formula and its numbers, for a reader of the key."""
         ...
 
     def make(self, folder: Path, plan: Plan, seed: int) -> None:

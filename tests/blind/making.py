@@ -15,7 +15,7 @@ import numpy as np
 
 from bench.blind.sealing import Answer, Secret, refuse_key_inside, write_key, write_set
 from bridge.faults import Fault
-from bridge.files import write_json
+from bridge.results import write_json
 from diagnosis.version import tool_version
 from tests.blind.generators import Effect, Generator, Plan, generator
 from tests.blind.real_logs import real_cases

@@ -2,7 +2,7 @@
 
 The baseline is fitted to two evidences of one rig, with the effect and without. The additional chi2 with the effect is the
 square of the length that a matched filter would see. Both evidences have a smooth surface: on a rough surface an effect also
-moves every slip to another place, which alone looks like two detection limits. The noise floor is that of the rough surface. A
+moves every slip to another place, which alone looks like two detection limits. The noise floor belongs to the rough surface. A
 detection limit is the length at which the log evidence of a single effect with one parameter reaches 8.
 
 A linear estimate, the difference without the nuisances' directions, is not enough (docs/method/diagnosis.md).
@@ -73,7 +73,7 @@ class Bench:
         problem = Problem(self._rig, [run for run in _runs(folder) if not run.holdout])
         fitter = Fitter(problem, self._floor(problem), self._nuisances)
         fit = _refitted(fitter, without.deviations)
-        # a better fit that only one of the two refits finds is no sign of the effect
+        # a better fit of only one of the two refits does not show the effect
         again = self._fitter.refit(NOTHING, fit.deviations, np.zeros(0))
         self._without = min(without, again, key=lambda one: one.chi2)
         as_before = self._without.chi2 / len(self._without.residual) * len(fit.residual)
@@ -127,7 +127,7 @@ def _measured(without: Problem, runs: list[Prepared], described: Point) -> Float
 
 
 def _differences(floor: Floor, without: Problem, there: Floats) -> Floats:
-    """Features [features] less those of the problem, in floors, [compared]."""
+    """Features [features] less the features of the problem, in floors, [compared]."""
     here = without.measured
     # `expected` adds noise that measured features hold already, so its bias is subtracted first
     apart = (floor.expected(there - floor.bias) - floor.expected(here - floor.bias))[floor.compared]

@@ -1,6 +1,6 @@
 """A small set with shorter runs and kept sizes, as sizing would take minutes of `make test`.
 
-`python -m tests.blind.small_set` sizes its effects anew and writes `small_set.toml`.
+`python -m tests.blind.small_set` sizes its effects again and writes `small_set.toml`.
 """
 
 import sys
@@ -34,7 +34,7 @@ class Part(NamedTuple):
     seeds: frozenset[int]
     visible: int  # single effects of two detection limits or more
     without_gap: int
-    jobs: int  # two processes of their own cost 30 s of CPU more than 1, which is this process; test_many.py has two
+    jobs: int  # two separate processes cost 30 s of CPU more than 1, which is this process; test_many.py has two
 
 
 SIZES = Path(__file__).with_suffix(".toml")

@@ -1,4 +1,4 @@
-"""Stand-ins without delay: a generator and a bench, where a strength s adds s to the force and is worth 4 s limits; cases."""
+"""Substitutes without delay: a generator and a bench, where a strength s adds s to the force and is worth 4 s limits; cases."""
 
 from pathlib import Path
 from typing import NamedTuple

@@ -25,7 +25,7 @@ BUT_FORCE_AND_DRIVE = (*ACCELERATIONS, "mass_position_m")
 
 
 class Unclear(NamedTuple):
-    """Effects that the remaining channels cannot tell apart, or only barely."""
+    """Effects that the remaining channels cannot separate, or only barely."""
 
     group: tuple[str, ...]
     leave_out: tuple[str, ...]

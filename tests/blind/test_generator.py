@@ -124,7 +124,7 @@ def test_no_strength_is_no_effect(busy):
 
 @pytest.mark.parametrize("name", ["force-sensor-gain", "static-level"])
 def test_the_counterfactual_has_the_same_rig_and_the_same_noise(name):
-    """What an effect does not touch yet differs by a count of the recorder at most: 0.1 um."""
+    """Signals before an effect acts differ by a count of the recorder at most: 0.1 um."""
     effect = draw_effect(np.random.default_rng(4), name)
     with_it, without = (simulate(Case(effects=e), 9, BUSY)[0] for e in ((effect,), ()))
     before = slice(0, 1000)  # 50 ms: the spring is below breakaway

@@ -1,4 +1,4 @@
-"""Rigs without a gap under other protocols than the blind check's: what a model cannot know must not count as a gap.
+"""Rigs without a gap under other protocols than the blind check's: facts that a model cannot know must not count as a gap.
 
 The figures of the models that called these rigs a gap are in docs/method/diagnosis.md.
 """
@@ -31,7 +31,7 @@ PROTOCOLS = {
         Plan(drive=((0.0, 0.17e-3),), vibration=((1.6, 802.0), (3.73, 2299.0), (5.87, 4250.0)), duration_s=8.0),
         HELD_OUT,
     ),
-    # hardly a block without vibration and slips, from which the noise of the accelerometers could be measured
+    # few blocks without vibration and slips, from which the noise of the accelerometers could be measured
     "shaken nearly throughout": (
         Plan(drive=((0.0, 1.5e-3),), duration_s=8.0),
         Plan(drive=((0.0, 0.5e-3),), duration_s=8.0),

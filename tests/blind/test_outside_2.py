@@ -1,4 +1,4 @@
-"""The second list of effects outside the library: each formula does what it says, and sets of it have no other."""
+"""The second list of effects outside the library: each formula behaves as described, and sets have no other effects."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Sizes in detection limits: little for what a refit can imitate, much for what it cannot."""
+"""Sizes in detection limits: small for an effect that a refit can imitate, large for one that it cannot."""
 
 import numpy as np
 import pytest

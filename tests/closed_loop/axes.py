@@ -36,7 +36,7 @@ def machine_axis(stiffness_N_per_m: float, velocity_mps: float = 5e-4, force_noi
 
 
 def told(stiffness_N_per_m: float, **more: Any) -> dict[str, Any]:
-    """A controller for such an axis that is told this stiffness of the drive."""
+    """A controller for such an axis, configured with this stiffness of the drive."""
     limits = {"amplitude_max_m": 1e-6, "slew_m_per_s": 1e-5}
     return {
         "contact_resonance_Hz": 587.0,

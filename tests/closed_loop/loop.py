@@ -1,19 +1,17 @@
-"""The controller on the rig, both in this process: what the loop does, sample by sample."""
+"""The controller on the rig, both in this process: the loop, sample by sample."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from bench.control import rules
-from bench.control.loop import Hum, JudgedLoop
 from bridge.config import validate
 from bridge.wire.messages import TRACE as TRACE_LAYOUT
 from bridge.wire.messages import sealed
 from bridge.wire.topics import TRACE
+from cockpit.run.closed_loop import ClosedLoop
 from controller.config import ControllerConfig
 from controller.node import ControllerNode
-from controller.records import build
 from plant.config import RigConfig
 from plant.node import PlantNode
 from plant.records import TRUTH
@@ -69,7 +67,7 @@ def close_the_loop(
     seed: int = 1,
     deliver: Callable[[int, bytes], bytes | None] | None = None,
 ) -> Loop:
-    """Run the loop in lockstep for `seconds`; `deliver` says what becomes of each block on its way, None for lost.
+    """Run the loop in lockstep for `seconds`; `deliver` returns each block as it arrives, None for a lost one.
 
     Without `deliver` a block takes 20 µs of compiled code, with it 150 µs; both make the same bits.
     """
@@ -78,11 +76,11 @@ def close_the_loop(
     blocks = round(seconds / rig_config.solver.block_s)
     if deliver is not None:
         return _block_by_block(blocks, rig_config, config, seed, deliver)
-    no_rule = rules.build(rules.NONE, rig_config, 0.0, 0.0, [1000.0])
-    loop = JudgedLoop(rig_config, seed, build(config), no_rule, False, Hum(0.0, 0.0, 0.0))
-    stretch = loop.advance(blocks)
-    truth = dict(zip(TRUTH, stretch.truth.reshape(len(TRUTH), blocks, -1), strict=True))
-    return _looped(stretch.traces, truth["true_drive_force_N"], truth["true_velocity_mps"])
+    stretch = ClosedLoop(rig_config, seed, config, arm=True).advance(blocks)
+    force_N, velocity_mps = (
+        stretch.truth[:, TRUTH.index(name)] for name in ("true_drive_force_N", "true_velocity_mps")
+    )
+    return _looped(stretch.trace, force_N, velocity_mps)
 
 
 def _looped(trace: Any, drive_force_N: Any, velocity_mps: Any) -> Loop:

@@ -1,4 +1,4 @@
-"""Faults of the sensors, laid on the blocks between rig and controller, and what the vibration truly does meanwhile."""
+"""Faults of the sensors, applied to the blocks between rig and controller, and the true vibration during them."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -16,12 +16,12 @@ from plant.config import RigConfig
 from plant.node import PlantNode
 from plant.piezo import base_velocity_mps
 
-Fault = Callable[[Any, int, "Memory"], None]  # the block's record [1], blocks since the fault came, what it remembers
+Fault = Callable[[Any, int, "Memory"], None]  # the block's record [1], blocks since the fault began, its memory
 CHANNELS = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m")
 
 
 class Memory:
-    """What a fault remembers: the first block that it met, and its own chance."""
+    """Memory of a fault: its first block, and its random generator."""
 
     def __init__(self) -> None:
         self.first: Any = None
@@ -110,7 +110,7 @@ def set_to(channel: str, value: float) -> Fault:
 
 
 def garbage(times: float) -> Fault:
-    """Every channel with noise, many times that of the paper's rig."""
+    """Every channel with many times the noise of the paper's rig."""
     rms = dict(zip(CHANNELS, (0.02, 0.0015, 0.0015, 5e-7, 5e-7), strict=True))
 
     def fault(block: Any, _at: int, memory: Memory) -> None:
@@ -121,7 +121,7 @@ def garbage(times: float) -> Fault:
 
 
 class Outcome(NamedTuple):
-    """What came of a fault."""
+    """Result of a fault."""
 
     over_s: float  # true v_a above 1.5 times the set point of 1.2 v_d
     peak: float  # true v_a over that set point
@@ -144,10 +144,10 @@ def suffer(
     mend_s: float = 1e9,
     operator: dict[int, int] | None = None,
 ) -> Outcome:
-    """Run a rig whose blocks come to the controller with a fault from `from_s` to `mend_s`.
+    """Run a rig whose blocks reach the controller with a fault from `from_s` to `mend_s`.
 
     Args:
-        operator: words of a person to the controller, by the number of the block.
+        operator: commands to the controller, by the number of the block.
 
     """
     own = rig or {"contact": {"pair": "C45-C45 @ 0.063"}, "drive": {"profile": [(0.0, speed_mps)]}}

@@ -13,13 +13,13 @@ import pytest
 
 from bench.control.drawn import drawn_axes
 from bridge.log.damage import Damage
-from bridge.wire.messages import CHANNELS
+from bridge.wire.channels import CHANNELS
 from cockpit.judge.run_judge import RunJudge
 from cockpit.judge.verdict import RunVerdict
 from cockpit.run.in_process import run_onboard
 from cockpit.run.scenario import Scenario
 from cockpit.run.sensor_needs import refuse_blind_sensors, refuse_out_of_travel
-from diagnosis.features.cycles import find_cycles, smallest_drop_N
+from diagnosis.slips import find_cycles, smallest_drop_N
 from plant.records import TRUTH, build
 from plant.simulate import drive_velocity_mps, run_blocks
 

@@ -1,4 +1,4 @@
-"""A healthy rig that a person arms: no word of a fault is said at its starts, stops and checks, and it vibrates as it should."""
+"""A healthy rig that an operator arms: its starts, stops and checks report no fault, and it vibrates as required."""
 
 import numpy as np
 import pytest
@@ -6,21 +6,21 @@ import pytest
 from bridge.guard.events import GuardEvents
 from bridge.guard.events import changes as guard_changes
 from bridge.wire import stickslip_pb2 as wire
-from cockpit.run.closed_loop import ClosedLoop, StretchMessages
+from cockpit.run.closed_loop import ClosedLoop, Stretch
 from cockpit.run.scenario import load_scenario
 from controller.trips.trip_events import TripEvents, changes
 
 ARM, DISARM = wire.Operator.ARM, wire.Operator.DISARM
 
 
-def played(name: str, seconds: float, words: dict[float, int]) -> tuple[set[str], list[StretchMessages]]:
-    """What guard and controller say in a run in which a person says `words`, at these times, and its blocks."""
+def played(name: str, seconds: float, words: dict[float, int]) -> tuple[set[str], list[Stretch]]:
+    """Reports of guard and controller in a run with these operator `words` at these times, and its blocks."""
     scenario = load_scenario(name, ["controller.policy.enabled_from_s=0.0"])
     loop = ClosedLoop(scenario.rig, scenario.seed, scenario.controller, arm=False)
     block_s = scenario.rig.solver.block_s
     guard, trips = GuardEvents(), TripEvents()
     said: set[str] = set()
-    parts: list[StretchMessages] = []
+    parts: list[Stretch] = []
     for at_s, ends_s in zip(words, [*list(words)[1:], seconds], strict=True):
         if loop.block < round(at_s / block_s):
             parts.append(loop.advance(round(at_s / block_s) - loop.block))

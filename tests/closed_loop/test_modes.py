@@ -1,4 +1,4 @@
-"""What the modes of the policy do in stop-and-go, and how a pair that needs nothing is let alone."""
+"""The modes of the policy in stop-and-go; a pair that needs no vibration is not vibrated."""
 
 from typing import Any
 
@@ -42,7 +42,7 @@ def test_settle_lets_the_vibration_die_out_after_a_move() -> None:
     settling = loop.trace[loop.trace["reason"] == wire.SETTLING]
     assert len(settling) == pytest.approx(400, abs=2)
     assert (np.diff(settling["wanted_velocity_mps"]) < 0.0).all()
-    assert 0.2 * 1.2 * 5e-4 < settling["wanted_velocity_mps"][0] < 1.2 * 5e-4  # it has fallen with the drive meanwhile
+    assert 0.2 * 1.2 * 5e-4 < settling["wanted_velocity_mps"][0] < 1.2 * 5e-4  # it has fallen with the drive
     assert loop.excited(2.1, 2.5) == 0.0
     assert _run("on-demand").excited(1.8, 2.5) == 0.0
 

@@ -1,4 +1,4 @@
-"""What the whole loop is for: stick-slip gone, v_a at or above v_d, whatever the exciter and the drive do."""
+"""The purpose of the loop: no stick-slip, v_a at or above v_d, for any exciter and drive."""
 
 from itertools import pairwise
 
@@ -226,7 +226,7 @@ def test_lost_blocks_do_not_disturb_the_measured_velocity(pause_blocks: int) -> 
 @pytest.mark.parametrize("unreadable", [False, True], ids=["lost", "no numbers"])
 @pytest.mark.parametrize("from_block", [0, 3000])
 def test_blocks_that_keep_failing_do_not_make_it_blind(every_blocks: int, unreadable: bool, from_block: int) -> None:
-    """Neither window ever holds 20 whole blocks; the drive goes from 0.5 to 0.8 mm/s meanwhile."""
+    """Neither window ever holds 20 whole blocks; the drive goes from 0.5 to 0.8 mm/s."""
 
     def deliver(block: int, payload: bytes) -> bytes | None:
         if block < from_block or block % every_blocks:

@@ -9,10 +9,10 @@ import pytest
 from bridge.log.logfile import STREAMING, RunData, read_run
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.clock import time
-from cockpit.run.in_process import run_onboard
+from cockpit.run.in_process import TimedAction, run_onboard
 from cockpit.run.scenario import Scenario, load_scenario
 from cockpit.run.simulated.log import run_with_faults
-from cockpit.run.simulated.run import ScriptedAction, SimulatedRun
+from cockpit.run.simulated.run import SimulatedRun
 from controller.replay import Change, replay
 from plant.faults.table import FaultTable
 
@@ -74,7 +74,7 @@ def test_a_controller_that_is_frozen_is_told_and_nothing_arms_by_itself(tmp_path
 
 
 def test_a_person_arms_the_rig_and_the_truth_is_the_rigs() -> None:
-    run = SimulatedRun(scenario(2.2), [ScriptedAction(0.02, wire.Operator.ARM)], arm=False)
+    run = SimulatedRun(scenario(2.2), [TimedAction(20_000_000, wire.Operator.ARM)], arm=False)
     truth = run.play()
     assert len(truth.t_s) >= 2200
     np.testing.assert_allclose(truth.drive_mps[10:], 5e-4, rtol=1e-6)

@@ -1,4 +1,4 @@
-"""Sensors that fail while it vibrates: the vibration stays within bounds, and a word says what it is."""
+"""Sensors that fail while it vibrates: the vibration stays within bounds, and an event names the fault."""
 
 from typing import Any
 

@@ -8,13 +8,12 @@ import pytest
 from bridge.faults import Fault
 from bridge.log.logfile import RunData, read_run
 from bridge.log.runlog import RunLog
-from bridge.wire.messages import ANNOUNCE
+from bridge.wire.messages import ANNOUNCE, ANNOUNCED, BLOCK
 from cockpit.run.closed_loop import ClosedLoop
 from cockpit.run.in_process import run_onboard
 from cockpit.run.replay import changes_of
 from cockpit.run.scenario import Scenario, header, load_scenario
 from controller.announced import MOST_ANNOUNCED
-from controller.codes import ANNOUNCED, BLOCK
 from controller.node import ControllerNode
 from controller.replay import replay
 from plant.config import MOST_BLOCKS_AHEAD

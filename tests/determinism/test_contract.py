@@ -66,7 +66,7 @@ def test_twice_over_the_bus_and_in_one_process_are_the_same_bytes(tmp_path: Path
         # both phases and six snapshots in fewer blocks
         shorter = ["--set", "duration_s=6.0", "--set", "controller.policy.enabled_from_s=2.0"]
         arguments = ["--lockstep", "--scenario", "paper-c45-c45", "--seed", "1", *shorter, *more, "--log", str(log)]
-        if more == ["--in-process"]:  # a process of its own imports for 2 s of CPU
+        if more == ["--in-process"]:  # a separate process imports for 2 s of CPU
             assert CliRunner().invoke(app, ["run", *arguments]).exit_code == 0
             continue
         subprocess.run(

@@ -8,9 +8,9 @@ import pytest
 from bridge.log.logfile import RunData, read_run
 from bridge.log.runlog import RunLog
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import BLOCK, RESET, STOP
 from cockpit.run.in_process import TimedAction, run_onboard
 from cockpit.run.scenario import Scenario, header, load_scenario
-from controller.codes import BLOCK, RESET, STOP
 from controller.node import ControllerNode
 from controller.replay import Change
 from plant.node import PlantNode
@@ -31,16 +31,16 @@ def block_by_block(scenario: Scenario, log: Path, changes: list[Change], words: 
     for role in ("controller", "plant"):
         written.add_header(header(scenario, role, lockstep=True))
     commands: list[bytes] = []
-    ahead, to_say = list(changes), list(words)
+    ahead, due = list(changes), list(words)
     while plant.block < round(scenario.duration_s * 1e3):
         t_ns = (plant.block + 1) * plant.block_ns
-        for word in (word for word in to_say if t_ns >= word.t_ns):
+        for word in (word for word in due if t_ns >= word.t_ns):
             plant.apply_order(word.action)
         messages = [*plant.advance(commands)]
         while ahead and t_ns >= ahead[0].t_ns:
             controller.reconfigure(ahead.pop(0).config)
-        while to_say and t_ns >= to_say[0].t_ns:
-            controller.operator(to_say.pop(0).action)
+        while due and t_ns >= due[0].t_ns:
+            controller.operator(due.pop(0).action)
         command = controller.block(messages[0].payload)
         assert command is not None
         commands = [command.payload]

@@ -119,7 +119,7 @@ def test_a_recorder_that_lost_the_steps_after_a_snapshot_costs_only_until_the_ne
     log: Path, from_s: float
 ) -> None:
     run = read_run(log)
-    lost = (run.trace["sequence"] >= 2000) & (run.trace["sequence"] < 2010)  # the memory is that of step 1999
+    lost = (run.trace["sequence"] >= 2000) & (run.trace["sequence"] < 2010)  # the memory is from step 1999
     if from_s == 0.0:  # a resume at step 2000 as well
         lost |= run.trace["sequence"] == 1500
     result = replay(run._replace(trace=run.trace[~lost]), changes_of(run, []), from_s)
@@ -272,7 +272,7 @@ def to_a_live_controller(log: Path, again: Path) -> list[int]:
 
 
 def told_whole(run: RunData) -> bool:
-    """Whether the log says of nothing that it was lost, and of its controller that it came to its end."""
+    """Whether the log reports no loss, and the end of its controller."""
     ends = [event.text for event in run.events if (event.source, event.code) == ("controller", "END")]
     lost = {"GAP", "RESTART", "DROPPED", "STALE", "PLANT_LOST"} & {event.code for event in run.events}
     return not lost and len(ends) == 1 and ends[0].endswith("dropped=0")

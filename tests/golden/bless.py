@@ -28,7 +28,7 @@ def make(name: str, path: Path) -> None:
 
 
 def bless(reason: str) -> None:
-    """Record all situations anew, with their figures and the reason."""
+    """Record all situations again, with their figures and the reason."""
     figures = ["# Figures of the golden logs: each may lie between its two numbers. Written by make bless."]
     for name in situations():
         path = FOLDER / f"{name}.mcap"

@@ -30,7 +30,7 @@ def test_replay_is_identical(name: str) -> None:
     if json.loads(run.headers["controller"]["versions"])["processor"] == processor():
         assert result.difference is None, result.difference
         return
-    # another processor: the last bit of a sine may differ, what is decided may not
+    # another processor: the last bit of a sine may differ, decisions may not
     again = answers(run)
     assert np.array_equal(again["mode"], run.trace["mode"])
     for field in ("score", "force_rate", "vibration_velocity_mps", "wanted_amplitude_m"):

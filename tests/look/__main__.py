@@ -17,7 +17,7 @@ _PERIODS = 25  # of stick-slip in a record; fewer slips: the intervals are of th
 _FEWEST_SLIPS = 8
 _LARGEST_STEP_PERIODS = 1 / 60  # of the swing: longer steps do not show how a slip falls
 _AT_REST = 0.02  # of the drive's velocity: the slide creeps in presliding
-WITHIN = 0.01  # what the tables of tribologists are read to
+WITHIN = 0.01  # precision of tables in tribology
 
 
 class Drawn(NamedTuple):
@@ -30,7 +30,7 @@ class Drawn(NamedTuple):
     noise_N: float
 
     def truth(self, made: Simulation) -> dict[str, float]:
-        """What `look` is to find. F_s is the force at breakaway, without noise: that of the friction law depends on the climb."""
+        """The true numbers. F_s is the force at breakaway, without noise: the F_s of the friction law depends on the climb."""
         contact = self.rig.contact
         fast = np.diff((made.velocity_mps > self.speed_mps).astype(int), prepend=0, append=0)
         long_s = (np.flatnonzero(fast == -1) - np.flatnonzero(fast == 1)) * (made.t_s[1] - made.t_s[0])
@@ -39,7 +39,7 @@ class Drawn(NamedTuple):
             "kinetic_force_N": contact.coulomb_force_N,
             "stiffness_N_per_m": self.rig.drive.stiffness_N_per_m,
             "mass_kg": self.rig.slide.mass_kg,
-            # the force climbs while the drive is faster than the slide; what is much shorter is the ring after a re-stick
+            # the force climbs while the drive is faster than the slide; much shorter climbs are the ring after a re-stick
             "slip_s": float(np.median(long_s[long_s > 0.5 * np.quantile(long_s, 0.9)])),
         }
 

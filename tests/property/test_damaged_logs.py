@@ -1,4 +1,4 @@
-"""Cut and damaged logs: what lies before the damage is read, what can be saved is, and only a Fault is ever raised."""
+"""Cut and damaged logs: messages before the damage are read, readable ones recovered, and only a Fault is raised."""
 
 import contextlib
 import threading
@@ -46,7 +46,7 @@ def chunk_ends() -> list[int]:
 
 
 def ends_of_header() -> int:
-    """Where the header record ends, which says whose file it is."""
+    """End of the header record, which identifies the writer."""
     return 8 + 9 + int.from_bytes(short_log()[9:17], "little")
 
 
@@ -79,7 +79,7 @@ def test_a_cut_costs_only_the_open_chunk(tmp_path: Path, share: float) -> None:
     for name in TABLES:
         assert getattr(again, name).tobytes() == getattr(run, name).tobytes()
     assert again.headers == run.headers
-    with saved.open("rb") as file:  # the index is one that other programs can use
+    with saved.open("rb") as file:  # other programs can use the index
         assert sum(1 for _ in make_reader(file).iter_messages()) == result.messages
 
 
@@ -91,7 +91,7 @@ def test_a_flipped_bit_costs_one_chunk_at_most(tmp_path: Path, share: float, bit
     data[at] ^= 1 << bit
     path, saved = tmp_path / "flipped.mcap", tmp_path / "saved.mcap"
     path.write_bytes(data)
-    if at < ends_of_header():  # magic and header: whose file it is cannot be told any more
+    if at < ends_of_header():  # magic and header: the writer is unknown
         with contextlib.suppress(Fault):
             recover(path, saved)
         return
@@ -109,7 +109,7 @@ def test_a_flipped_bit_costs_one_chunk_at_most(tmp_path: Path, share: float, bit
 def test_every_byte_of_the_definitions_may_be_damaged(tmp_path: Path, data: st.DataObject) -> None:
     content = bytearray(short_log())
     first = chunk_ends()[0]
-    # strings hold most of the bytes; what is around them is more interesting
+    # strings hold most of the bytes; the bytes around them matter more
     at = data.draw(st.one_of(st.integers(8, 60), st.integers(8, first - 1), st.integers(first - 1500, first - 1)))
     content[at] = data.draw(st.integers(0, 255))
     path = tmp_path / "flipped.mcap"
@@ -213,7 +213,7 @@ def test_a_log_that_a_fault_has_closed_can_be_closed_again(tmp_path: Path, monke
     log = RunLog(tmp_path / "run.mcap", lockstep=True)
     log.write(SENSORS, block(0))
 
-    def full() -> None:
+    def full(index: bool = True) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(log._files.writer, "finish", full)
@@ -274,7 +274,8 @@ def test_a_rig_that_leaves_before_its_first_word_ends_the_record(tmp_path: Path)
     log = RunLog(tmp_path / "run.mcap", lockstep=False)
     bus: Any = Left()
     inbox: Any = Quiet()
-    assert recorder._record(log, bus, inbox, threading.Event(), None, Complaints(log.add_event)) is True
+    dropped, complaints = recorder._Dropped(log, inbox), Complaints(log.add_event)
+    assert recorder._record(log, bus, inbox, threading.Event(), None, dropped, complaints) is True
     log.close()
     assert [event.code for event in read_run(log.path).events] == ["PLANT_LOST"]
 
@@ -310,6 +311,7 @@ def test_a_stop_ends_the_record_of_a_rig_that_goes_on(tmp_path: Path, monkeypatc
     stop.set()
     bus: Any = None
     inbox: Any = Endless()
-    assert recorder._record(log, bus, inbox, stop, None, Complaints(log.add_event)) is False
+    dropped, complaints = recorder._Dropped(log, inbox), Complaints(log.add_event)
+    assert recorder._record(log, bus, inbox, stop, None, dropped, complaints) is False
     assert inbox.count > 0
     log.close()

@@ -1,4 +1,4 @@
-"""Damaged tables of every format: they are read, or a Fault says so; no reader's own error reaches a person."""
+"""Damaged tables of every format: they are read, or a Fault names the damage; no other exception of a reader escapes."""
 
 from functools import cache
 from pathlib import Path
@@ -72,7 +72,7 @@ def check(folder: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, many: int)
     random = np.random.default_rng(5)
     path = folder / f"damaged{suffix}"
     if suffix == ".mat":
-        # without the trial in a process of its own, which takes a second
+        # without the trial in a separate process, which takes a second
         monkeypatch.setattr(mat, "_loaded", lambda at: scipy.io.loadmat(at, squeeze_me=True, struct_as_record=False))
     for _ in range(many):
         path.write_bytes(damaged(sound(suffix), random))

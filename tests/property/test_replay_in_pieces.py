@@ -112,7 +112,7 @@ def test_the_answer_is_that_of_the_log_in_whole(seed: int, from_s: float, disord
     try:
         found = in_pieces(run, changes, from_s, chance, apart_ms)
     except OutOfOrder:
-        # what comes within the window is no disorder; but snapshots, from the last of which before `from_s` it begins, are
+        # messages within the window are not disordered; snapshots, the last of which before `from_s` is the start, are
         # further apart than this window
         assert disorder or from_s
     else:
@@ -131,7 +131,7 @@ def test_nothing_is_kept_of_a_log_in_order() -> None:
 
 
 def passes_of(path: Path, monkeypatch: pytest.MonkeyPatch) -> int:
-    """How often a log is read for a replay, whose answer is that of the log in whole."""
+    """How often a log is read for a replay, whose result equals the replay of the whole log."""
     whole_logs: list[RunData] = []
     with monkeypatch.context() as patch:
         patch.setattr(replaying, "read_run", lambda path: whole_logs.append(read_run(path)) or whole_logs[-1])

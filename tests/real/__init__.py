@@ -1,1 +1,1 @@
-"""Measured data that nobody here made, as evidence: what was known beforehand, and what the diagnosis made of it."""
+"""Measured data of others as evidence: facts known in advance, and the diagnosis."""

@@ -1,4 +1,4 @@
-"""Diagnose the measured logs beside the repository and print the figures of docs/quality/results.md."""
+"""Diagnose the measured logs next to the repository and print the figures of docs/quality/results.md."""
 
 import argparse
 import json
@@ -6,11 +6,11 @@ import sys
 import tempfile
 from pathlib import Path
 
+from bridge.results import strict_json
 from diagnosis.diagnose import diagnose
 from diagnosis.evidence.folder import load_evidence
 from diagnosis.processes import one_thread
 from diagnosis.report.page import write_report
-from diagnosis.result import to_json
 from tests.real.evidences import AXIS, EVIDENCES, MISSING, SLIDER
 from tests.real.known import known
 from tests.real.table import lines, of_latent, of_relations
@@ -57,7 +57,7 @@ if __name__ == "__main__":
                 told.budget,
             )
         write_report(found, name, told.out / f"{name}.html")
-        results[name] = to_json(found)
+        results[name] = strict_json(found)
         print("\n".join([name, *(f"  {line}" for line in lines(found))]), flush=True)
     if told.json:
         told.json.write_text(json.dumps(results, indent=1), encoding="utf-8")

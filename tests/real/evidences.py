@@ -1,6 +1,6 @@
-"""Evidence folders out of the public logs beside the repository. The rig tables hold what their publishers state.
+"""Evidence folders from the public logs next to the repository. The rig tables hold what their publishers state.
 
-What they do not state is read off the record with a ruler, or taken from the literature on such contacts, and gets a wide
+Other numbers are read off the record with a ruler, or taken from the literature on such contacts, and gets a wide
 tolerance. No number here comes from a fit of this project.
 """
 
@@ -27,7 +27,7 @@ Sensor = Callable[[Floats, Floats], Floats]
 
 
 def faithful(_t_s: Floats, force_N: Floats) -> Floats:
-    """What a sensor without fault shows of a force [N] over time [s]; tests/blind/real_logs.py has others."""
+    """Signal of a sensor without fault for a force [N] over time [s]; tests/blind/real_logs.py has others."""
     return force_N
 
 
@@ -49,7 +49,7 @@ class Cut(NamedTuple):
 class Levels(NamedTuple):
     """Friction over weight, with a ruler on the whole log: mean of the peaks, and of peaks and troughs.
 
-    An undamped slider on a spring falls as far below the sliding friction as it was above it at breakaway.
+    An undamped slider on a spring falls as far below the sliding friction as it starts above it at breakaway.
     """
 
     static: float
@@ -114,7 +114,7 @@ def slider(
 
 
 _N_PER_V = 35.15
-# friction, mass and viscous damping as published; what the paper does not give, as for a ball screw with seals
+# friction, mass and viscous damping as published; the other numbers as for a ball screw with seals
 AXIS_MANIFEST = """
 format = "evidence/1"
 [rig]
@@ -176,7 +176,7 @@ def _speeds(folder: Path) -> None:
         Cut("k168Nm_v1100", 1.1e-3, 0.0, 9.0),
         Cut("k168Nm_v4300", 4.3e-3, 0.0, 3.8, holdout=True),
     )
-    slider(folder, 168.0, Levels(0.35, 0.32), cuts)  # between those of the two fitted logs
+    slider(folder, 168.0, Levels(0.35, 0.32), cuts)  # between the levels of the two fitted logs
 
 
 def _stiff(folder: Path) -> None:

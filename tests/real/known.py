@@ -1,4 +1,4 @@
-"""What plain rulers and straight-line fits say about the measured logs, before any diagnosis; nothing here comes from it."""
+"""Results of rulers and straight-line fits on the measured logs, independent of any diagnosis."""
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,7 @@ _LOGS = {  # drive velocity [m/s], stiffness [N/m]
     "k2254Nm_v42": (4.2e-5, 2254.0),
 }
 _WAVES_M = np.linspace(0.002, 0.007, 251)
-_DROP = 0.015  # of the weight: a smaller fall is no slip
+_DROP = 0.015  # of the weight: a smaller fall is not a slip
 
 
 def known() -> list[str]:
@@ -59,7 +59,7 @@ def _wave(at_m: Floats, value: Floats) -> tuple[float, float, float]:
 
 
 def _axis() -> list[str]:
-    """The published regression again, and what further terms take of what it leaves."""
+    """The published regression again, and the part of its residual that further terms explain."""
     log = scipy.io.loadmat(AXIS / "DATA_EMPS.mat")
     q_m, force_N = log["qm"].ravel(), float(log["gtau"].item()) * log["vir"].ravel()
     v, a = (savgol_filter(q_m, 61, 3, order, delta=1e-3) for order in (1, 2))

@@ -1,4 +1,4 @@
-"""The figures of one diagnosis, a few lines of text: what docs/quality/results.md quotes."""
+"""The figures of one diagnosis, a few lines of text, which docs/quality/results.md quotes."""
 
 from bridge.units import percent, times
 from diagnosis.evidence.folder import Evidence
@@ -39,7 +39,7 @@ def lines(found: Diagnosis) -> list[str]:
 
 
 def of_relations(evidence: Evidence) -> list[str]:
-    """What the relations between channels show: sizes, shares on the held-out runs, what is left out."""
+    """The relations between channels: sizes, shares on the held-out runs, omitted relations."""
     runs = prepare(evidence)
     relations = relations_of(evidence.rig, runs)
     said = [line for one in relations.answered for line in _relation(one)]
@@ -53,7 +53,7 @@ def of_relations(evidence: Evidence) -> list[str]:
 
 
 def of_latent(evidence: Evidence) -> list[str]:
-    """What the friction goes with: what differs on the held-out runs, and the shares of it."""
+    """Latent friction: the variation on the held-out runs, and its shares."""
     said: list[str] = []
     for one in latent_of(evidence.rig, prepare(evidence)):
         once = "" if one.revisited else "; each place once"

@@ -1,4 +1,4 @@
-"""What the diagnosis makes of measured logs, where that is robust; its errors are in docs/quality/results.md."""
+"""Robust results of the diagnosis on measured logs; its errors are in docs/quality/results.md."""
 
 from pathlib import Path
 
@@ -25,7 +25,7 @@ def diagnosed(folder: Path) -> Diagnosis:
 def test_what_is_known_is_in_the_logs() -> None:
     said = known()
     wavelengths_mm = [float(line.split(" mm")[0].split()[-1]) for line in said[:5]]
-    assert all(3.4 < wavelength_mm < 4.4 for wavelength_mm in wavelengths_mm)  # said beside the data: 3.7 to 4.3 mm
+    assert all(3.4 < wavelength_mm < 4.4 for wavelength_mm in wavelengths_mm)  # published with the data: 3.7 to 4.3 mm
     left_N = [float(line.split()[-3]) for line in said[5:]]
     assert left_N == sorted(left_N, reverse=True)
     offset_N = float(said[6].split("(")[1].split(")")[0])

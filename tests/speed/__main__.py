@@ -1,6 +1,6 @@
 """Run every bench, one after the other so that none slows another; exit 1 if one misses its bar.
 
-`--quick`: fewer repetitions, shorter runs, and without what takes minutes.
+`--quick`: fewer repetitions, shorter runs, and no part of some minutes.
 """
 
 import sys
@@ -8,7 +8,7 @@ import time
 
 from tests.speed import cycles, diagnosis, effects, files, kernel, loop, old_version, replay, side_by_side
 
-# the diagnosis first: its memory counts this process too, and what the others leave in it
+# the diagnosis first: its memory counts this process too, with the rest of the others in it
 BENCHES = [
     diagnosis.bench,
     kernel.bench,

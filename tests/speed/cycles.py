@@ -3,8 +3,8 @@
 import time
 from statistics import median
 
-from diagnosis.features.cycles import find_cycles
-from tests.unit.diagnosis.features.test_cycles import sawtooth
+from diagnosis.slips import find_cycles
+from tests.unit.diagnosis.test_slips import sawtooth
 
 SECONDS = 20.0
 RATE_HZ = 20000

@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from bridge.wire.messages import CHANNELS
+from bridge.wire.channels import CHANNELS
 from diagnosis.diagnose import diagnose
 from diagnosis.evidence.folder import load_evidence
 from diagnosis.features.segments import CommandedRun
@@ -26,7 +26,7 @@ from tests.speed import case as paper
 LIMIT_S, FIRST_LIMIT_S, LIMIT_GB = 60.0, 5.0, 1.5
 JOBS = 2
 # nothing, an effect that every run shows, and two, for which a second search is made; in the last one the library has
-# no name for what is wrong, and every form of every effect is refitted before that is said
+# a cause without a name: every form of every effect is refitted before the answer
 UNKNOWN = "unknown effect"
 CASES: dict[str, dict[str, dict[str, float | str]]] = {
     "no effect": {},
@@ -72,7 +72,7 @@ def bench(quick: bool = False) -> bool:
 
 
 def _seconds(name: str) -> tuple[float, float, str]:
-    """Seconds to the first figure and to the end, and the verdict with what was named: a quick wrong answer is none."""
+    """Seconds to the first figure and to the end, and the verdict with its names: a quick wrong answer does not count."""
     with tempfile.TemporaryDirectory() as folder:
         make_evidence(Path(folder) / "bench", Case(effects=CASES[name]), seed=31)
         if name == UNKNOWN:

@@ -1,4 +1,4 @@
-"""What the effects cost: the disturbed kernel beside the nominal one, and each effect on top of it, in one run."""
+"""Cost of the effects: the disturbed kernel compared with the nominal one, and each effect in addition, in one run."""
 
 import time
 from statistics import median
@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bridge.wire.messages import CHANNELS
+from bridge.wire.channels import CHANNELS
 from plant.config import RigConfig
 from plant.effects.library import EFFECTS
 from plant.records import TRUTH, build
@@ -58,7 +58,7 @@ def rows() -> list[Row]:
 
 
 def bench(quick: bool = False) -> bool:
-    """Print the table, not where it has to be quick; True, as there is no bar."""
+    """Print the table, except in a quick run; True, as there is no bar."""
     if quick:
         return True
     table = rows()

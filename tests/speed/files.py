@@ -1,4 +1,4 @@
-"""How fast files are read: a log beside the official reader, a table of text beside NumPy, and `look` at that table."""
+"""Speed of reading: a log against the official reader, a table of text against NumPy, and `look` at that table."""
 
 import tempfile
 import time
@@ -15,7 +15,7 @@ from cockpit.run.in_process import run_onboard
 from cockpit.run.scenario import load_scenario
 from diagnosis.evidence.import_table import import_file
 from diagnosis.look.look import RecordFacts, look
-from tests.unit.diagnosis.features.test_cycles import sawtooth
+from tests.unit.diagnosis.test_slips import sawtooth
 
 SECONDS = 20.0
 RATE_HZ = 20_000

@@ -1,4 +1,4 @@
-"""How fast the rig's kernel is beside SciPy's stiff solvers and MuJoCo, all held to one slip-time error."""
+"""Speed of the rig's kernel against SciPy's stiff solvers and MuJoCo, all at one slip-time error."""
 
 import importlib.util
 import math
@@ -23,7 +23,7 @@ analogue filters; the others solve slide and friction only, SciPy with a compile
 
 
 class Rival(NamedTuple):
-    """A solver and its settings, cheapest first: the first that keeps the error is the one that is timed."""
+    """A solver and its settings, cheapest first: the first that keeps the error is timed."""
 
     name: str
     solver: Solver
@@ -79,7 +79,7 @@ def rivals(quick: bool = False) -> list[Rival]:
 
 
 def _choose(case: Case, rival: Rival) -> Row:
-    """The first setting within the limit, else the most accurate. What it calls is warm afterwards."""
+    """The first setting within the limit, else the most accurate. Its functions are compiled afterwards."""
     best = Row(rival, rival.settings[0], math.inf, [math.nan])
     for setting in rival.settings:
         if rival.solver is ours and setting * 20.0 * case.frequency_Hz > 1.0 + 1e-9:

@@ -1,4 +1,4 @@
-"""The latent friction on made rows whose shares are known, beside a one-way analysis of variance over bins.
+"""The latent friction on made rows whose shares are known, compared with a one-way analysis of variance over bins.
 
 `python -m tests.speed.latent_friction SEED RECORDS`: one table. The rows are made of formulas that the model does not have:
 sines, bumps, steps and random paths along the track, settling drifts, falling and rising friction laws, scatter with long tails.
@@ -113,7 +113,7 @@ def _binned(values: Floats, bins: int) -> npt.NDArray[np.int64]:
 
 
 def _share(found: LatentSignal, what: str) -> tuple[float, tuple[float, float], bool]:
-    """Share, interval, and whether it is more than chance; what goes with place is that of a rough track as well."""
+    """Share, interval, and whether it is more than chance; the share of place includes a rough track."""
     own = [one for one in found.shares if one.what == what]
     if not own:
         return 0.0, (0.0, 0.0), False

@@ -1,4 +1,4 @@
-"""The loop in real time beside bare ping-pongs of the same minutes, and lockstep beside its limit."""
+"""The loop in real time compared with plain ping-pongs of the same minutes, and lockstep with its limit."""
 
 import tempfile
 from pathlib import Path
@@ -39,7 +39,7 @@ def bench(quick: bool = False) -> bool:
 
 
 def _real_time(log: Path, seconds: float, pings: int) -> dict[str, float]:
-    """Print the loop beside ping-pongs before and after it; the medians [us] by kind, and under "kept" 1 for all bars kept."""
+    """Print the loop with ping-pongs before and after it; the medians [us] by kind, and under "kept" 1 for all bars kept."""
     print(
         f"\nreal time: {seconds:g} s at 1000 blocks/s, block out to command in, beside ping-pongs of the same minutes"
     )

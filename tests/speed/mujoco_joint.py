@@ -22,7 +22,7 @@ def mujoco(case: Case, setting: tuple[str, float]) -> Run:
 
     integrator, step_s = setting
     # input="none" and a motor constant of 1e-6: friction only, with a back-EMF drag of 1e-12 N s/m. The drive
-    # spring is an actuator of its own; its activation is s_d, integrated from its control, the velocity v_d.
+    # spring is a separate actuator; its activation is s_d, integrated from its control, the velocity v_d.
     model = mj.MjModel.from_xml_string(f"""
         <mujoco>
           <option timestep="{step_s!r}" gravity="0 0 0" integrator="{integrator}">

@@ -1,4 +1,4 @@
-"""This version beside an older one, in turns on the same machine: what was gained since."""
+"""This version and an older one in turns on the same computer."""
 
 import io
 import os
@@ -19,7 +19,7 @@ RUN_S = 20.0  # simulated, in one process
 
 
 class Gain(NamedTuple):
-    """What is compared, and how many times as fast this version has to be."""
+    """A comparison, and the required ratio of the speeds."""
 
     name: str
     work: str  # of `version_worker`
@@ -27,11 +27,11 @@ class Gain(NamedTuple):
 
 
 GAINS = [
-    # with the old controller in both versions the bars were 7 and 1.9; 70 % of each for the one that estimates in both directions
+    # with the old controller in both versions the bars were 7 and 1.9; now 70 % of each: both directions are estimated
     Gain("in one process, log written", "in_process", 4.9),
     Gain("replay, reading included", "replay", 1.33),
     Gain("the rig's kernel, no vibration", "plant", 3.3),
-    # it estimates in both directions, learns, and judges the contact every millisecond: half as much again is what that may cost
+    # it estimates in both directions, learns, and judges the contact every millisecond: this may cost half as much again
     Gain("the controller's steps", "controller", 0.667),
     # no slower; the scatter of medians of turns on a shared machine is some 5 %
     Gain("the rig's kernel, 3 kHz", "vibrated", 0.95),
@@ -39,7 +39,7 @@ GAINS = [
 
 
 class _Version:
-    """A version at work in a process of its own."""
+    """A version in a separate process."""
 
     def __init__(self, name: str, tree: Path, folder: Path) -> None:
         self._process = subprocess.Popen(
@@ -52,7 +52,7 @@ class _Version:
         )
 
     def answer(self) -> str:
-        """The next line that it says."""
+        """Its next line."""
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
         if not line:

@@ -25,7 +25,7 @@ PING, PONG = bytes(428), bytes(60)  # a SensorBlock, a Command
 _DEFAULT = "()"  # Zenoh's own threads; without it `bridge.wire.zenoh_link` sets one thread
 _START_S = 60.0  # a first start compiles
 
-# what a ping-pong goes over; see `_ends`
+# the medium of a ping-pong; see `_ends`
 PLAIN, SETTINGS, CHANNEL = "zenoh-callback", "zenoh-settings", "zenoh-channel"
 SOCKET, MEMORY = "socket", "memory"
 NAMES = {
@@ -43,12 +43,12 @@ class End(NamedTuple):
     """One end of a ping-pong."""
 
     send: Callable[[], Any]
-    receive: Callable[[], Any]  # waits for the other end; what is false ends the echo
+    receive: Callable[[], Any]  # waits for the other end; a false value ends the echo
     close: Callable[[], Any]
 
 
 def measure(kind: str, pings: int) -> Nanoseconds:
-    """Round trips [ns], of `pings` at 1000 a second, between two processes of their own: what they ask for stays there."""
+    """Round trips [ns], of `pings` at 1000 a second, between two separate processes, which keep their priorities."""
     environment = dict(os.environ)
     if kind in {PLAIN, CHANNEL}:
         environment["ZENOH_RUNTIME"] = _DEFAULT
@@ -192,7 +192,7 @@ def _answer(cell: npt.NDArray[np.int64], pings: int, looks: int) -> bool:
     for number in range(1, pings + 1):
         if not _await(cell, 0, number, looks):
             return False
-        cell[8] = number  # on a cache line of its own
+        cell[8] = number  # on a separate cache line
     return True
 
 

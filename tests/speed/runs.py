@@ -1,4 +1,4 @@
-"""Runs as a person starts them, for benches: their results and how long they took."""
+"""Runs by the command, for benches: their results and durations."""
 
 import json
 import subprocess
@@ -14,7 +14,7 @@ FROM_THE_START = ("--set", "controller.policy.enabled_from_s=0.0")
 
 
 def start(log: Path, seconds: float, *more: str) -> "subprocess.Popen[str]":
-    """A run on an endpoint of its own."""
+    """A run on a separate endpoint."""
     arguments = ["--set", f"duration_s={seconds}", "--endpoint", free_endpoint(), "--log", str(log), "--json", *more]
     return subprocess.Popen(
         [sys.executable, "-m", "cockpit", "run", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -22,7 +22,7 @@ def start(log: Path, seconds: float, *more: str) -> "subprocess.Popen[str]":
 
 
 def result(run: "subprocess.Popen[str]") -> dict[str, Any]:
-    """What a run says at its end, of a fault too."""
+    """Last output of a run, also of a fault."""
     out, err = run.communicate(timeout=300)
     try:
         return json.loads(out)
@@ -46,6 +46,6 @@ def timed(logs: list[Path], seconds: float, *more: str) -> tuple[list[dict[str, 
 
 
 def bar(name: str, value: float, good: bool, rule: str) -> bool:
-    """Print a figure beside its bar; whether it is kept."""
+    """Print a figure with its bar; True if it is kept."""
     print(f"  {name:<44} {value:8.2f}   {rule:<18} {'PASS' if good else 'FAIL'}")
     return good

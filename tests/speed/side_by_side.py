@@ -48,7 +48,7 @@ def _times(results: list[dict[str, Any]]) -> str:
 
 
 def _lockstep(folder: Path, seconds: float) -> bool:
-    """Print how fast two runs in lockstep are beside each other; whether each wrote what it writes alone."""
+    """Print the speed of two simultaneous runs in lockstep; whether each wrote the same as alone."""
     alone, both = folder / "alone.mcap", [folder / "first.mcap", folder / "second.mcap"]
     (alone_s,) = timed([alone], seconds, "--lockstep")[1]
     results, both_s = timed(both, seconds, "--lockstep")

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.integrate import odeint, solve_ivp
 
 from bridge.kernel import kernel
-from bridge.wire.messages import CHANNELS
+from bridge.wire.channels import CHANNELS
 from plant.config import RigConfig
 from plant.records import TRUTH, build
 from plant.simulate import run_blocks
@@ -75,7 +75,7 @@ def _sample_times(case: Case) -> Floats:
 
 
 def lsoda(case: Case, tolerances: tuple[float, float]) -> Run:
-    """SciPy's odeint: the loop of LSODA is compiled, unlike that of solve_ivp."""
+    """SciPy's odeint: the loop of LSODA is compiled, unlike the loop of solve_ivp."""
     rtol, atol = tolerances
     t_s = _sample_times(case)
     arguments = (case.base_velocity_mps, case.omega)
@@ -85,7 +85,7 @@ def lsoda(case: Case, tolerances: tuple[float, float]) -> Run:
 
 
 def lsoda_in_blocks(case: Case, tolerances: tuple[float, float]) -> Run:
-    """LSODA begun afresh every 1 ms, as a rig has to that obeys a new command in every block."""
+    """LSODA restarted every 1 ms, as for a rig with a new command in every block."""
     rtol, atol = tolerances
     t_s = _sample_times(case)
     arguments = (case.base_velocity_mps, case.omega)

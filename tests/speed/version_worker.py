@@ -54,7 +54,7 @@ def _steps(version: str) -> Any:
 
 
 class Worker:
-    """One version's functions and what they work on."""
+    """Functions of a version and their data."""
 
     def __init__(self, version: str, folder: Path) -> None:
         modules = {name: importlib.import_module(place) for name, place in _PLACES[version].items()}

@@ -1,7 +1,7 @@
 """A rig written from bridge/wire/PROTOCOL.md alone: nothing of the project but its message schema is imported.
 
 A light slider on a spring with LuGre friction, integrated by plain small steps, in lockstep over Zenoh. It writes its
-messages with the protobuf library's own serialisation, which leaves zeros out. At the end it prints what it saw as JSON.
+messages with the protobuf library's own serialisation, which leaves zeros out. At the end it prints its observations as JSON.
 """
 
 import json
@@ -153,7 +153,7 @@ class Rig:
                 sys.exit(f"not on the bus: {roles - self._alive}")
 
     def event(self, code: str, text: str, t_ns: int) -> None:
-        """Tell the bus."""
+        """Publish an event."""
         event = wire.Event(sequence=self._events, t_ns=t_ns, source="plant", code=code, text=text)
         self._events += 1
         self._send_event.put(event.SerializeToString())
@@ -178,7 +178,7 @@ class Rig:
 
 
 def run(rig: Rig, blocks: int) -> dict[str, object]:
-    """`blocks` blocks in lockstep; what came of them."""
+    """Run `blocks` blocks in lockstep; returns the observations."""
     slider = Slider()
     rig.wait_for({"controller", "recorder"})
     rig.event("START", "lockstep", 0)

@@ -1,4 +1,4 @@
-"""A session of nobody's, or of somebody who has a role's password, that says what no process of the project would say."""
+"""A session without a role, or with the password of a role, that sends messages no process of the project would send."""
 
 import json
 import time

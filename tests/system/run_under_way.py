@@ -1,4 +1,4 @@
-"""A run of several processes, as a person starts it, for tests that disturb or end it."""
+"""A run of several processes, started as from a terminal, for tests that disturb or end it."""
 
 import subprocess
 import sys
@@ -27,7 +27,7 @@ def children_of(pid: int) -> list[int]:
 
 
 def role(pid: int) -> str:
-    """What a child of a run is, from its command line."""
+    """The role of a child process of a run, from its command line."""
     try:
         words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
     except OSError:
@@ -87,7 +87,7 @@ class Run:
         assert set(self.children) == roles
 
     def end(self, within_s: float = 30.0) -> tuple[int, str, str]:
-        """Status, stdout and stderr; nobody may be left."""
+        """Status, stdout and stderr; no process may be left."""
         out, err = self.process.communicate(timeout=within_s)
         assert all(gone(pid) for pid in self.children.values())
         return self.process.returncode, out, err

@@ -112,7 +112,7 @@ def one(damped):
 
 @pytest.mark.nightly  # 37 s of CPU
 def test_nothing_leaks_from_the_held_out_run(damped, one, short, tmp_path):
-    """A held-out run of another rig refutes the name, and changes not a digit of what was fitted."""
+    """A held-out run of another rig refutes the name, and changes no digit of the fits."""
     other = tmp_path / "other"
     shutil.copytree(damped, other)
     shutil.copy(made_evidence(Case(short), seed=99) / "run-03.parquet", other / "run-03.parquet")

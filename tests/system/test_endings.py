@@ -1,4 +1,4 @@
-"""Runs that a person ends, and what a person is told: Ctrl-C in every moment, runs without an end, a missing priority."""
+"""Runs that an operator ends, and their messages: Ctrl-C at any moment, runs without an end, a missing priority."""
 
 import json
 import os
@@ -23,7 +23,7 @@ from tests.system.told import told
 
 pytestmark = pytest.mark.realtime
 
-# one handler serves them all, so that by day two are enough: Ctrl-C, and that of a terminal that closes
+# one handler serves them all, so that by day two are enough: Ctrl-C, and the signal of a closing terminal
 ENDINGS = [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.nightly), signal.SIGHUP]
 
 
@@ -161,7 +161,7 @@ def test_judging_that_takes_long_is_told_and_can_be_left(tmp_path: Path, number:
             time.sleep(0.02)
         run.send_signal(number)
         time.sleep(0.3)
-        run.send_signal(number)  # of a person who presses it twice to be sure
+        run.send_signal(number)  # pressed twice
         assert run.stderr.readline() == "judging the log; Ctrl-C again to leave it unjudged\n"
         run.send_signal(number)
         err = run.communicate(timeout=30)[1]

@@ -1,4 +1,4 @@
-"""Everything that can die, dies here: one clear line, a closed or recoverable log, nobody left behind."""
+"""Each process is killed: one clear line, a closed or recoverable log, no process left."""
 
 import json
 import os
@@ -125,7 +125,7 @@ def test_full_disk(tmp_path: Path, runs: list[Run]) -> None:
     assert "it goes on in run-00" in err
     data = read_run(log)
     assert data.damage.whole
-    # the log went on in the next files; what came between two of them, and that may be the END, is told
+    # the log went on in the next files; losses between two of them, possibly the END, are reported
     assert data.sensors["t_ns"][-1] > 3_000_000_000
     assert {"LOG_WRITE"} <= {event.code for event in data.events}
     with log.open("rb") as file:

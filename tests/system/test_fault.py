@@ -1,4 +1,4 @@
-"""`stickslip fault` beside a rig that runs: it acts, it is told, and it is over."""
+"""`stickslip fault` on a running rig: the fault acts, is reported, and ends."""
 
 import os
 import subprocess
@@ -97,7 +97,7 @@ def test_a_fault_of_each_kind_acts_on_a_loop_that_runs_and_the_loop_goes_on(tmp_
 
 
 def _hear(inbox: Inbox, enough: Callable[[wire.Applied, set[str]], bool], most_s: float) -> set[str]:
-    """The codes of the events until what the rig applies and what was told is enough, or time is up."""
+    """Codes of the events until the applied vibration and the events suffice, or the time is over."""
     until_s, told, applied = time.monotonic() + most_s, set[str](), wire.Applied()
     while not enough(applied, told) and time.monotonic() < until_s:
         received = inbox.get(0.1)

@@ -1,4 +1,4 @@
-"""A rig that knows only bridge/wire/PROTOCOL.md is controlled and recorded; and that page says what the code does."""
+"""A rig that knows only bridge/wire/PROTOCOL.md is controlled and recorded; the page agrees with the code."""
 
 import ast
 import json
@@ -35,7 +35,7 @@ def start() -> Iterator[Start]:
     started: list[subprocess.Popen[str]] = []
 
     def start_one(*arguments: str) -> subprocess.Popen[str]:
-        # a stranger's Zenoh has its own threads: with our single one, which this process may have asked for, the rig stalls
+        # a foreign Zenoh has several threads: with our single one, which this process may have requested, the rig stalls
         without_ours = {name: value for name, value in os.environ.items() if name != "ZENOH_RUNTIME"}
         process = subprocess.Popen(
             [sys.executable, *arguments],

@@ -1,4 +1,4 @@
-"""What other programs make of a log, as far as they run here: Foxglove's schemas, the protobuf decoder, rerun's converter."""
+"""Logs in other programs, as far as they run here: Foxglove's schemas, the protobuf decoder, rerun's converter."""
 
 import subprocess
 import sys

@@ -15,14 +15,14 @@ from websockets.typing import Subprotocol
 
 from bridge.faults import Fault
 from cockpit.live.view import View
-from cockpit.run.child_process import guarded
+from cockpit.run.child_process import exit_status_of
 from tests.unit.cockpit.live.made import Rig
 
 _MESSAGE = 1  # opcode of "message data": then the subscription (4 bytes), the time (8 bytes), the payload
 
 
 def decoder(channel: dict[str, Any]) -> Any:
-    """The message class that a client builds from what the server says of a channel."""
+    """The message class that a client builds from the server's description of a channel."""
     files = descriptor_pb2.FileDescriptorSet.FromString(base64.b64decode(channel["schema"]))
     pool = descriptor_pool.DescriptorPool()
     for file in files.file:
@@ -76,7 +76,7 @@ def test_a_client_subscribes_and_decodes_signals_and_events() -> None:
     with Foxglove(0) as server:
         with pytest.raises(Fault, match=f"ENDPOINT_BUSY.*{server.port}.*--foxglove-port"):
             Foxglove(server.port)
-        found = asyncio.run(received(server.port, rig, lambda: server.tell(view.step())))
+        found = asyncio.run(received(server.port, rig, lambda: server.send(view.step())))
     times = [time for time, _ in found["/scope"]]
     assert {later - time for time, later in itertools.pairwise(times)} == {5_000_000}
     scope = [message for _, message in found["/scope"]]
@@ -92,6 +92,6 @@ def test_without_the_extra_its_install_line_is_told(monkeypatch: pytest.MonkeyPa
     from cockpit.live.foxglove_server import Foxglove
 
     monkeypatch.setitem(sys.modules, "foxglove", None)
-    assert guarded(lambda: Foxglove(0) and None) != 0
+    assert exit_status_of(lambda: Foxglove(0) and None) != 0
     assert "MISSING_EXTRA" in (said := capsys.readouterr().err)
     assert "pip install 'stickslip[foxglove]'" in said

@@ -1,4 +1,4 @@
-"""A rig by itself: nothing vibrates until a person arms it, and a person's stop outlasts its process."""
+"""A rig by itself: nothing vibrates until an operator arms it, and an operator's stop outlasts its process."""
 
 import json
 import os
@@ -37,7 +37,7 @@ def rig(endpoint: str, environment: dict[str, str], *more: str) -> Generator[sub
 
 
 def say(word: str, endpoint: str, *options: str) -> tuple[int, dict[str, Any]]:
-    """Exit status of a word, and what came of it; said again until the rig is there."""
+    """Exit status and output of an operator command, repeated until the rig is present."""
     command = [*COMMAND, word, "--json", "--endpoint", endpoint, *options]
     done = subprocess.run(command, timeout=60, check=False, capture_output=True, text=True)
     until_s = time.monotonic() + 60.0

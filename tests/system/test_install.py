@@ -1,4 +1,4 @@
-"""The installed command where a stranger calls it: beside files that have the names of its packages."""
+"""The installed command in a foreign folder, next to files with the names of its packages."""
 
 import json
 import os
@@ -26,14 +26,14 @@ NAMES = ("bridge", "cockpit", "controller", "diagnosis", "joblib", "json", "nump
 
 @pytest.fixture
 def crowded(tmp_path: Path) -> Path:
-    """A folder of somebody's own modules; one that is imported ends its process."""
+    """A folder of foreign modules; an import of one ends the process."""
     for name in NAMES:
         (tmp_path / f"{name}.py").write_text(f"raise SystemExit('{name}.py of the folder was imported')\n")
     return tmp_path
 
 
 def call(folder: Path, *arguments: str, status: int = 0, search: Path | None = None) -> str:
-    """What the command says on stdout; it has to end with that exit status.
+    """Stdout of the command, which has to end with that exit status.
 
     Args:
         search: a folder of modules that come before the installed ones, in child processes too.
@@ -55,7 +55,7 @@ def test_a_run_in_a_folder_with_files_of_the_same_names(crowded: Path) -> None:
 
 @pytest.mark.nightly  # 14 s of CPU; the run before has processes in such a folder, too
 def test_workers_of_a_diagnosis_in_a_folder_with_files_of_the_same_names(crowded: Path) -> None:
-    """Each worker says what its evidence lacks: a whole diagnosis in the same workers would take half a minute."""
+    """Each worker reports the gaps of its evidence: a whole diagnosis in the same workers would take half a minute."""
     for name in ("first", "second"):
         (made_up.evidence_folder(crowded / name) / "run-01.csv").unlink()
     said = call(crowded, "diagnose", "first", "second", "--jobs", "2", status=FAULTS["BAD_EVIDENCE"].exit_status)
@@ -66,7 +66,7 @@ def test_workers_of_a_diagnosis_in_a_folder_with_files_of_the_same_names(crowded
 BASE = """
 import sys
 from cockpit.cli import app
-from cockpit.run import operator
+from cockpit.live import operator
 
 for line in sys.argv[1:]:
     try:

@@ -101,7 +101,7 @@ def test_of_two_first_starts_at_once_one_process_compiles_each_set_and_nobody_is
         assert len(compiling) == 1, lines
         assert "first start of this version, about a minute" in compiling[0]
         assert sum(f"another process compiles the kernels of the {role}: waiting for it" in line for line in lines) == 1
-        # the second process loads what the first has kept, and writes nothing
+        # the second process loads the kernels that the first has kept, and writes nothing
         done = next(cache.glob(f"the {role}-*")).stat().st_mtime_ns
         assert all(path.stat().st_mtime_ns <= done for path in cache.glob(f"{role}_*/*.nbc"))
     assert not [line for line in lines if "have not connected to each other" in line]

@@ -1,4 +1,4 @@
-"""Many evidence folders on several processes and on a Dask cluster: complete when a worker dies, nobody left behind."""
+"""Many evidence folders on several processes and on a Dask cluster: complete when a worker dies, no process left."""
 
 import json
 import os
@@ -83,7 +83,7 @@ def cluster(at: Path, workers: int, certs: Path | None = None) -> Iterator[str]:
 
 
 def test_outcomes_on_two_processes(tmp_path):
-    """The last folder has both processes, as the stand-in says."""
+    """The last folder has both processes, as the substitute reports."""
     names = ["a", "b", "refused", "broken", "c"]
     outcomes = by_name(diagnose_many(sources(tmp_path, names), 2, diagnose=made_up.spreads))
     found = {name: outcome.diagnosis for name, outcome in outcomes.items() if outcome.diagnosis}

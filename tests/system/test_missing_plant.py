@@ -1,4 +1,4 @@
-"""A controller that nobody answers, beside which other tests may run."""
+"""A controller without an answer, while other tests may run."""
 
 import subprocess
 import sys
@@ -38,7 +38,7 @@ def test_a_controller_without_a_plant_is_told_what_to_start() -> None:
     with pytest.raises(Fault, match="no plant answered within 1 s; start `stickslip plant`") as raised:
         Bus(config, "controller", lockstep=True, patience_s=1.0)
     assert raised.value.kind is FAULTS["NO_PEER"]
-    assert "--wait" not in str(raised.value)  # its patience is its own, as that of a command without the option
+    assert "--wait" not in str(raised.value)  # it waits as a command without the option does
 
 
 def test_faults_are_not_said_to_be_over_where_no_rig_hears_it() -> None:

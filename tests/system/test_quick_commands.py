@@ -1,4 +1,4 @@
-"""Commands that a person waits for import no more than they need."""
+"""Interactive commands import only the modules that they need."""
 
 import json
 import resource
@@ -59,7 +59,7 @@ def _cpu_s(command: list[str]) -> float:
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", ["log info", "stop", "status"])
 def test_a_quick_command_takes_little_processor_time(tmp_path: Path, name: str) -> None:
-    """Each pair one after the other, as a shared core is now fast and now slow; what is imported is tested above."""
+    """Each pair one after the other, as the speed of a shared core varies; imports are tested above."""
     numpy = [sys.executable, "-P", "-c", "import numpy"]
     command = [sys.executable, "-P", "-m", "cockpit", *_commands(tmp_path)[name]]
     assert median(_cpu_s(command) / _cpu_s(numpy) for _ in range(3)) < _NUMPIES

@@ -13,9 +13,9 @@ import pytest
 from bridge.faults import FAULTS
 from bridge.log.logfile import read_run
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import BLOCK
 from bridge.wire.topics import APPLIED, OPERATOR, STATE
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
-from controller.codes import BLOCK
 from tests.system.lost import lost_of
 from tests.system.ports import free_endpoint
 
@@ -43,7 +43,7 @@ def test_every_block_arrives_and_is_answered(tmp_path: Path) -> None:
     lost = lost_of(data.events)
     # after the last of 6 s the vibration fades
     assert 6000 <= len(data.sensors) + lost["/sensors"] < 6100, result.stderr
-    # how soon the answers come is for the bench to say; that they come at all, or are told as lost, is for this test
+    # the bench measures how soon answers come; this test checks that they come, or are reported as lost
     traced = data.trace["block"][data.trace["events"] & BLOCK != 0]
     assert (np.diff(traced.astype(np.int64)) > 0).all()
     for answered in (traced, data.command["block"]):

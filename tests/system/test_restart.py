@@ -1,4 +1,4 @@
-"""A rig that dies and begins anew is taken up again; processes that stand still are told of rightly."""
+"""A rig that dies and restarts is used again; stopped processes are reported correctly."""
 
 import os
 import signal
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.realtime
 
 @contextmanager
 def processes(endpoint: str, log: Path) -> Iterator[dict[str, subprocess.Popen[str]]]:
-    """A rig, a controller and a recorder that nobody watches."""
+    """A rig, a controller and a recorder without a supervisor."""
     settings = ["--endpoint", endpoint, "--set", "duration_s=99", "--set", "controller.policy.enabled_from_s=0.0"]
     started = {
         role: subprocess.Popen(
@@ -45,7 +45,7 @@ def processes(endpoint: str, log: Path) -> Iterator[dict[str, subprocess.Popen[s
 
 
 def life_of(process: subprocess.Popen[str]) -> list[str]:
-    """What a process that has ended told a person of its life."""
+    """Lifecycle lines of an ended process."""
     assert process.stderr is not None
     words = [line.split()[0] for line in process.stderr.read().splitlines()]
     return [word for word in words if word in {"waiting", "joined", "running", "ended"}]
@@ -115,7 +115,7 @@ def test_who_stalls_says_so_and_the_run_goes_on(tmp_path: Path, role: str, for_s
     else:
         assert {"RIG_BACK", "GAP"} <= {event.code for event in data.events}
     said = [event for event in data.events if event.source == "controller"]
-    made_up_for = {"LATE", "FLOOD", "FOREIGN", "GAIN_LIMIT"}  # what the blocks that come late and at once may bring
+    made_up_for = {"LATE", "FLOOD", "FOREIGN", "GAIN_LIMIT"}  # possible events when late blocks arrive at once
     codes = [event.code for event in said if event.code not in made_up_for]
     assert codes[-2:] == ["FRESH", "END"], [event.text for event in said]
 

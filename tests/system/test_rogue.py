@@ -1,4 +1,4 @@
-"""What a stranger says on an open bus ends nobody, changes no vibration, and is told, at most once a second a kind."""
+"""Foreign messages on an open bus end no process, change no vibration, and are reported at most once a second a kind."""
 
 import json
 import signal
@@ -104,7 +104,7 @@ def test_a_stranger_ends_nobody_and_changes_no_vibration(tmp_path: Path) -> None
     assert gaps.min() >= 0
     assert gaps.sum() == lost_of(data.events)["/sensors"]
     before, after = data.applied[1000 : applied.sequence], data.applied[applied.sequence :]
-    # no more than the rig's own controller wants, which is what it was unless the machine kept the two apart
+    # at most the amplitude of the rig's controller, unless the computer delayed one of both
     assert after["amplitude_m"].max() <= data.trace["wanted_amplitude_m"].max()
     if not {"FALLBACK", "STALE"} & {event.code for event in data.events}:
         assert after["amplitude_m"].max() < 1.2 * before["amplitude_m"].max()

@@ -1,4 +1,4 @@
-"""Who may open a session with a rig, and what each role may do there: real sessions on loopback, with passwords and with TLS."""
+"""Access to a rig and the rights of each role: real sessions on loopback, with passwords and with TLS."""
 
 import os
 import stat
@@ -93,7 +93,7 @@ def test_a_viewer_passes_for_nobody(config: BusConfig) -> None:
             assert [one.ok.payload.to_bytes()[:2] for one in recorder._session.get("rig/header/*", timeout=2.0)] == [
                 b"\n\x05"
             ]
-            assert time.monotonic() - began_s < 1.5  # nobody was asked who does not answer
+            assert time.monotonic() - began_s < 1.5  # no silent session was queried
         assert not plant.alive("controller")
         assert tokens
         assert answering
@@ -108,7 +108,7 @@ def test_without_the_password_nobody_gets_in() -> None:
                 rogue(config.endpoint, more={"transport/auth/usrpwd": wrong} if wrong else {}),
             ):
                 pass
-        with rogue(config.endpoint, "controller"):  # as PROTOCOL.md tells a foreign client
+        with rogue(config.endpoint, "controller"):  # as PROTOCOL.md describes for a foreign client
             pass
 
 

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.realtime
 
 
 def until_quiet(inbox: Inbox) -> list[Received]:
-    """What comes until nothing has come for a while, many times the 2 ms between two blocks."""
+    """Messages until a silence of many times the 2 ms between two blocks."""
     return list(iter(lambda: inbox.get(1.0), None))
 
 

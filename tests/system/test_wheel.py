@@ -20,7 +20,7 @@ BASE_MB = 650.0
 
 
 def run(*command: str | Path, cwd: Path, **more: str) -> str:
-    """What a command that has to end well says on stdout, without the environment of the checkout."""
+    """Stdout of a command that has to succeed, without the environment of the checkout."""
     usual = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
     done = subprocess.run(command, cwd=cwd, env=usual | more, capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == 0, done.stderr
@@ -48,7 +48,7 @@ def test_what_the_wheel_holds_runs_in_an_empty_folder(wheel: Path, tmp_path: Pat
     unpacked, empty = tmp_path / "unpacked", tmp_path / "empty"
     empty.mkdir()
     zipfile.ZipFile(wheel).extractall(unpacked)
-    # interpreted: the kernels at another path would be compiled anew, for half a minute, and kept for nobody
+    # interpreted: the kernels at another path would be compiled again, for half a minute, and never used
     said = run(
         sys.executable, "-P", "-m", "cockpit", "run", "--in-process", "--scenario", "from-the-start", "--set", "duration_s=0.05",
         cwd=empty, PYTHONPATH=str(unpacked), NUMBA_DISABLE_JIT="1",
@@ -61,7 +61,7 @@ def test_what_the_wheel_holds_runs_in_an_empty_folder(wheel: Path, tmp_path: Pat
 
 
 def installed(at: Path, requirement: str) -> Path:
-    """The bin folder of a fresh environment with what was required, from the package index."""
+    """The bin folder of a new environment with the requirements, from the package index."""
     venv.create(at, with_pip=True)
     run(at / "bin" / "python", "-m", "pip", "install", "--quiet", requirement, cwd=at)
     return at / "bin"

@@ -1,4 +1,4 @@
-"""The lines of a command on stderr, without those of its life cycle, its priority and the time of judging."""
+"""Lines of a command on stderr, without its lifecycle, priority and time of judging."""
 
 _LEFT_OUT = (
     *("stickslip: warning: normal scheduling", "judging the log; "),

@@ -8,7 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from bridge.wire.messages import CHANNELS, sensor_block
+from bridge.wire.channels import CHANNELS
+from bridge.wire.messages import sensor_block
 from plant.effects.library import EFFECTS, checked
 from plant.effects.waves import smooth_noise
 from plant.records import TRUTH, build
@@ -139,7 +140,7 @@ def test_friction_that_depends_on_the_direction_changes_places():
     """Friction of the way forth and of the way back, exchanged."""
     there = run(rig({"direction-dependent-friction": {"form": "both", "ratio": 0.3}}), DRIVE)
     back = run(rig({"direction-dependent-friction": {"form": "both", "ratio": -0.3}}), -DRIVE)
-    assert worst(there, back) < ROUNDING  # at a velocity of 0 it is that of the way forth
+    assert worst(there, back) < ROUNDING  # at a velocity of 0 the force of the way forth remains
     assert np.abs(there.true_drive_force_N).max() > 1.2 * np.abs(there.true_drive_force_N[9000:19000]).max()
 
 
@@ -158,7 +159,7 @@ def test_a_random_track_goes_on_below_0(way):
 
 
 def readings(config, analogue_N, analogue_m):
-    """What the sensors report, without noise, of these forces and positions [samples]."""
+    """Sensor signals, without noise, for these forces and positions [samples]."""
     params, _ = build(config)
     samples = len(analogue_N)
     analogue = np.zeros((len(CHANNELS), samples))

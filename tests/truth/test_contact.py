@@ -8,9 +8,9 @@ from scipy.integrate import solve_ivp
 
 from bridge.config import validate
 from bridge.faults import Fault
-from bridge.wire.messages import CHANNELS
+from bridge.wire.channels import CHANNELS
 from cockpit.paper.runs import AMPLITUDE_M, STEEL_PAIRS
-from diagnosis.features.cycles import find_cycles
+from diagnosis.slips import find_cycles
 from plant.config import RigConfig
 from plant.contact import step
 from plant.core import advance

@@ -1,4 +1,4 @@
-"""Effects of the drive, on a slide without friction: what is left is a mass, a spring and what the effect makes of it."""
+"""Effects of the drive, on a slide without friction: a mass, a spring and the effect."""
 
 import math
 
@@ -158,7 +158,7 @@ def test_a_screw_that_gives_way_is_the_more_uneven_the_more_it_carries():
     """Independently: SciPy integrates drive and slide, a mass on the drive's spring that starts 2 mm behind the drive."""
     ratio, wavelength_m, phase, at_mps = 0.4, 2e-4, 1.0, 5e-4
     values = {"form": "load", "ratio": ratio, "wavelength_m": wavelength_m, "phase_rad": phase, "second_cos": 0.3}
-    # the static friction is only what the load is relative to: at any speed none is left of it
+    # the load is relative to the static friction, which vanishes at any speed
     contact = NO_FRICTION | {"static_force_N": 40.0, "stribeck_velocity_mps": 1e-9}
     config = rig({"drive-speed-ripple": values}, contact=contact)
     start_N = STIFFNESS * 2e-3

@@ -1,4 +1,4 @@
-"""Effects that change friction here and now: in steady sliding friction is what its formula says."""
+"""Effects without memory: friction in steady sliding equals the formula."""
 
 import math
 

@@ -12,7 +12,7 @@ from tests.effects_rig import BLOCK_S, HEAVY_KG, TAU, rig, run, stribeck_N
 
 CONTACT = rig().contact
 K_T, H_T = CONTACT.stiffness_N_per_m, CONTACT.damping_Ns_per_m
-# slow enough to show the bristle, quick enough not to age meanwhile; the Stribeck curve is flat and the damping out of the way
+# slow enough to show the bristle, quick enough not to age; the Stribeck curve is flat and the damping out of the way
 PULL_MPS = 1e-4
 PULL_S = 0.1
 FLAT = {"pair": "C45-C45 @ 0.063", "damping_Ns_per_m": 0.0, "stribeck_velocity_mps": 0.05}

@@ -59,7 +59,7 @@ def test_all_of_them_at_once_are_as_well(nominal_bytes):
 
 @pytest.mark.parametrize("name", [name for name in EFFECTS if name != "direction-dependent-friction"])
 def test_an_effect_of_its_default_size_is_not(name, nominal_bytes):
-    """But for what happens backwards only."""
+    """Effects that act backwards only are left out."""
     assert rows(paper_rig({name: {}})).tobytes() != nominal_bytes
 
 

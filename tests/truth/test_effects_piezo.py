@@ -1,4 +1,4 @@
-"""What the base makes of the command: seen by its accelerometer, whose filters are wide open here."""
+"""Motion of the base for a command, measured by its accelerometer without filters."""
 
 import math
 
@@ -12,7 +12,7 @@ SOLVER = {"step_s": 2.5e-6, "samples_per_block": 200}
 
 
 def delivered(effects, frequency_Hz):
-    """Acceleration amplitude of the base over that of the command."""
+    """Acceleration amplitude of the base over the commanded one."""
     result = run(rig(effects, solver=SOLVER), np.zeros(20), None, frequency_Hz, AMPLITUDE_M)
     late = result.base_accel_mps2[1000:]
     swing = np.exp(-1j * TAU * frequency_Hz * result.t_s[1000:])
@@ -84,7 +84,7 @@ def test_sag_by_heat_begins_when_the_piezo_is_switched_on():
 
 
 def test_a_pause_cools_it():
-    from bridge.wire.messages import CHANNELS
+    from bridge.wire.channels import CHANNELS
     from plant.core import advance_disturbed
     from plant.records import TRUTH, build
 

@@ -5,7 +5,8 @@ import pytest
 from scipy.signal import lfilter
 from scipy.special import gammainc
 
-from bridge.wire.messages import CHANNELS, sensor_block
+from bridge.wire.channels import CHANNELS
+from bridge.wire.messages import sensor_block
 from plant.core import advance_disturbed
 from plant.effects.sensors import LONGEST_DELAY
 from plant.node import PlantNode
@@ -108,7 +109,7 @@ def test_a_delay_between_samples_is_linear_between_them():
 
 
 def test_the_longest_delay_fits_the_line_that_keeps_it():
-    """At fine sampling the line is shorter in seconds; the configuration refuses what it cannot keep."""
+    """At fine sampling the delay line is shorter in seconds; the configuration refuses a longer delay."""
     solver = {"step_s": 5e-6, "samples_per_block": 200}
     sample_s = 5e-6
     config = rig(

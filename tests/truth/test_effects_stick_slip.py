@@ -1,4 +1,4 @@
-"""Whole stick-slip with an effect against SciPy's LSODA on equations written down anew."""
+"""Whole stick-slip with an effect against SciPy's LSODA on independently written equations."""
 
 import math
 from types import SimpleNamespace
@@ -149,7 +149,7 @@ def test_slips_come_within_a_tenth_of_a_millisecond_of_lsoda(name):
     expected_s = slips_s(pieces)
     assert len(expected_s) == SLIPS
     assert found_s == pytest.approx(expected_s, abs=1e-4)
-    # and the effect is no small thing
+    # and the effect is large
     assert np.abs(found_s - rig_slips_s(rig())).max() > 2e-3
 
 

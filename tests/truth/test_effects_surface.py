@@ -1,4 +1,4 @@
-"""What scatters: the random load and the rough surface, and the noise that both are made of."""
+"""Random effects: the random load, the rough surface, and the noise behind both."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def test_noise_has_mean_0_and_variance_1(noise):
 
 
 def test_noise_is_smooth_and_forgets_itself_after_two_cells(noise):
-    """One cell later 9/70, the mean of s (1 - s), over 26/35, that of its variance; nothing after two."""
+    """One cell later 9/70, the mean of s (1 - s), over 26/35, the mean of its variance; 0 after two."""
     correlation = np.array([np.mean(noise[: -10 * cells] * noise[10 * cells :]) for cells in (1, 2, 3, 7)])
     assert correlation[0] == pytest.approx((9 / 70) / (26 / 35), abs=0.03)
     assert correlation[1:] == pytest.approx(0.0, abs=0.03)

@@ -78,7 +78,7 @@ def test_what_a_slip_does_to_all_features_of_its_segment_counts_once(bench):
 
 
 def test_a_power_that_is_above_its_replicates_by_chance_leaves_something_of_a_weaker_one(bench):
-    """A ring was 1.6 times what its replicates show, and of one a fifth as strong less than nothing was left."""
+    """A ring of 1.6 times its replicates must not leave a negative power for a ring a fifth as strong."""
     plain = bench.problem.predicted(bench.point({}))
     powers = bench.floor.powers & bench.floor.compared
     drawn = bench.runs(4, 2)
@@ -112,7 +112,7 @@ def test_slips_that_the_model_lacks_count_once_each(bench):
 
 
 def test_coarse_steps_move_no_feature_by_a_third_of_a_floor(bench, monkeypatch):
-    """Runs without vibration, whose steps the twin chooses freely, against those of the plant's own 10 us."""
+    """Runs without vibration, whose steps the model chooses freely, against the plant's steps of 10 us."""
     quiet = Problem(bench.problem.rig, [run for run in bench.problem.runs if not run.commands.frequency_Hz.any()])
     files = {run.file for run in quiet.runs}
     scatter = bench.floor.scatter[[file in files for file, _ in bench.problem.labels]]

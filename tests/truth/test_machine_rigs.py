@@ -12,7 +12,7 @@ from plant.simulate import drive_velocity_mps, simulate
 @pytest.mark.parametrize(
     ("name", "ways", "stuck", "slips"),
     [
-        # share of the moving time in which the slide stands, and slips a stroke, at least
+        # least share of the moving time in which the slide rests, and least slips a stroke
         ("ball-screw-axis", (1.0, -1.0), 0.15, 300),
         ("belt-axis", (1.0, -1.0), 0.5, 100),
         ("pneumatic-seal", (1.0, -1.0), 0.5, 10),

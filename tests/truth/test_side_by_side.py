@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from bridge.wire.messages import CHANNELS
+from bridge.wire.channels import CHANNELS
 from diagnosis.features.grid import SIGNALS
 from diagnosis.features.segments import CommandedRun
 from diagnosis.gap.problem import Problem
@@ -63,7 +63,7 @@ def alone(config, commands, start):
     """A run of one rig through the plant's own kernel, block by block, without entries."""
     params, state, steps = built(config, False, commands, start)
     p = params[0]
-    # of each length arrays of its own: for a part of a longer one the kernels would be compiled again, for 11 s
+    # separate arrays of each length: the kernels would be compiled again for a part of a longer array, in 11 s
     scratch = {
         samples: (np.empty((len(CHANNELS), samples)), np.empty((len(TRUTH), samples)))
         for samples in set(steps.tolist())

@@ -8,9 +8,9 @@ import pytest
 from scipy.special import lambertw
 
 from bridge.config import validate
-from bridge.wire.messages import CHANNELS
-from cockpit.judge import stability_map as of_map
-from cockpit.judge.stability_map import stability_map as draw_map
+from bridge.wire.channels import CHANNELS
+from cockpit.figures import stability_map as of_map
+from cockpit.figures.stability_map import stability_map as draw_map
 from plant.config import RigConfig
 from plant.core import advance
 from plant.records import TRUTH, build
@@ -42,7 +42,7 @@ def rig(drive_mps=DRIVE_MPS, damping=0.0, stiffness=11700.0, pair="C45-C45 @ 0.0
 
 
 def force_near_steady(config, duration_s, away_N, vibration_mps=0.0, frequency_Hz=5000.0):
-    """Drive force less its steady mean [N], 20 samples a block, from `away_N` beside steady sliding."""
+    """Drive force less its steady mean [N], 20 samples a block, starting `away_N` from steady sliding."""
     params, state = build(config)
     s, c = state[0], config.contact
     v = config.drive.profile[0][1]
@@ -99,7 +99,7 @@ def test_without_vibration_the_slip_is_the_slope_of_the_stribeck_curve():
 
 @pytest.mark.parametrize("damping", [1.0, 10.0, 50.0])
 def test_critical_velocity_meets_its_closed_form(damping):
-    """The bristle relaxes within 1 ms: what is left of Hurwitz is g'(v) = -h_d, solved by Lambert's function."""
+    """The bristle relaxes within 1 ms: Hurwitz's condition becomes g'(v) = -h_d, solved by Lambert's function."""
     c = rig().contact
     relative = damping * c.stribeck_velocity_mps / (c.static_force_N - c.coulomb_force_N)
     closed_mps = c.stribeck_velocity_mps * math.sqrt(-lambertw(-0.5 * relative**2, -1).real / 2.0)
@@ -204,7 +204,7 @@ def test_below_v_d_a_vibration_leaves_stick_slip_that_has_started(drive_mps, dam
 
 
 def test_the_tail_of_the_stribeck_curve_is_a_slope_too():
-    """h_d = -g'(v) far above the Stribeck velocity, where only the tail still falls: 2 d / (q^3 v_s) but for 1 / q^2."""
+    """h_d = -g'(v) far above the Stribeck velocity, where only the tail still falls: 2 d / (q^3 v_s), up to 1 / q^2."""
     config = rig(damping=0.5)
     c = config.contact.model_copy(update={"stribeck_tail": 0.4})
     drop_N, q = 0.4 * (c.static_force_N - c.coulomb_force_N), 5.0
@@ -220,7 +220,7 @@ def test_the_tail_of_the_stribeck_curve_is_a_slope_too():
 
 @pytest.mark.nightly
 def test_the_map_of_a_rig_with_effects(tmp_path):
-    """What an effect changes for good is in the map, what it has no place for is told."""
+    """A permanent change by an effect is in the map; an effect without a place in it is reported."""
     plain = draw_map(rig(0.002, 50.0), tmp_path / "plain.png")
     effects = {
         "drive-damping": {"form": "viscous", "damping_Ns_per_m": 50.0},

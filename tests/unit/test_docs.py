@@ -118,7 +118,7 @@ def test_contributing_names_commands_that_there_are() -> None:
 def test_every_decision_has_its_four_headings() -> None:
     for page in (ROOT / "docs/decisions").glob("[0-9]*.md"):
         headings = re.findall(r"^## (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
-        assert headings == ["Status", "Context", "Decision", "Consequences"], page.name
+        assert headings == ["Problem", "Decision", "Alternatives", "Revisit when"], page.name
 
 
 def _packages() -> list[Path]:

@@ -8,12 +8,8 @@ from bridge.log.check.signal_range import SignalLook
 from bridge.log.finding import Finding
 from bridge.log.metadata import is_number
 from bridge.units import counted
-from bridge.wire.messages import CHANNELS
+from bridge.wire.channels import SENSOR_CHANNELS
 
-_ACCEL = "accel_noise_mps2", "accel_resolution_mps2", "", "accel_range_mps2"
-_POSITION = "position_noise_m", "position_resolution_m", "position_lowest_m", "position_range_m"
-_FORCE = "force_noise_N", "force_resolution_N", "force_lowest_N", "force_range_N"
-_KEYS = dict(zip(CHANNELS, (_FORCE, _ACCEL, _ACCEL, _POSITION, _POSITION), strict=True))
 # Noise over resolution from which a live channel never repeats a value for long: 2 sigma are then half a step. Larger: a dead
 # channel of coarse steps passes. Smaller: a channel at rest, whose samples all fall on the same step, counts as dead.
 _NOISY = 0.25
@@ -52,10 +48,12 @@ def channels_of(plant: Any) -> dict[str, ChannelLimits]:
         return float(sensors[key]) if is_number(sensors.get(key)) else otherwise
 
     channels: dict[str, ChannelLimits] = {}
-    for name, (noise, step, lowest, highest) in _KEYS.items():
-        high = number(highest, math.inf)
-        low = number(lowest, -math.inf) if lowest else -high
-        channels[name] = ChannelLimits(number(noise, math.nan), number(step, math.nan), low, high)
+    for channel in SENSOR_CHANNELS.values():
+        sensor, unit = channel.sensor, channel.name.rpartition("_")[2]
+        high = number(f"{sensor}_range_{unit}", math.inf)
+        low = number(f"{sensor}_lowest_{unit}", -math.inf) if channel.has_lowest else -high
+        noise, step = (number(f"{sensor}_{of}_{unit}", math.nan) for of in ("noise", "resolution"))
+        channels[channel.name] = ChannelLimits(noise, step, low, high)
     return channels
 
 

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,16 +14,15 @@ from bridge.log.damage import damage_findings
 from bridge.log.finding import Finding
 from bridge.log.in_charge import ChargeWatch
 from bridge.log.log_reader import LogReader
-from bridge.log.logfile import STREAMING, block_period_ns, check_log_file, iter_pieces
+from bridge.log.logfile import STREAMING, block_period_ns, check_log_file, feed
 from bridge.log.metadata import configuration_of, number_of
-from bridge.log.storage.chain import HashChain, chain_findings, chain_of
-from bridge.log.storage.parts import chain_of_log
+from bridge.log.storage.checksums import Checksums, checksum_findings
 from bridge.log.topic_watch import TopicWatch
 from bridge.log.watches.event_watch import EventWatch, is_weighty
 from bridge.units import counted
-from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import CHANNELS, Records
-from bridge.wire.payloads import READABLE_VERSIONS, parsed
+from bridge.wire.channels import CHANNELS
+from bridge.wire.messages import Records
+from bridge.wire.payloads import READABLE_VERSIONS
 from bridge.wire.topics import BY_NAME
 
 LATE_NS = 1_000_000  # 1 ms, the usual block: a later answer arrives after the next block is due
@@ -41,13 +39,8 @@ class LogCheck(NamedTuple):
     messages: dict[str, int]  # by streaming topic
     seconds: float  # of sensor blocks
     late_share: dict[str, float]  # share of messages later than 1 ms: /applied (block sent), /trace (answer ready)
-    chain: HashChain  # result of the hash chain
+    checksums: Checksums
     foreign: dict[str, int]  # messages in topics of other programs, not counted as findings
-
-    def as_dict(self) -> dict[str, Any]:
-        """The result as an object for `--json`."""
-        findings = [finding.as_dict() for finding in self.findings]
-        return self._asdict() | {"findings": findings, "chain": self.chain.as_dict()}
 
 
 class LogWatch:
@@ -85,17 +78,17 @@ class LogWatch:
             field = "late_ns" if topic == "applied" else "lateness_ns"
             self.late[topic] += int((records[field] > LATE_NS).sum())
 
-    def add_others(self, topic: str, payloads: Sequence[bytes]) -> None:
+    def add_others(self, topic: str, messages: Sequence[Any]) -> None:
         """Take messages of another topic."""
         if topic.startswith("event/"):
-            self.events.add(parsed(wire.Event, payload, "/" + topic) for payload in payloads)
+            self.events.add(messages)
         elif topic not in BY_NAME:
-            self.unknown[topic] = self.unknown.get(topic, 0) + len(payloads)
+            self.unknown[topic] = self.unknown.get(topic, 0) + len(messages)
 
-    def result(self, reader: LogReader, chain: HashChain) -> LogCheck:
+    def result(self, reader: LogReader, checksums: Checksums) -> LogCheck:
         """All findings, once the reader is at the end of the log."""
         path = reader.path
-        findings = chain_findings(chain, path.name)
+        findings = checksum_findings(checksums, path)
         findings += _of_file(path, reader, self)
         findings += schema_findings(reader)
         findings += self.charge.result().findings()
@@ -114,7 +107,7 @@ class LogWatch:
                 findings.append(Finding("late", where, text, self.late[where[1:]]))
         messages = {name: watch.messages for name, watch in self.topics.items()}
         seconds = messages["sensors"] * self.period_ns / 1e9
-        return LogCheck(str(path), findings, messages, seconds, shares, chain, reader.foreign)
+        return LogCheck(str(path), findings, messages, seconds, shares, checksums, reader.foreign)
 
 
 def check_log(path: Path, progress: Callable[[float], None] | None = None) -> LogCheck:
@@ -125,20 +118,6 @@ def check_log(path: Path, progress: Callable[[float], None] | None = None) -> Lo
     check_log_file(path)
     reader, seen = LogReader(path), LogWatch()
     return seen.result(reader, feed(reader, seen, progress))
-
-
-def feed(reader: LogReader, watch: Any, progress: Callable[[float], None] | None = None) -> HashChain:
-    """Pass every message of a log to a watch with the methods of `LogWatch`; a second thread checks and returns the chain."""
-    with ThreadPoolExecutor(max_workers=1) as worker:
-        chain = worker.submit(chain_of if reader.alone else chain_of_log, reader.path)
-        for piece in iter_pieces(reader):
-            if piece.topic in STREAMING:
-                watch.add(piece.topic, piece.records, piece.log_time_ns)
-            else:
-                watch.add_others(piece.topic, piece.payloads)
-            if progress is not None:
-                progress(reader.position_bytes / max(reader.size_bytes, 1))
-        return chain.result()
 
 
 def _channels(reader: LogReader) -> dict[str, ChannelLimits]:
@@ -171,15 +150,9 @@ def _of_file(path: Path, reader: LogReader, seen: LogWatch) -> list[Finding]:
         if version is not None and version not in map(str, READABLE_VERSIONS):
             text = f"the {role} has schema version {version}: must be {' or '.join(map(str, READABLE_VERSIONS))}"
             findings.append(Finding("schema-version", path.name, text))
-    findings += [
-        Finding(
-            "unknown-topic",
-            "/" + topic,
-            f"{counted(times, 'message')} of a topic unknown to this version",
-            times,
-        )
-        for topic, times in seen.unknown.items()
-    ]
+    for topic, times in seen.unknown.items():
+        text = f"{counted(times, 'message')} of a topic unknown to this version"
+        findings.append(Finding("unknown-topic", "/" + topic, text, times))
     if seen.topics["sensors"].messages == 0:
         findings.append(Finding("empty", path.name, "holds no sensor block"))
     else:

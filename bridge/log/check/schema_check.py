@@ -13,11 +13,11 @@ _ENCODING = "protobuf"
 def schema_findings(reader: LogReader) -> list[Finding]:
     """A finding for each topic whose schema is missing, unreadable or of another message."""
     findings: list[Finding] = []
-    for channel in reader.channels.values():
+    for channel in reader.definitions.channels.values():
         topic = (BY_NAME | {SCOPE.name: SCOPE}).get(channel.topic.removeprefix("/"))
         if topic is None:
             continue
-        schema = reader.schemas.get(channel.schema_id)
+        schema = reader.definitions.schemas.get(channel.schema_id)
         wanted = topic.message.DESCRIPTOR.full_name
         if schema is None:
             text = f"its channel names schema {channel.schema_id}, which is missing"

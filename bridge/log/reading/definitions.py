@@ -5,6 +5,7 @@ before the first message of the channel, inside or outside of a chunk, and again
 """
 
 import contextlib
+from functools import cached_property
 from io import BytesIO
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.records import Channel, Schema
+from mcap.summary import Summary
 
 from bridge.log.reading.chunk_bytes import UNREADABLE
 from bridge.log.viewers import foxglove_log
@@ -34,7 +36,6 @@ class Definitions:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._summary: Definitions | None = None
         self.schemas: dict[int, Schema] = {}
         self.channels: dict[int, Channel] = {}
 
@@ -53,24 +54,19 @@ class Definitions:
         channel = self.channels.get(channel_id)
         if channel is not None and channel.schema_id in self.schemas and _name(channel) in _KNOWN:
             return True
-        again = self.of_summary()
-        other = again.channels.get(channel_id)
+        other = self._summary.channels.get(channel_id)
         if other is not None and (channel is None or _name(other) in _KNOWN):
             channel = self.channels[channel_id] = other
-        if channel is not None and channel.schema_id in again.schemas:
-            self.schemas.setdefault(channel.schema_id, again.schemas[channel.schema_id])
+        if channel is not None and channel.schema_id in self._summary.schemas:
+            self.schemas.setdefault(channel.schema_id, self._summary.schemas[channel.schema_id])
         return channel is not None
 
-    def of_summary(self) -> "Definitions":
-        """The definitions in the summary of the file; empty without a readable summary."""
-        if self._summary is None:
-            self._summary = Definitions(self._path)
-            with contextlib.suppress(OSError, ValueError, *UNREADABLE), self._path.open("rb") as file:
-                summary = make_reader(file).get_summary()
-                if summary is not None:
-                    self._summary.schemas = summary.schemas
-                    self._summary.channels = summary.channels
-        return self._summary
+    @cached_property
+    def _summary(self) -> Summary:
+        """The summary of the file; empty where it cannot be read."""
+        with contextlib.suppress(OSError, ValueError, *UNREADABLE), self._path.open("rb") as file:
+            return make_reader(file).get_summary() or Summary()
+        return Summary()
 
     def topic(self, channel_id: int) -> str | None:
         """The topic of a channel of this project without the leading slash; None for a channel of another program."""

@@ -1,8 +1,8 @@
-"""The files of a log, and proof that no byte was changed.
+"""The files of a log, and the proof that no byte was changed.
 
-chain        a hash over all bytes, link by link
-parts        the files that belong to one log
-part_file    one file that is being written
-log_files    the next file after a full, lost or long file
-afterwards   a table added to a closed log
+parts          the files that belong to one log
+part_file      one file that is being written
+log_files      the next file after a full, lost or long file
+checksums      digest and checksums of a whole log
+verdict_file   the verdict in a file next to the log
 """

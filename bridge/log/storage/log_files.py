@@ -5,13 +5,16 @@ import time
 import uuid
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 from bridge.faults import Fault
 from bridge.log.mcap_chunks import ChunkWriter
 from bridge.log.storage.part_file import PartFile
-from bridge.log.storage.parts import part_path
+from bridge.log.storage.parts import PART, LogPart, part_path
 from bridge.units import counted
+
+if TYPE_CHECKING:
+    from bridge.log.runlog import RunLog
 
 _LOOK_S = 1.0  # between two checks of the path of the file, and of a full disk
 _LONGEST_WAIT_S = 64.0  # longest wait between two tries; it doubles each time, as a quota shows only on writing
@@ -26,33 +29,12 @@ class Rotation(NamedTuple):
     seconds: float = 0.0  # of the run
 
 
-class Owner(Protocol):
-    """The owner of the log: it fills the beginning of each file, and reports events."""
-
-    def begin(self, writer: ChunkWriter, number: int, begins: str, follows: str) -> None:
-        """Write the beginning of a file: definitions, tables, and its place in the log."""
-        ...
-
-    def add_event(self, code: str, text: str) -> object:
-        """Report an event in the log and on the bus."""
-        ...
-
-    def repeat_events(self) -> None:
-        """Repeat the events that are valid for the whole log."""
-        ...
-
-    @property
-    def t_ns(self) -> int:
-        """The time of the run."""
-        ...
-
-
 class LogFiles:
     """The files of one log. If a file cannot be written any more, the fault is kept and raised at the end.
 
     Args:
         path: the first file.
-        owner: the log's owner.
+        owner: fills the beginning of each file, and reports events.
         rotation: when to continue in a new file.
         patient: a full disk does not end the log: it waits for space.
 
@@ -60,16 +42,13 @@ class LogFiles:
 
     """
 
-    def __init__(self, path: Path, owner: Owner, rotation: Rotation, patient: bool) -> None:
+    def __init__(self, path: Path, owner: "RunLog", rotation: Rotation, patient: bool) -> None:
         self.path = path
         self.unwritten = 0  # messages lost since the disk was full
         self.whole_t_ns: int | None = None  # time of the latest message in a chunk that is whole in a file
         self._owner, self._rotation, self._patient = owner, rotation, patient
         self._number = 0
-        self.begins = ""  # first link of the first file
-        self.links = 0  # of the hash chains of all files that were closed
-        self.last_link = ""  # of these
-        self._follows = ""  # last link of the file before
+        self._begins = ""  # identifies the log
         self._began_ns = 0
         self._wait_s = _LOOK_S
         self._look_s = time.monotonic() + _LOOK_S
@@ -79,7 +58,7 @@ class LogFiles:
 
     def begin(self) -> None:
         """Write the beginning of the first file."""
-        self.guarded(lambda writer: self._owner.begin(writer, 0, "", ""))
+        self.guarded(lambda writer: self._owner.begin(writer, LogPart(0, "")))
         if self._fault is not None:  # a log that cannot begin fails even if patient
             raise self._fault
 
@@ -97,13 +76,19 @@ class LogFiles:
         if part is None:
             return
         writer = part.writer
+
+        def write_and_identify() -> None:
+            write(writer)
+            if writer.chunks and not self._begins:
+                self._begins = f"{writer.crc:08x}"
+                writer.add_metadata(PART, LogPart(0, self._begins).as_texts())
+
         try:
-            part.guarded(lambda: write(writer))
+            part.guarded(write_and_identify)
         except OSError as error:
             self._give_up(part, error)
             return
-        self.begins = self.begins or part.writer.first_link
-        if self._owner.t_ns and not part.writer.open_bytes:
+        if self._owner.t_ns and not part.writer.open_chunk.size:
             self.whole_t_ns = self._owner.t_ns
 
     def look_after(self) -> None:
@@ -142,7 +127,7 @@ class LogFiles:
 
     def _is_long(self, part: PartFile) -> bool:
         most_bytes, most_s = self._rotation
-        if not part.writer.links:
+        if not part.writer.chunks:
             return False
         long = bool(most_s) and self._owner.t_ns - self._began_ns >= most_s * 1e9
         return long or (bool(most_bytes) and part.whole_bytes >= most_bytes)
@@ -153,8 +138,6 @@ class LogFiles:
     def _end(self, part: PartFile) -> None:
         try:
             part.close()
-            self.links += part.writer.links
-            self.last_link = part.writer.last_link
             if self._owner.t_ns:
                 self.whole_t_ns = self._owner.t_ns
         except OSError as error:
@@ -167,7 +150,8 @@ class LogFiles:
         if self._part is None:
             self.unwritten += part.writer.unsure_messages
         else:
-            self._part.writer.put_open(part.writer.take_open())
+            new, old = self._part.writer, part.writer
+            new.open_chunk, old.open_chunk = old.open_chunk, new.open_chunk
         part.leave()
         goes_on = f"the log goes on in {self._name()}" if self._part else "the log waits for a place to go on"
         self._owner.add_event(code, f"{part.path.name} {text}; {goes_on}")
@@ -186,7 +170,6 @@ class LogFiles:
         self.unwritten += part.writer.unsure_messages
         part.close_without_index(lambda: self._owner.add_event("LOG_WRITE", text))
         self._part = None
-        self._follows = part.writer.last_link
         self._wait_s = _LOOK_S
         fault = Fault("LOG_WRITE", f"{part.path}: {error.strerror}; {self._kept(part.path)}")
         self._note(fault)
@@ -212,11 +195,9 @@ class LogFiles:
 
     def _go_on(self) -> None:
         """Begin the next file; if that fails, wait twice as long before the next try."""
-        before, self._part = self._part, None
-        if before is not None:
-            self._follows = before.writer.last_link
+        self._part = None
         number = self._number + 1
-        self.begins = self.begins or uuid.uuid4().hex  # the first file was lost before its first chunk
+        self._begins = self._begins or uuid.uuid4().hex  # the first file was lost before its first chunk
         part: PartFile | None = None
         try:
             while part is None:
@@ -225,7 +206,7 @@ class LogFiles:
                 except FileExistsError:  # of another log
                     number += 1
             writer = part.writer
-            part.guarded(lambda: self._owner.begin(writer, number, self.begins, self._follows))
+            part.guarded(lambda: self._owner.begin(writer, LogPart(number, self._begins)))
         except (OSError, Fault) as error:
             if part is not None:
                 part.abandon()

@@ -11,7 +11,7 @@ from bridge.faults import Fault
 from bridge.files import LOG, followed, open_new, refuse_to_replace
 from bridge.log.library import LIBRARY
 from bridge.log.live import locked
-from bridge.log.mcap_chunks import ChunkWriter, ending_without_index
+from bridge.log.mcap_chunks import ChunkWriter
 
 
 class PartFile:
@@ -122,21 +122,12 @@ class PartFile:
         with contextlib.suppress(OSError):
             self._file.close()
 
-        def with_last_words() -> None:
-            last_words()
-            self.writer.finish_without_index()
-
-        ends = (with_last_words, self.writer.finish_without_index)
         with contextlib.suppress(OSError), self.path.open("r+b", buffering=0) as file:
-            for end in ends:
+            for words in (last_words, lambda: None):  # `give_up` drops them, so the second try writes 50 bytes
                 file.truncate(self.whole_bytes)
                 file.seek(self.whole_bytes)
                 self.writer.give_up(file)
-                try:
-                    end()
-                except OSError:
-                    continue
-                return
-            file.truncate(self.whole_bytes)
-            file.seek(self.whole_bytes)
-            file.write(ending_without_index())
+                with contextlib.suppress(OSError):
+                    words()
+                    self.writer.finish(index=False)
+                    return

@@ -12,22 +12,24 @@ from mcap.opcode import Opcode
 from mcap.records import Metadata
 
 from bridge.log.library import HEAD, MAGIC
-from bridge.log.storage.chain import CHAIN, HashChain, Stretch, chain_of
 
-PART = "part"  # the metadata record of every file but the first
+PART = "part"  # the metadata record of each file: of the first file after its first chunk, of others before it
 RECOVERED = "recovered"  # the metadata record of a file that `stickslip log recover` wrote; before the record above
 LOST = "lost"  # the metadata record at the end of such a file, if the original log was not whole
-OF_FILES = frozenset({CHAIN, PART, RECOVERED, LOST})  # records about the file, not about its run
-_BEGINNING_BYTES = 1 << 21  # the first link is within: definitions, configurations and one chunk
+_CHAIN = "chain"  # the metadata record after each chunk in logs of version 0.2; its first hash identifies the log
+OF_FILES = frozenset({_CHAIN, PART, RECOVERED, LOST})  # records about the file, not about its run
+_BEGINNING_BYTES = 1 << 21  # the record of the file is within: definitions, configurations and one chunk
 
 
 class LogPart(NamedTuple):
     """The place of a file in a log of several files."""
 
     number: int  # of the file, from 0
-    begins: str  # SHA-256 of the first link of the log's first file
-    follows: str  # SHA-256 of the last link of the file before
-    recovered: bool = False  # it was rewritten, and its links differ from those known to the next file
+    begins: str  # identifies the log: made of the first bytes of its first file
+
+    def as_texts(self) -> dict[str, str]:
+        """The fields of the metadata record."""
+        return {"number": json.dumps(self.number), "begins": json.dumps(self.begins)}
 
 
 def part_path(first: Path, number: int) -> Path:
@@ -36,25 +38,23 @@ def part_path(first: Path, number: int) -> Path:
 
 
 def part_of(path: Path) -> LogPart | None:
-    """The place of a file; number 0 for a first file. None if it cannot be read."""
+    """The place of a file; number 0 for a first file. None if it cannot be read, or is alone."""
     try:
         with path.open("rb") as file:
             data = file.read(_BEGINNING_BYTES)
         at = len(MAGIC) if data.startswith(MAGIC) else len(data)
-        recovered: str | None = None
+        recovered = ""
         while at + HEAD.size <= len(data):
             opcode, length = HEAD.unpack_from(data, at)
             at += HEAD.size
             if opcode == Opcode.METADATA:
                 record = Metadata.read(ReadDataStream(BytesIO(data[at : at + length])))
                 if record.name == PART:
-                    value = {key: json.loads(text) for key, text in record.metadata.items()}
-                    place = int(value["number"]), str(value["begins"]), str(value["follows"])
-                    return LogPart(*place, recovered is not None)
+                    return LogPart(*(json.loads(record.metadata[key]) for key in LogPart._fields))
                 if record.name == RECOVERED:
-                    recovered = record.metadata["begins"]
-                if record.name == CHAIN:
-                    return LogPart(0, recovered or record.metadata["sha256"], "", recovered is not None)
+                    recovered = record.metadata.get("begins", "")
+                if record.name == _CHAIN:
+                    return LogPart(0, recovered or record.metadata["sha256"])
             at += length
     except Exception:
         return None
@@ -63,61 +63,22 @@ def part_of(path: Path) -> LogPart | None:
 
 def parts_of(path: Path) -> list[Path]:
     """The files of a log from `path` on, in order; `path` alone if no other file continues it."""
-    numbered = re.fullmatch(r"(.*)-(\d{4,})", path.stem)
-    others = _numbered(path.stem, path)
-    place = part_of(path) if others or numbered else None
+    likely = _numbered(path.stem, path) or re.search(r"-\d{4,}$", path.stem)
+    place = part_of(path) if likely else None
     if place is None:
         return [path]
-    if place.number:
-        others = _numbered(numbered[1], path) if numbered else {}
-    rest = {number: other for number, other in others.items() if number > place.number}
-    mine = [rest[number] for number in sorted(rest) if _belongs(rest[number], number, place.begins)]
-    return [path, *mine]
+    stem = path.stem.removesuffix(f"-{place.number:04d}") if place.number else path.stem
+    later = [(number, other) for number, other in _numbered(stem, path) if number > place.number]
+    return [path, *(other for number, other in later if part_of(other) == LogPart(number, place.begins))]
 
 
 def later_names(path: Path) -> list[Path]:
     """Files named like further files of the log `path`, in order."""
-    named = _numbered(path.stem, path)
-    return [named[number] for number in sorted(named)]
+    return [other for _, other in _numbered(path.stem, path)]
 
 
-def _numbered(stem: str, first: Path) -> dict[int, Path]:
-    """Files in the folder of `first` named like further files of the log `stem`."""
+def _numbered(stem: str, first: Path) -> list[tuple[int, Path]]:
+    """Files in the folder of `first` named like further files of the log `stem`, in order of their numbers."""
     named = re.compile(rf"{re.escape(stem)}-(\d{{4,}}){re.escape(first.suffix)}")
     likely = first.parent.glob(f"{glob.escape(stem)}-[0-9][0-9][0-9][0-9]*")
-    matches = ((named.fullmatch(other.name), other) for other in likely)
-    return {int(match[1]): other for match, other in matches if match}
-
-
-def _belongs(path: Path, number: int, begins: str) -> bool:
-    part = part_of(path)
-    return part is not None and part.number == number and part.begins == begins
-
-
-def chain_of_log(path: Path) -> HashChain:
-    """The chain of all files of a log, including whether each file continues the one before. Raises Fault BAD_LOG."""
-    parts = parts_of(path)
-    chains = [chain_of(part) for part in parts]
-    whole = chains[0]
-    before = part_of(path) if len(parts) > 1 else None
-    for part, chain in zip(parts[1:], chains[1:], strict=True):
-        place = part_of(part)
-        changed = [*whole.changed, *chain.changed]
-        changes = whole.changes + chain.changes
-        anew = (before is not None and before.recovered) or whole.rewritten_by or chain.rewritten_by
-        if place is not None and whole.last and place.follows != whole.last and not anew:
-            changed.append(Stretch(part.name, 0, 0))
-            changes += 1
-        before = place
-        whole = HashChain(
-            whole.links + chain.links,
-            whole.first,
-            chain.last or whole.last,
-            changed,
-            changes,
-            whole.ended and chain.ended,
-            chain.covered_bytes,
-            whole.closed and chain.closed,
-            whole.rewritten_by or chain.rewritten_by,
-        )
-    return whole
+    return sorted((int(match[1]), other) for other in likely if (match := named.fullmatch(other.name)))

@@ -10,7 +10,8 @@ from bridge.log.block_rows import FIELDS_BYTES, MessageRows, rows
 from bridge.log.chunk_messages import HEAD, Bytes, Column, cut
 from bridge.log.viewers.stretches import ScopeBlocks, Stretches, last_of_stretches
 from bridge.wire import topics
-from bridge.wire.messages import APPLIED, CHANNELS, TRACE, Layout, sensor_block
+from bridge.wire.channels import CHANNELS
+from bridge.wire.messages import APPLIED, TRACE, Layout, sensor_block
 
 # Blocks that become messages at once: one second. Fewer: numpy's call overhead dominates; with the 100 blocks of a chunk it is a
 # third of the cost of writing the log. More: a kill loses more of this topic, and viewers must look further ahead.
@@ -59,7 +60,7 @@ class ScopeMaker:
             heads, starts = _found(data, [indexes[topic] for _, indexes in waiting], begins)
             right = np.flatnonzero(heads["length"] == FIELDS_BYTES + layout.size)
             last_ones = right[last_of_stretches(heads["publish_ns"].astype(np.int64)[right])]
-            self._stretches.say(topic, cut(data, starts[last_ones], layout.size).view(layout.dtype))
+            self._stretches.add(topic, cut(data, starts[last_ones], layout.size).view(layout.dtype))
         blocks = self._blocks(data, *_found(data, [indexes[topics.SENSORS.name] for _, indexes in waiting], begins))
         records, log_ns = self._stretches.made(blocks, last)
         return None if records is None else rows({channels[topics.SCOPE.name]: records}, {}, log_ns)

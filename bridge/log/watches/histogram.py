@@ -9,6 +9,7 @@ import numpy.typing as npt
 # (now 5500 bins of 8 bytes). Larger: visibly stepped percentiles.
 _RATIO = 1.005
 _LOWEST, _HIGHEST = 1e-3, 1e9  # values beyond count in the first or last bin
+_BINS_PER_BAR = 23  # 20 bars a decade
 _BINS = int(np.ceil(np.log(_HIGHEST / _LOWEST) / np.log(_RATIO)))
 
 
@@ -28,6 +29,16 @@ class Histogram:
         self._bins += np.bincount(np.minimum(at.astype(np.int64), _BINS - 1), minlength=_BINS)
         self.count += len(values)
         self.most = max(self.most, float(values.max()))
+
+    def bars(self, unit: str) -> dict[str, list[float]] | None:
+        """Edges as `edges_` with the unit of the values, and `counts` of 20 bars a decade; None without values."""
+        bars = np.add.reduceat(self._bins, np.arange(0, _BINS, _BINS_PER_BAR))
+        filled = np.flatnonzero(bars)
+        if not len(filled):
+            return None
+        first, end = int(filled[0]), int(filled[-1]) + 1
+        edges = _LOWEST * _RATIO ** (_BINS_PER_BAR * np.arange(first, end + 1))
+        return {f"edges_{unit}": np.round(edges, 3).tolist(), "counts": bars[first:end].tolist()}
 
     def quantile(self, share: float) -> float:
         """The value below which this share of the values is, to 0.25 %; 0 without values."""

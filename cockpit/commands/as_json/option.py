@@ -11,10 +11,11 @@ import typer
 from typer.core import TyperGroup
 
 from bridge.faults import Fault
-from bridge.files import JSON, refuse_to_replace, strict_json, write_json
+from bridge.files import JSON, refuse_to_replace
 from bridge.plain import plain
 from bridge.provenance import COMMAND
-from cockpit.run.child_process import guarded, report
+from bridge.results import strict_json, write_json
+from cockpit.run.child_process import exit_status_of, report
 from cockpit.run.writable import check_output, writing
 
 STDOUT = Path("-")
@@ -53,7 +54,7 @@ class JsonGroup(TyperGroup):
             command = wrong.ctx.command_path if wrong.ctx else "stickslip"
             message = wrong.format_message().rstrip(".")
             line = f"{command}: {message}{_perhaps_meant(message)}; see {command} --help"
-            status = guarded(lambda: report(Fault("CONFIG", line), as_json=True))
+            status = exit_status_of(lambda: report(Fault("CONFIG", line), as_json=True))
         sys.exit(status or 0)
 
 
@@ -82,7 +83,7 @@ def carry_out(work: Callable[[], int | None], as_json: Path | None) -> NoReturn:
         except Fault as fault:
             raise Fault(fault.kind.code, fault.line + _perhaps_meant(fault.line)) from None
 
-    sys.exit(guarded(checked, as_json == STDOUT))
+    sys.exit(exit_status_of(checked, as_json == STDOUT))
 
 
 def _perhaps_meant(message: str) -> str:
@@ -91,7 +92,7 @@ def _perhaps_meant(message: str) -> str:
     return f"; if it is meant as the file of {_OPTION}, it must end in {_SUFFIX}" if about else ""
 
 
-def tell(as_json: Path | None, result: Any, words: Iterable[str], indent: int | None = None) -> None:
+def print_result(as_json: Path | None, result: Any, words: Iterable[str], indent: int | None = None) -> None:
     """Print a result as JSON, or write it to a file and print its lines. Raises Fault LOG_WRITE.
 
     Args:

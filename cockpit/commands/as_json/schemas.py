@@ -1,7 +1,8 @@
 """Every TOML and JSON format of the project by name, each with its JSON Schema."""
 
 from collections.abc import Callable
-from typing import Any, Literal, NamedTuple, NotRequired
+from importlib import import_module
+from typing import Any, NamedTuple
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -81,17 +82,10 @@ def _with_pairs_and_effects(schema: dict[str, Any]) -> dict[str, Any]:
     return schema
 
 
-def _controller() -> dict[str, Any]:
-    from controller.config import ControllerConfig
-
-    return ControllerConfig.model_json_schema()
-
-
 def _evidence() -> dict[str, Any]:
     from diagnosis.evidence.manifest import Manifest
 
-    schema = Manifest.model_json_schema()
-    return _with_channels(schema)
+    return _with_channels(Manifest.model_json_schema())
 
 
 def _import_map() -> dict[str, Any]:
@@ -121,15 +115,9 @@ def _with_channels(schema: dict[str, Any]) -> dict[str, Any]:
         channels |= {"properties": dict.fromkeys(STANDARD, channel), "additionalProperties": False}
     rig = schema["$defs"]["RigTable"]
     # numbers that the owner of a rig rarely knows are optional; the diagnosis assumes them
-    rig |= (
-        {
-            "required": [
-                name for name in rig["required"] if not name.startswith(("contact", "viscous", "mass", "stribeck"))
-            ]
-        }
-        if "required" in rig
-        else {}
-    )
+    rarely_known = ("contact", "viscous", "mass", "stribeck")
+    if "required" in rig:
+        rig["required"] = [name for name in rig["required"] if not name.startswith(rarely_known)]
     numbers = [
         name
         for name in RigTable.model_fields
@@ -144,200 +132,92 @@ def _with_channels(schema: dict[str, Any]) -> dict[str, Any]:
 # JSON: from the types of the results
 
 
-def _diagnosis_type() -> Any:
-    from cockpit.commands.as_json.types import table
-    from diagnosis.result import FORMAT, Candidate, Diagnosis, Estimate
-
-    candidate = table(Candidate, {"form": NotRequired[str], "parameters": NotRequired[dict[str, Estimate]]})
-    return table(Diagnosis, {"format": Literal[FORMAT], "candidates": list[candidate]}, left_out=("pictures",))
-
-
-def _diagnosis() -> dict[str, Any]:
-    from cockpit.commands.as_json.types import schema_of
-
-    return schema_of(_diagnosis_type())
-
-
-def _diagnoses() -> dict[str, Any]:
-    from cockpit.commands.as_json.types import objects, schema_of
-    from cockpit.commands.diagnose_output import MANY_FORMAT
-
-    fault = objects("FolderFault", {"fault": str, "line": str})
-    folder = {"evidence": str, "diagnosis": NotRequired[_diagnosis_type()], "fault": NotRequired[fault]}
-    return schema_of(objects("Diagnoses", {"format": Literal[MANY_FORMAT], "results": list[objects("Folder", folder)]}))
-
-
-def _fault() -> dict[str, Any]:
-    from cockpit.commands.as_json.types import objects, schema_of
-
-    return schema_of(objects("Fault", {"fault": str, "line": str, "exit_status": int}))
-
-
-def _verdict(**more: Any) -> Any:
-    """The type of a verdict, with more fields."""
-    from cockpit.commands.as_json.types import table
-    from cockpit.judge.verdict import NOT_JUDGED, NOT_OK, OK, RunVerdict
-
-    words = dict.fromkeys(("headline", "reason", "data"), str)
-    lists = dict.fromkeys(("trips", "injected", "warnings"), list[str])
-    return table(RunVerdict, {"good": bool, "control": Literal[OK, NOT_OK, NOT_JUDGED]} | words | lists | more)
-
-
-def _run() -> dict[str, Any]:
-    from cockpit.commands.as_json.types import schema_of
-    from cockpit.judge.margins import Margins
-    from cockpit.judge.phases import Phase
-
-    more = {"effects": NotRequired[list[str]], "loop": NotRequired[Margins], "without": NotRequired[Phase]}
-    return schema_of(_verdict(rig=str, **more))
-
-
-def _log_info() -> dict[str, Any]:
-    from bridge.log.finding import Finding
-    from cockpit.commands.as_json.types import objects, schema_of
-
-    one = _verdict(findings=list[Finding])
-    fault = objects("LogFault", {"fault": str, "line": str, "exit_status": int})
-    return schema_of(one | list[one | fault])
-
-
-def _plot() -> dict[str, Any]:
-    from cockpit.commands.as_json.types import schema_of
-
-    return schema_of(_verdict(picture=str, data=str | None))
-
-
-def _review() -> dict[str, Any]:
-    from cockpit.commands.as_json.types import objects, schema_of
-
-    return schema_of(objects("Review", {"page": str, "logs": list[_verdict()]}))
-
-
-def _look() -> dict[str, Any]:
-    from bridge.log.finding import Finding
-    from cockpit.commands.as_json.types import objects, schema_of
-
-    number = objects("Number", {"value": float, "interval_90": list[float | None], "unit": str})
-    of_speed = {"speed_mps": float, "times": int, "mean_N": number, "breakaway_N": number | None}
-    fields = {
-        "headline": str,
-        "seconds": float,
-        "rate_Hz": float,
-        "noise_N": float,
-        "slips": int,
-        "swings_without_stick": int,
-        "mean_force_N": float,
-        "numbers": dict[str, number],
-        "at_speeds": list[objects("AtSpeed", of_speed)],
-        "findings": list[Finding],
-        "written": list[str],
-    }
-    return schema_of(objects("Look", fields))
-
-
-def _log_recover() -> dict[str, Any]:
-    from bridge.log.damage import Damage
-    from cockpit.commands.as_json.types import schema_of, table
-
-    return schema_of(table(Damage, {"messages": int, "attachments": int, "out": str}))
-
-
-def _explain() -> dict[str, Any]:
-    from bridge.wire.event_codes import EventCode
-    from bridge.wire.words import ColumnWord
-    from cockpit.commands.as_json.types import schema_of
-    from cockpit.commands.explain import Meaning
-
-    return schema_of(list[Meaning | ColumnWord | EventCode])
-
-
-def _reproduce() -> dict[str, Any]:
-    from cockpit.commands.as_json.types import schema_of, table
-    from cockpit.paper.page import ReproduceResult
-
-    return schema_of(table(ReproduceResult, {"passed": bool, "verdict": str}))
-
-
-def _faults() -> dict[str, Any]:
-    from cockpit.faults.catalogue import FaultGroup
-
-    return FaultGroup.model_json_schema()
-
-
-def _soak() -> dict[str, Any]:
-    from cockpit.commands.as_json.types import schema_of
-    from cockpit.run.soak import Memory, Period
-
-    more = {"scenario": str, "wanted_s": float, "interrupted": bool, "memory": list[Memory], "periods": list[Period]}
-    return schema_of(_verdict(**more))
-
-
-def result_of(module: str, kind: str, many: bool = False) -> Callable[[], dict[str, Any]]:
-    """The schema of a command whose result is a named tuple, or a list of named tuples."""
+def result_of(place: str) -> Callable[[], dict[str, Any]]:
+    """The schema of a result or a table, from the place `module:name` of its type."""
 
     def make() -> dict[str, Any]:
-        from importlib import import_module
-
         from cockpit.commands.as_json.types import schema_of
 
-        made = getattr(import_module(module), kind)
-        return schema_of(list[made] if many else made)
+        module, _, name = place.partition(":")
+        return schema_of(getattr(import_module(module), name))
 
     return make
 
 
+def _log_info() -> dict[str, Any]:
+    from cockpit.commands.as_json.types import schema_of
+    from cockpit.judge.judged import Judged
+    from cockpit.run.child_process import ReportedFault
+
+    return schema_of(Judged | list[Judged | ReportedFault])
+
+
+_RESULTS = {
+    "run": "cockpit.run.outcome:RunOutcome",
+    "plant": "cockpit.commands.processes:Served",
+    "controller": "cockpit.commands.processes:Served",
+    "record": "cockpit.commands.processes:Recorded",
+    "status": "cockpit.live.status:Status",
+    "fault": "cockpit.faults.injection:Injected",
+    "soak": "cockpit.run.soak:Soaked",
+    "certs": "cockpit.run.authority:Made",
+    "replay": "cockpit.run.replay:ReplayResult",
+    "plot": "cockpit.figures.run_figure:Plotted",
+    "review": "cockpit.review.page:Reviewed",
+    "look": "cockpit.look.result:Looked",
+    "map": "cockpit.figures.stability_map:MapResult",
+    "reproduce": "cockpit.paper.page:ReproduceResult",
+    "example": "cockpit.commands.example:Example",
+    "log check": "bridge.log.check.log_check:LogCheck",
+    "log recover": "bridge.log.recover:Recovered",
+    "log export": "bridge.tables.export:Exported",
+    "log import": "diagnosis.evidence.import_table:Imported",
+    "scenarios": "cockpit.commands.scenarios:Shipped",
+    "explain": "cockpit.commands.explain:Explained",
+    "schema": "cockpit.commands.schema:SchemaNames",
+}
 TOML = (
     Format("rig", "A rig file, as in deploy/rigs: `--rig FILE.toml`.", _rig),
     Format("scenario", "A scenario file, as in deploy/scenarios: `--scenario FILE.toml`.", scenario),
-    Format("faults", "A group of the catalogue of `python -m bench faults`, as in deploy/faults.", _faults),
-    Format("controller", "The table [controller] of a scenario, and the configuration in a log.", _controller),
+    Format(
+        "faults",
+        "A group of the catalogue of `python -m bench faults`, as in deploy/faults.",
+        result_of("cockpit.faults.catalogue:FaultGroup"),
+    ),
+    Format(
+        "controller",
+        "The table [controller] of a scenario, and the configuration in a log.",
+        result_of("controller.config:ControllerConfig"),
+    ),
     Format("evidence-1", "manifest.toml of an evidence folder, evidence/1.", _evidence),
     Format("import-map", "A channel map: `stickslip log import --map FILE.toml`.", _import_map),
 )
 JSON = (
-    Format("diagnosis-2", "`stickslip diagnose FOLDER --json`, diagnosis/2.", _diagnosis),
-    Format("diagnoses-2", "`stickslip diagnose --json` of several folders, diagnoses/2.", _diagnoses),
+    Format("diagnosis-2", "`stickslip diagnose FOLDER --json`, diagnosis/2.", result_of("diagnosis.result:Diagnosis")),
+    Format(
+        "diagnoses-2",
+        "`stickslip diagnose --json` of several folders, diagnoses/2.",
+        result_of("cockpit.commands.diagnose_output:Diagnoses"),
+    ),
     Format(
         "fleet-1",
         "index.json that `stickslip diagnose --report DIR` of several folders writes.",
-        result_of("cockpit.fleet.groups", "Fleet"),
+        result_of("cockpit.fleet.groups:Fleet"),
     ),
-    Format("fault", "Any command that fails with JSON on stdout.", _fault),
-    Format("run-result", "`stickslip run --json`.", _run),
-    Format("plant-result", "`stickslip plant --json`.", result_of("cockpit.commands.processes", "Served")),
-    Format("controller-result", "`stickslip controller --json`.", result_of("cockpit.commands.processes", "Served")),
-    Format("record-result", "`stickslip record --json`.", result_of("cockpit.commands.processes", "Recorded")),
-    Format("status-result", "`stickslip status --json`.", result_of("cockpit.run.status", "Status")),
+    Format(
+        "fault", "Any command that fails with JSON on stdout.", result_of("cockpit.run.child_process:ReportedFault")
+    ),
     Format(
         "word-result",
         "`stickslip arm --json`; disarm, stop and reset print the same format.",
-        result_of("cockpit.run.operator", "CommandOutcome"),
+        result_of("cockpit.live.operator:CommandOutcome"),
     ),
-    Format("fault-result", "`stickslip fault --json`.", result_of("cockpit.faults.injection", "Injected")),
-    Format("fault-list", "`stickslip fault --list --json`.", result_of("cockpit.faults.catalogue", "FaultList")),
-    Format("soak-result", "`stickslip soak --json`.", _soak),
-    Format("certs-result", "`stickslip certs --json`.", result_of("cockpit.run.authority", "Made")),
-    Format("replay-result", "`stickslip replay --json`.", result_of("cockpit.run.replay", "Replayed", many=True)),
-    Format(
-        "closed-loop-result", "`stickslip replay --closed-loop --json`.", result_of("cockpit.run.replay", "Compared")
-    ),
-    Format("plot-result", "`stickslip plot --json`.", _plot),
-    Format("review-result", "`stickslip review --json`.", _review),
-    Format("look-result", "`stickslip look --json`.", _look),
-    Format("map-result", "`stickslip map --json`.", result_of("cockpit.judge.stability_map", "MapResult")),
-    Format("reproduce-result", "`stickslip reproduce --json`.", _reproduce),
-    Format("example-result", "`stickslip example --json`.", result_of("cockpit.commands.example", "Example")),
+    Format("fault-list", "`stickslip fault --list --json`.", result_of("cockpit.faults.catalogue:FaultList")),
+    Format("closed-loop-result", "`stickslip replay --closed-loop --json`.", result_of("cockpit.run.replay:Compared")),
     Format("log-info-result", "`stickslip log info --json`; of several logs a list.", _log_info),
-    Format("log-check-result", "`stickslip log check --json`.", result_of("bridge.log.check.log_check", "LogCheck")),
-    Format("log-recover-result", "`stickslip log recover --json`.", _log_recover),
-    Format("log-export-result", "`stickslip log export --json`.", result_of("bridge.tables.export", "Exported")),
-    Format(
-        "log-import-result", "`stickslip log import --json`.", result_of("diagnosis.evidence.import_table", "Imported")
-    ),
-    Format("scenarios-result", "`stickslip scenarios --json`.", result_of("cockpit.commands.scenarios", "Shipped")),
-    Format("explain-result", "`stickslip explain --json`.", _explain),
-    Format(
-        "schema-result", "`stickslip schema --json`.", result_of("cockpit.commands.schema", "SchemaName", many=True)
+    *(
+        Format(f"{command.replace(' ', '-')}-result", f"`stickslip {command} --json`.", result_of(place))
+        for command, place in _RESULTS.items()
     ),
 )
 FORMATS = {row.name: row for row in (*TOML, *JSON)}

@@ -1,34 +1,19 @@
 """JSON Schemas of results, derived from the Python types of the results."""
 
 import types
-from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
-from typing import Any, Literal, NotRequired, Union, get_args, get_origin, get_type_hints, is_typeddict
+from typing import Any, Literal, NotRequired, Union, get_args, get_origin, get_type_hints
 
 from pydantic import ConfigDict, TypeAdapter
 from typing_extensions import TypedDict  # pydantic refuses typing.TypedDict before Python 3.12
 
+from bridge.results import json_names
+
 
 def schema_of(kind: Any) -> dict[str, Any]:
-    """JSON Schema of the JSON that `tell` writes for a value of type `kind`."""
+    """JSON Schema of the JSON that `bridge.results.strict_json` makes of a value of type `kind`."""
     return TypeAdapter[Any](_written(kind)).json_schema()
-
-
-def table(kind: Any, more: Mapping[str, Any], left_out: tuple[str, ...] = ()) -> Any:
-    """The type of an object with the fields of a named tuple, without those in `left_out` and with those in `more`.
-
-    A field in `more` replaces the field of the same name; `NotRequired[...]` marks an optional field.
-    """
-    fields = {name: hint for name, hint in get_type_hints(kind).items() if name not in left_out}
-    return objects(kind.__name__, fields | dict(more))
-
-
-def objects(name: str, fields: Mapping[str, Any]) -> Any:
-    """The type of an object with these fields and no others."""
-    make: Any = TypedDict
-    made = make(name, {field: _written(hint) for field, hint in fields.items()})
-    made.__pydantic_config__ = ConfigDict(extra="forbid")
-    return made
 
 
 def _written(kind: Any) -> Any:
@@ -37,10 +22,10 @@ def _written(kind: Any) -> Any:
         return float | None
     if kind is Path:
         return str
-    if isinstance(kind, type) and hasattr(kind, "_fields"):
-        return table(kind, {})
+    if hasattr(kind, "_fields"):
+        return _object(kind)
     origin, inner = get_origin(kind), get_args(kind)
-    if origin is None or origin is Literal or is_typeddict(kind):
+    if origin is None or origin is Literal:
         return kind
     if origin is tuple and inner[1:] == (Ellipsis,):
         return list[_written(inner[0])]
@@ -48,4 +33,27 @@ def _written(kind: Any) -> Any:
     if origin in (Union, types.UnionType):
         return Union[plain]  # noqa: UP007 (made of a list)
     generic: Any = origin
-    return NotRequired[plain[0]] if origin is NotRequired else generic[plain]
+    return generic[plain]
+
+
+@cache
+def _object(kind: Any) -> Any:
+    make: Any = TypedDict
+    made = make(kind.__name__, _entries(kind))
+    made.__pydantic_config__ = ConfigDict(extra="forbid")
+    return made
+
+
+def _entries(kind: Any) -> dict[str, Any]:
+    """Types of the entries of a named tuple's JSON, by name."""
+    hints = get_type_hints(kind)
+    optional, merged = getattr(kind, "JSON_OPTIONAL", ()), getattr(kind, "JSON_MERGED", "")
+    entries = _entries(hints[merged]) if merged else {}
+    for name in json_names(kind):
+        hint = hints[name] if name in hints else get_type_hints(getattr(kind, name).fget)["return"]
+        if name in optional:
+            present = [part for part in get_args(hint) if part is not types.NoneType]
+            entries[name] = NotRequired[_written(present[0] if types.NoneType in get_args(hint) else hint)]
+        else:
+            entries[name] = _written(hint)
+    return entries

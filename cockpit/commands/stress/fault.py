@@ -5,8 +5,8 @@ from typing import Annotated
 import typer
 
 from bridge.faults import Fault
-from cockpit.commands.as_json.option import Json, carry_out, tell
-from cockpit.commands.options import DEFAULT_SCENARIO, Certs, Endpoint, Prefix, ScenarioName, as_settings
+from cockpit.commands.as_json.option import Json, print_result
+from cockpit.commands.options import BUS, SharedOptions, command
 
 
 def _entry_names(incomplete: str) -> list[str]:
@@ -15,7 +15,9 @@ def _entry_names(incomplete: str) -> list[str]:
     return entry_names(incomplete)
 
 
+@command(*BUS)
 def fault(
+    shared: SharedOptions,
     name: Annotated[
         str, typer.Argument(help="Name of a fault in the catalogue; --list prints all.", autocompletion=_entry_names)
     ] = "",
@@ -25,37 +27,27 @@ def fault(
     ] = None,
     clear: Annotated[bool, typer.Option("--clear", help="First end all faults that are active at the rig.")] = False,
     known: Annotated[bool, typer.Option("--list", help="Print the catalogue and every kind of fault.")] = False,
-    scenario: ScenarioName = DEFAULT_SCENARIO,
-    endpoint: Endpoint = None,
-    prefix: Prefix = None,
-    certs: Certs = None,
     as_json: Json = None,
 ) -> None:
     """Inject a fault into a running loop with a simulated rig. A real rig refuses it; its processes must be of this user."""
+    from cockpit.faults.catalogue import FaultList, find_entry, known_faults
+    from cockpit.faults.injection import inject
 
-    def work() -> None:
-        from cockpit.faults.catalogue import FaultList, find_entry, known_faults
-        from cockpit.faults.injection import inject
-        from cockpit.run.scenario_file import load_bus
-
-        if known:
-            catalogue: FaultList = known_faults()
-            tell(as_json, catalogue, catalogue.in_words())
-            return
-        if not (name or clear):
-            raise Fault("CONFIG", "NAME: missing: must be a fault of the catalogue; see `stickslip fault --list`")
-        tables = list(find_entry(name).entry.fault) if name else []
-        if name and not tables:
-            raise Fault(
-                "CONFIG",
-                f"{name}: is an operator command: must be a fault; see `stickslip {name.split('-')[0]} --help`",
-            )
-        changed = {} if for_s is None else {"for_s": for_s}
-        tables = [
-            type(table).model_validate(table.model_dump() | {"name": table.name or name} | changed) for table in tables
-        ]
-        bus = load_bus(scenario, as_settings([], None, endpoint, prefix, certs))
-        done = inject(bus, name or "clear", tables, clear)
-        tell(as_json, done, done.in_words())
-
-    carry_out(work, as_json)
+    if known:
+        catalogue: FaultList = known_faults()
+        print_result(as_json, catalogue, catalogue.in_words())
+        return
+    if not (name or clear):
+        raise Fault("CONFIG", "NAME: missing: must be a fault of the catalogue; see `stickslip fault --list`")
+    tables = list(find_entry(name).entry.fault) if name else []
+    if name and not tables:
+        raise Fault(
+            "CONFIG",
+            f"{name}: is an operator command: must be a fault; see `stickslip {name.split('-')[0]} --help`",
+        )
+    changed = {} if for_s is None else {"for_s": for_s}
+    tables = [
+        type(table).model_validate(table.model_dump() | {"name": table.name or name} | changed) for table in tables
+    ]
+    done = inject(shared.bus(), name or "clear", tables, clear)
+    print_result(as_json, done, done.in_words())

@@ -6,65 +6,46 @@ from typing import Annotated
 import typer
 
 from bridge.faults import Fault
-from cockpit.commands.as_json.option import Json, carry_out, tell
-from cockpit.commands.options import (
-    Certs,
-    Endpoint,
-    LogFile,
-    Prefix,
-    ScenarioName,
-    Seed,
-    Settings,
-    as_settings,
-    watched_share,
-)
+from cockpit.commands.as_json.option import Json, print_result
+from cockpit.commands.options import SharedOptions, command, watched_share
 from cockpit.run.child_process import stopped_once
 
 _PAGE = (".md",)
 
 
+@command("settings", "seed", "endpoint", "prefix", "certs", "log", scenario="belt-axis")
 def soak(
-    scenario: ScenarioName = "belt-axis",
+    shared: SharedOptions,
     hours: Annotated[float, typer.Option(min=0.0, help="Duration in hours.")] = 0.0,
     minutes: Annotated[float, typer.Option(min=0.0, help="Duration in minutes, added to --hours.")] = 0.0,
-    settings: Settings = [],  # noqa: B006
-    seed: Seed = None,
-    endpoint: Endpoint = None,
-    prefix: Prefix = None,
-    certs: Certs = None,
-    log: LogFile = None,
     report: Annotated[Path | None, typer.Option(metavar="FILE", help="Report to write, one .md file.")] = None,
     as_json: Json = None,
-) -> None:
+) -> int:
     """Run a loop for hours: verdict, memory of each process, latency over time; exit status 1: ended early, or lost messages.
 
     Ctrl-C ends it with a result. Its log is deleted at the end unless --log is given.
     """
+    from bridge.files import write_whole
+    from cockpit.run.child_process import warn_without_priority
+    from cockpit.run.scenario import load_scenario, refuse_short_blocks
+    from cockpit.run.soak import soak as run
+    from cockpit.run.writable import LOG, check_output, writing
 
-    def work() -> int:
-        from bridge.files import write_whole
-        from cockpit.run.child_process import warn_without_priority
-        from cockpit.run.scenario import load_scenario, refuse_short_blocks
-        from cockpit.run.soak import soak as run
-        from cockpit.run.writable import LOG, check_output, writing
-
-        seconds = 3600.0 * hours + 60.0 * minutes
-        if seconds <= 0.0:
-            raise Fault("CONFIG", "--hours, --minutes: missing: their sum must be above 0; give one of them")
-        changed = as_settings(settings, seed, endpoint, prefix, certs)
-        made = load_scenario(scenario, [*changed, f"duration_s={seconds}"])
-        refuse_short_blocks(made)
-        for path, option, kind in ((report, "--report", _PAGE), (log, "--log", LOG)):
-            if path is not None:
-                check_output(option, path, kind)
-        warn_without_priority()
-        arguments = ["--scenario", scenario, *(part for setting in changed for part in ("--set", setting))]
-        with stopped_once(), watched_share("soaking", quiet=False) as progress:
-            soaked = run(made.name, arguments, made.bus, seconds, log, progress)
-        if report is not None:
-            with writing(report):
-                write_whole(report, soaked.page())
-        tell(as_json, soaked.as_dict(), soaked.in_words())
-        return 0 if soaked.good else 1
-
-    carry_out(work, as_json)
+    seconds = 3600.0 * hours + 60.0 * minutes
+    if seconds <= 0.0:
+        raise Fault("CONFIG", "--hours, --minutes: missing: their sum must be above 0; give one of them")
+    changed = shared.as_settings()
+    made = load_scenario(shared.scenario, [*changed, f"duration_s={seconds}"])
+    refuse_short_blocks(made)
+    for path, option, kind in ((report, "--report", _PAGE), (shared.log, "--log", LOG)):
+        if path is not None:
+            check_output(option, path, kind)
+    warn_without_priority()
+    arguments = ["--scenario", shared.scenario, *(part for setting in changed for part in ("--set", setting))]
+    with stopped_once(), watched_share("soaking", quiet=False) as progress:
+        soaked = run(made.name, arguments, made.bus, seconds, shared.log, progress)
+    if report is not None:
+        with writing(report):
+            write_whole(report, soaked.page())
+    print_result(as_json, soaked, soaked.in_words())
+    return 0 if soaked.good else 1

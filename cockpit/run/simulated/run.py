@@ -12,6 +12,7 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.inbox import WAITING
 from bridge.wire.session import LEASE_S
 from bridge.wire.topics import OPERATOR, TOPICS, Outgoing
+from cockpit.run.in_process import TimedAction
 from cockpit.run.scenario import Scenario
 from cockpit.run.simulated.bus import Hub, Receive, Session
 from cockpit.run.simulated.stage import Player, Stage, WaitingInbox
@@ -27,13 +28,6 @@ _LINKED_S = 0.05  # from the resumption of a frozen process to its new link
 _LONGEST_AFTER_S = 2.0  # for the fade-out and the end of the processes after the last block
 _POSITION, _VELOCITY = TRUTH.index("true_drive_position_m"), TRUTH.index("true_velocity_mps")
 _GRANTED = "simulated time"
-
-
-class ScriptedAction(NamedTuple):
-    """An operator command at a time of the run."""
-
-    at_s: float
-    action: int  # of `wire.Operator.Action`
 
 
 class Truth(NamedTuple):
@@ -76,7 +70,7 @@ class SimulatedRun:
 
     """
 
-    def __init__(self, scenario: Scenario, words: Sequence[ScriptedAction] = (), arm: bool | None = None) -> None:
+    def __init__(self, scenario: Scenario, words: Sequence[TimedAction] = (), arm: bool | None = None) -> None:
         self._scenario = scenario
         self._arm = scenario.arm if arm is None else arm
         self._stage = Stage()
@@ -90,7 +84,7 @@ class SimulatedRun:
         for table in faults:
             self._stage.cue(round(table.from_s * 1e9), lambda table=table: self._disturb(table))
         for word in words:
-            self._stage.cue(round(word.at_s * 1e9), lambda word=word: self._send(word))
+            self._stage.cue(word.t_ns, lambda word=word: self._send(word))
 
     def listen(self, receive: Receive) -> None:
         """Receive every message of the run, as a recorder does."""
@@ -165,7 +159,7 @@ class SimulatedRun:
         self._hub.announce("controller")
         self._players["controller"] = stage.enter(Player("controller", lambda: process.loop(self._stop, _GRANTED)))
 
-    def _send(self, word: ScriptedAction) -> None:
+    def _send(self, word: TimedAction) -> None:
         command = wire.Operator(action=cast(Any, word.action), who="a person")
         self._hub.put("cockpit", OPERATOR, command.SerializeToString())
 

@@ -1,6 +1,6 @@
 """Kept sizes: with these a set is made again without sizing, and is the same set for every version of the sizing.
 
-`<generator>-<seed>.toml` beside this file has a table for the seed of each case; an entry gives the strength of an effect and
+`<generator>-<seed>.toml` next to this file has a table for the seed of each case; an entry gives the strength of an effect and
 the detection limits that the effect is worth. These files hold all of the answers but the names of the cases, so a set made
 with them is development data.
 """

@@ -54,6 +54,7 @@ def test_a_fault_is_json_where_the_result_would_be() -> None:
     [
         (["bench", "control", "--small"], "python -m bench control --small"),
         (["blind", "score", "a set", "--key", "k.json"], "python -m bench blind score 'a set' --key k.json"),
+        (["blind", "make", "--cases", "3"], "python -m tests.blind make --cases 3"),
         (["bench"], "python -m bench"),
     ],
 )

@@ -7,9 +7,10 @@ import pytest
 
 from bench.faults.judge import SAFE, SILENT, UNSAFE, judge
 from bench.faults.page import page
-from bench.faults.run import FaultBench, bench
+from bench.faults.run import FaultBench, bench, chosen
 from bridge.faults import Fault
-from cockpit.faults.catalogue import CatalogueEntry, chosen, find_entry, load_catalogue
+from bridge.results import strict_json
+from cockpit.faults.catalogue import CatalogueEntry, find_entry, load_catalogue
 from cockpit.run.scenario import load_scenario
 
 
@@ -43,7 +44,7 @@ def test_a_dead_controller_is_safe_and_told_and_the_page_says_so() -> None:
     text = page(result)
     assert "| `controller-killed` |" in text
     assert "**1 safe, 0 SILENT, 0 UNSAFE**" in text
-    assert result.as_json()["counts"] == {SAFE: 1, SILENT: 0, UNSAFE: 0}
+    assert strict_json(result)["counts"] == {SAFE: 1, SILENT: 0, UNSAFE: 0}
 
 
 def test_what_no_word_says_is_silent_and_worse_than_is_known() -> None:

@@ -3,19 +3,21 @@
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pyarrow
 import pyarrow.csv
 import pyarrow.parquet
 import pytest
-import scipy.io
 from typer.testing import CliRunner
 
 from bridge.faults import Fault
 from bridge.log.log_reader import LogReader
 from bridge.log.logfile import STREAMING, iter_pieces, read_run
+from bridge.tables import writers
 from bridge.tables.export import export
-from bridge.wire.messages import CHANNELS
+from bridge.tables.readers import read_table
+from bridge.wire.channels import CHANNELS
 from cockpit.commands.log import log_app
 from tests.logs import short_log
 
@@ -31,8 +33,10 @@ def log(tmp_path: Path) -> Path:
 
 def columns_of(suffix: str, to: Path, topic: str) -> dict[str, Any]:
     if suffix == ".mat":
-        struct = scipy.io.loadmat(to, squeeze_me=True, struct_as_record=False)[topic]
-        return {name: np.atleast_1d(getattr(struct, name)) for name in struct._fieldnames}
+        table = read_table(to)
+        return {
+            name.removeprefix(f"{topic}."): values for name, values in table.columns.items() if name.startswith(topic)
+        }
     path = to.with_name(f"{to.stem}.{topic}{suffix}")
     # numbers of blocks go up to 2^64 - 1, which a reader that guesses takes for floating point
     types = pyarrow.csv.ConvertOptions(column_types={"command_block": pyarrow.uint64()})
@@ -70,10 +74,34 @@ def test_units_are_told(log: Path, tmp_path: Path) -> None:
     schema = pyarrow.parquet.read_schema(tmp_path / "one.parquet")
     assert schema.field("mass_accel_mps2").metadata[b"unit"] == b"m/s^2"
     export(log, tmp_path / "all.mat", ALL)
-    units = scipy.io.loadmat(tmp_path / "all.mat", squeeze_me=True, struct_as_record=False)["units"]
-    assert units.sensors.drive_force_N == "N"
-    assert units.trace.slips == "1"
-    assert units.trace.vibration_velocity_mps == "m/s"
+    units = read_table(tmp_path / "all.mat").columns
+    assert units["units.sensors.drive_force_N"].tolist() == ["N"]
+    assert units["units.trace.slips"].tolist() == ["1"]
+    assert units["units.trace.vibration_velocity_mps"].tolist() == ["m/s"]
+
+
+def test_a_matlab_file_has_the_header_and_classes_of_version_7_3(
+    log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(writers, "BATCH_ROWS", 150)  # of 400 blocks: columns grow
+    to = tmp_path / "all.mat"
+    export(log, to, ["trace", "sensors"])
+    head = to.read_bytes()[:520]
+    assert head.startswith(b"MATLAB 7.3 MAT-file")
+    assert head[124:128] == b"\x00\x02IM"
+    assert head[512:] == b"\x89HDF\r\n\x1a\n"
+    trace = read_run(log).trace
+    with h5py.File(to) as file:
+        assert file.userblock_size == 512
+        names = ("trace/t_s", "sensors/drive_force_N", "trace/mode", "trace/sequence")
+        assert [file[name].attrs["MATLAB_class"] for name in names] == [b"double", b"single", b"uint32", b"uint64"]
+        assert {file[name].attrs["MATLAB_class"] for name in ("trace", "units", "units/trace")} == {b"struct"}
+        assert file["trace/score"].shape == (1, 400)
+        assert (file["trace/score"][0] == trace["score"]).all()
+        unit = file["units/trace/drive_force_N"]
+        assert unit.attrs["MATLAB_class"] == b"char"
+        assert unit.attrs["MATLAB_int_decode"] == 2
+        assert unit[:, 0].tobytes().decode("utf-16-le") == "N"
 
 
 def test_only_the_wanted_time(log: Path, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from bridge.log.check.log_check import check_log
 from bridge.log.in_charge import NO_COMMAND
 from bridge.log.logfile import read_run
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.event_codes import EVENTS, LETTERS, harms, is_listed
+from bridge.wire.event_codes import EVENTS, SEVERITIES, harms, is_listed
 from cockpit.judge.judged import judge
 from cockpit.judge.verdict_words import headline, in_words
 from cockpit.run.in_process import run_onboard
@@ -134,8 +134,8 @@ def test_definitions_that_are_not_those_of_the_messages_are_found(
     assert any(told in finding.text for finding in check_log(path).findings if finding.kind == "schema")
 
 
-def test_every_code_has_its_letter_and_place() -> None:
-    assert {one.letter for one in EVENTS.values()} <= LETTERS.keys()
+def test_every_code_has_its_severity_and_place() -> None:
+    assert {one.letter for one in EVENTS.values()} <= SEVERITIES.keys()
     protocol = (Path(__file__).parents[3] / "bridge/wire/PROTOCOL.md").read_text(encoding="utf-8")
     assert not [code for code in EVENTS if f"`{code}`" not in protocol]
     assert (harms("GAP"), harms("STALE"), is_listed("STALE"), is_listed("START")) == (True, False, True, False)

@@ -30,11 +30,9 @@ def bomb(path: Path, chunks: int, messages: int) -> None:
         schema = writer.add_schema("stickslip.Command", "protobuf", b"")
         writer.add_channel("/command", "protobuf", schema, {})
         payload = COMMAND.blank().tobytes()
-        message = writer.put_open
         for _ in range(chunks):
             writer.add_message(1, 1, payload, 1, 1)
-            one, _, first, last = writer.take_open()
-            message((one._replace(parts=one.parts * messages), 1, first, last))
+            writer.open_chunk.parts *= messages
             writer.flush()
         writer.finish()
 

@@ -41,8 +41,12 @@ def rotated(path: Path, files: int = 4, scenario: str = "x") -> None:
     log.close()
 
 
-def changes(path: Path) -> list[str]:
-    return [f"{finding.where}: {finding.text}" for finding in check_log(path).findings if finding.kind == "changed"]
+def changes(path: Path, kind: str = "changed") -> list[str]:
+    return [f"{finding.where}: {finding.text}" for finding in check_log(path).findings if finding.kind == kind]
+
+
+def gaps(path: Path) -> list[str]:
+    return changes(path, "gap")
 
 
 def test_a_log_goes_on_in_the_next_file_and_is_read_by_its_first_name(tmp_path: Path) -> None:
@@ -76,14 +80,15 @@ def test_a_file_of_a_log_that_was_taken_away_changed_or_exchanged_is_found(tmp_p
     second = parts_of(path)[2]
     kept = second.read_bytes()
     second.unlink()
-    assert len(changes(path)) == 1
-    assert "does not continue the file before it" in changes(path)[0]
+    assert gaps(path) == ["/sensors: 100 messages lost: 200 to 299"]
     second.write_bytes(kept[:3000] + bytes([kept[3000] ^ 1]) + kept[3001:])
-    assert len(changes(path)) == 1
+    assert changes(path) == [
+        "run-0002.mcap: does not fit the checksums at its end: it was damaged or changed after writing; do not trust it"
+    ]
     other = tmp_path / "other" / "run.mcap"
     rotated(other, scenario="y")
     second.write_bytes(parts_of(other)[2].read_bytes())
-    assert changes(path)
+    assert gaps(path) == ["/sensors: 100 messages lost: 200 to 299"]
 
 
 def test_a_new_log_does_not_take_the_files_of_an_old_one(tmp_path: Path) -> None:
@@ -272,3 +277,20 @@ def test_memory_that_grows_while_a_log_is_read_keeps_what_is_there(
     grown = read_run(path).sensors
     assert len(grown) == 400
     assert grown.tobytes() == whole.tobytes()
+
+
+@pytest.mark.parametrize("recovered", [False, True])
+def test_the_files_of_a_log_with_a_hash_chain_belong_together(tmp_path: Path, recovered: bool) -> None:
+    for number, name in enumerate(("run.mcap", "run-0001.mcap")):
+        log = RunLog(tmp_path / name, lockstep=True)
+        writer = log._files.writer
+        assert writer is not None
+        if number:
+            writer.add_metadata("part", {"number": "1", "begins": '"ab"', "follows": '"cd"'})
+        elif recovered:
+            writer.add_metadata("recovered", {"from": "run.mcap", "begins": "ab"})
+        writer.add_metadata("chain", {"link": "0", "sha256": "12" if recovered else "ab"})
+        write(log, range(100 * number, 100 * number + 100))
+        log.close()
+    run = read_run(tmp_path / "run.mcap")
+    assert (len(run.sensors), run.headers, run.checksums.damaged) == (200, {}, [])

@@ -7,7 +7,22 @@ from hypothesis import strategies as st
 
 from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import APPLIED, CHANNELS, COMMAND, STATE, TRACE, Layout, sensor_block
+from bridge.wire.channels import CHANNELS
+from bridge.wire.messages import (
+    ANNOUNCED,
+    APPLIED,
+    BLOCK,
+    COMMAND,
+    GAP,
+    LATE,
+    RESET,
+    STALE,
+    STATE,
+    STOP,
+    TRACE,
+    Layout,
+    sensor_block,
+)
 from bridge.wire.payloads import sequence_and_time
 
 
@@ -46,3 +61,7 @@ def test_a_copy_is_not_shared() -> None:
     first["block"] = 5
     assert second["block"][0] == 0
     assert np.array_equal(COMMAND.read(first.tobytes(), "command"), first)
+
+
+def test_the_bits_of_a_step_are_those_of_the_schema() -> None:
+    assert (BLOCK, GAP, STALE, STOP, RESET, ANNOUNCED, LATE) == (1, 2, 4, 8, 16, 32, 64)

@@ -14,7 +14,8 @@ from bridge.log.check.log_check import check_log
 from bridge.log.logfile import read_run
 from bridge.log.runlog import RunLog
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import CHANNELS, SCOPE, TRACE, sensor_block
+from bridge.wire.channels import CHANNELS
+from bridge.wire.messages import SCOPE, TRACE, sensor_block
 from bridge.wire.topics import PLANT_EVENT, SENSORS, TOPICS
 from bridge.wire.topics import TRACE as TRACE_TOPIC
 from cockpit.run.in_process import run_onboard

@@ -13,7 +13,7 @@ import pytest
 from bridge.log.check.channel import ChannelLimits, channels_of
 from bridge.log.logfile import RunData, read_run
 from bridge.log.watches.arrays import Longest
-from bridge.wire.messages import CHANNELS
+from bridge.wire.channels import CHANNELS
 from cockpit.judge.verdict import OK, RunVerdict
 from cockpit.run.in_process import run_onboard
 from cockpit.run.scenario import Scenario, load_scenario

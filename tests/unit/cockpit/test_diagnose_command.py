@@ -10,7 +10,8 @@ import pytest
 from typer.testing import CliRunner
 
 from bridge.faults import FAULTS
-from bridge.files import strict_json, write_whole
+from bridge.files import write_whole
+from bridge.results import strict_json
 from cockpit.cli import app
 from cockpit.fleet import work
 from diagnosis import diagnose_many as many

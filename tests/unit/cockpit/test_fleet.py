@@ -12,7 +12,7 @@ from cockpit.fleet.groups import Diagnosed, Failed, fleet_of
 from cockpit.fleet.kept import RESULTS, digest_of, keep, kept
 from cockpit.fleet.page import write_page
 from cockpit.fleet.work import FleetFolder, report_names, with_estimate
-from diagnosis.diagnose_many import FolderResult, find_sources
+from diagnosis.diagnose_many import FolderFault, FolderResult, find_sources
 from diagnosis.result import Diagnosis, Share
 from tests import made_up
 
@@ -72,7 +72,7 @@ def test_only_what_changed_or_failed_is_missing(tmp_path):
     assert fleet.kept() == []
     for source in sources[:2]:
         fleet.add(FolderResult(source, TOLD, None))
-    fleet.add(FolderResult(sources[2], None, ("PEER_DIED", "c: its worker process died")))
+    fleet.add(FolderResult(sources[2], None, FolderFault("PEER_DIED", "c: its worker process died")))
     assert fleet.refused == []
     assert [one.evidence for one in fleet.fleet().failed] == ["c"]
     again = FleetFolder(tmp_path / "out", sources, None)

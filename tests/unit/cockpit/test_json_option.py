@@ -10,8 +10,8 @@ import typer
 from typer.testing import CliRunner
 
 from bridge.faults import FAULTS
-from bridge.files import strict_json
 from bridge.log.finding import Finding
+from bridge.results import strict_json
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.cli import app
 from cockpit.commands.as_json.option import with_places

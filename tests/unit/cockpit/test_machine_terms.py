@@ -9,6 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from bridge.log.logfile import read_run
+from bridge.log.storage.verdict_file import verdict_path
+from bridge.results import strict_json
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.cli import app
 from cockpit.commands.as_json.schemas import FORMATS
@@ -156,7 +158,7 @@ def test_the_verdict_has_the_terms_of_the_stretch_after(tmp_path: Path) -> None:
     way_m = float(run.sensors["drive_position_m"][-1].mean() - run.sensors["mass_position_m"][-1].mean())
     assert following.error_peak_m == pytest.approx(way_m, rel=0.05)
     assert any(line.startswith("error    following error") for line in in_words(verdict, verbose=True))
-    assert verdict.as_dict()["after"]["following"]["error_peak_m"] == following.error_peak_m
+    assert strict_json(verdict)["after"]["following"]["error_peak_m"] == following.error_peak_m
 
 
 @pytest.mark.slow
@@ -184,4 +186,4 @@ def test_a_run_is_compared_with_itself_without_the_controller(tmp_path: Path) ->
     assert without["following"]["error_ripple_m"] > after["following"]["error_ripple_m"]
     (line,) = (line for line in result.stdout.splitlines() if line.startswith("without "))
     assert line.endswith("simulated without the controller")
-    assert json.loads(read_run(log).headers["verdict"]["without"]) == without
+    assert json.loads(verdict_path(log).read_text())["without"] == without

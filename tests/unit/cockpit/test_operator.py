@@ -16,7 +16,7 @@ from bridge.wire.payloads import parsed
 from bridge.wire.topics import APPLIED, OPERATOR, PLANT_EVENT, Topic
 from bridge.wire.words import words
 from bridge.wire.zenoh_link import Bus, BusConfig, is_frozen
-from cockpit.run import operator, status
+from cockpit.live import operator, status
 from cockpit.run.authority import make_certificates
 from tests.system.ports import free_endpoint
 
@@ -71,8 +71,8 @@ def say(monkeypatch: pytest.MonkeyPatch) -> Callable[[Rig, str], operator.Comman
         monkeypatch.setattr(operator, name, seconds)
 
     def call(rig: Rig, word: str) -> operator.CommandOutcome:
-        monkeypatch.setattr(operator, "Bus", lambda *_args, **_more: rig)
-        return operator.tell(BusConfig(), word)
+        monkeypatch.setattr(operator, "connected", lambda *_args: rig)
+        return operator.send_command(BusConfig(), word)
 
     return call
 
@@ -180,7 +180,7 @@ def test_where_no_rig_is_the_advice_is_that_of_the_word(
 ) -> None:
     monkeypatch.setattr(operator, "_DIAL_S", 0.2)
     with pytest.raises(Fault, match="no rig answered at") as raised:
-        operator.tell(BusConfig(endpoint=free_endpoint()), word)
+        operator.send_command(BusConfig(endpoint=free_endpoint()), word)
     assert ("by hand" in str(raised.value), "start one, or give its --endpoint" in str(raised.value)) == (
         advice == "by hand",
         advice == "start one",
@@ -193,7 +193,7 @@ def test_where_no_rig_answers_a_certificate_the_authority_is_asked_about(
     monkeypatch.setattr(operator, "_DIAL_S", 0.2)
     make_certificates(tmp_path, [])
     config = BusConfig(endpoint=free_endpoint().replace("tcp/", "tls/"), certificates=str(tmp_path))
-    for ask in (lambda: operator.tell(config, "ARM"), lambda: status.look(config)):
+    for ask in (lambda: operator.send_command(config, "ARM"), lambda: status.look(config)):
         with pytest.raises(Fault, match=r"no rig answered .*the authority of --certs must be those"):
             ask()
 
@@ -224,5 +224,5 @@ def test_what_listens_and_does_not_read_stands_still(monkeypatch: pytest.MonkeyP
         with pytest.raises(
             Fault, match=r"STOP NOT DELIVERED: .* does not answer .*: must run; assume that the exciter still vibrates"
         ) as raised:
-            operator.tell(config, "STOP")
+            operator.send_command(config, "STOP")
     assert raised.value.kind is FAULTS["NO_PEER"]

@@ -8,6 +8,7 @@ import pytest
 
 from bridge.log.logfile import RunData, read_run
 from bridge.log.pause_events import CORE_PAUSE, NOT_WATCHED, PAUSE, WATCH, in_words
+from bridge.results import strict_json
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import APPLIED
 from cockpit.judge.pauses import Pauses, computer_in_words, pauses_in_words
@@ -142,7 +143,7 @@ def test_what_the_verdict_says(run: RunData, tmp_path: Path) -> None:
     applied = account({500: 1.5, 800: 1.2})
     verdict = verdict_of(watched(run, applied, (501.2, 1.1), (900.0, 12.0)))
     assert pauses_in_words(verdict.pauses)[0].startswith("stalls   every core stalled 2 times (13.1 ms in total, ")
-    assert verdict.as_dict()["pauses"]["number"] == 2
+    assert strict_json(verdict)["pauses"]["number"] == 2
     assert pauses_in_words(found(run, applied)) == [
         "stalls   none of every core; 2 commands later than 1 ms outside of them (0.20 %)"
     ]

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 from bridge.log.logfile import read_run
-from bridge.wire.messages import APPLIED, TRACE
+from bridge.wire.messages import APPLIED, GAP, LATE, STALE, TRACE
 from bridge.wire.stickslip_pb2 import EXCITE
 from cockpit.judge.ratio_watch import MOST_ABOVE_S, RatioVerdict, RatioWatch
 from cockpit.judge.setup import Setup
 from cockpit.judge.window import APPLIED_ROW, COMMAND_ROW, TRACE_ROW, JudgedBlocks, Window, rows_of
-from controller.codes import GAP, LATE, STALE
 from tests.logs import verdict_of
 
 GOLDEN = Path(__file__).parents[2] / "golden"

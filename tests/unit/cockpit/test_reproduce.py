@@ -5,6 +5,7 @@ import re
 
 import pytest
 
+from bridge.results import strict_json
 from cockpit.paper.claims import PaperRow
 from cockpit.paper.page import reproduce
 
@@ -43,13 +44,13 @@ def test_the_page_names_every_claim(report):
 
 def test_one_failing_check_is_a_failing_result(report):
     result, _ = report
-    failed = result._replace(rows=[*result.rows, PaperRow("group", "claim", "1 N", "2 N", False)])
+    failed = result._replace(rows=[*result.rows, PaperRow("claim", "1 N", "2 N", False, group="group")])
     assert not failed.passed
     assert f"{len(result.rows)} of {len(failed.rows)} checks" in failed.verdict
 
 
 def test_the_result_is_plain_json(report):
     result, _ = report
-    again = json.loads(json.dumps(result.as_json()))
+    again = json.loads(json.dumps(strict_json(result)))
     assert again["passed"] is True
     assert {"group", "claim", "found", "criterion", "passed", "deviation_percent"} == set(again["rows"][0])

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bridge.results import strict_json
 from cockpit.paper import page, plots
-from cockpit.paper.claims import PAPER_CLAIMS, PaperRow, parameter_rows
+from cockpit.paper.claims import PaperRow, parameter_rows
 
-CLAIM = PaperRow(PAPER_CLAIMS, "the slips fade", "5 N < 6 N", "smaller", True)
+CLAIM = PaperRow("the slips fade", "5 N < 6 N", "smaller", True)
 
 
 @pytest.fixture
@@ -37,7 +38,7 @@ def test_the_page_has_every_check_and_needs_nothing_from_outside(runs: dict[Any,
 
 def test_a_check_that_fails_is_marked_and_counted(runs: dict[Any, Any]) -> None:
     result = page.ReproduceResult([CLAIM, CLAIM._replace(passed=False)], 12.0)
-    assert (result.passed, result.as_json()["passed"]) == (False, False)
+    assert (result.passed, strict_json(result)["passed"]) == (False, False)
     made = page._page(result, runs)
     assert "1 of 2 claims of the paper hold; 1 of 2 checks in all; failures are marked red below" in made
     assert made.count(">FAILS<") == 1

@@ -13,7 +13,9 @@ from typer.testing import CliRunner
 
 from bridge.faults import FAULTS, Fault
 from bridge.log.logfile import RunData, read_run
+from bridge.results import strict_json
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import STALE
 from cockpit.cli import app
 from cockpit.judge import window
 from cockpit.judge.judged import judge, judge_log
@@ -23,7 +25,6 @@ from cockpit.run.closed_loop import ClosedLoop
 from cockpit.run.in_process import run_onboard
 from cockpit.run.run import run_scenario
 from cockpit.run.scenario import load_scenario
-from controller.codes import STALE
 from tests.logs import Tables, tables_of, verdict_of, write
 
 
@@ -43,7 +44,7 @@ def run(log: Path) -> RunData:
 
 
 def figures(verdict: Any) -> dict[str, Any]:
-    return {name: value for name, value in verdict.as_dict().items() if name not in {"log", "chain"}}
+    return {name: value for name, value in strict_json(verdict).items() if name not in {"log", "checksums"}}
 
 
 def test_windows_change_no_figure(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -70,7 +71,7 @@ def test_windows_change_no_figure(log: Path, monkeypatch: pytest.MonkeyPatch) ->
 def test_a_run_is_judged_while_it_is_written_as_its_log_is(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     came = run_scenario("belt-axis", ["duration_s=3.0", "controller.policy.enabled_from_s=1.0"], False, True, path)
-    again = judge_log(path, margins=True)
+    again = judge_log(path)
     assert figures(came.verdict) == figures(again.verdict)
     assert came.loop == (again.judge.margins() if came.effects else None)
 
@@ -93,6 +94,15 @@ def test_dropouts_that_overlap_are_left_out_once(run: RunData, tmp_path: Path) -
     assert after is not None
     # from 4 s to 4.1 s: the last fallback ends at 5.4 s, and its second after the end of the run
     assert after.seconds == pytest.approx(0.1, abs=2e-3)
+
+
+def test_stretches_without_a_controller_are_one(run: RunData) -> None:
+    applied = tables_of(run)["applied"]
+    for first in (3200, 4700):
+        applied["fallback"][first : first + 1200] = 1
+    alone = verdict_of(run._replace(applied=applied)).alone
+    assert alone is not None
+    assert alone.seconds == pytest.approx(2.4, abs=2e-3)
 
 
 def gap(first: int, count: int, seen: bool) -> Any:
@@ -159,13 +169,14 @@ def test_the_headline_of_a_run_that_is_not_ok_says_so(run: RunData) -> None:
     assert (headline(sound).partition(":")[0], headline(weak)) == ("stick-slip is gone", "not ok: PIEZO_WEAK")
 
 
-def test_a_trip_is_in_words_without_the_letter_of_its_cause(run: RunData) -> None:
-    text = "ACTIVE -> FAULT: OVERTRAVEL: S: stroke beyond guard.stroke_m"
+@pytest.mark.parametrize("severity", ["S", "out of specification"])
+def test_a_trip_is_in_words_without_the_severity_of_its_cause(run: RunData, severity: str) -> None:
+    text = f"ACTIVE -> FAULT: OVERTRAVEL: {severity}: stroke beyond guard.stroke_m"
     verdict = verdict_of(run._replace(events=[wire.Event(source="plant", code="FAULT", text=text), *run.events]))
     assert headline(verdict).endswith(
         "stopped the vibration: ACTIVE -> FAULT: OVERTRAVEL: stroke beyond guard.stroke_m"
     )
-    assert ": S:" not in "".join(in_words(verdict, verbose=True))
+    assert f": {severity}:" not in "".join(in_words(verdict, verbose=True))
 
 
 def test_the_first_bytes_of_a_log_are_a_cut_log(log: Path, tmp_path: Path) -> None:

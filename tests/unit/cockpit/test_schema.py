@@ -1,22 +1,23 @@
 """`stickslip schema`: what the files and results are, what the schemas say they are, and what the project ships agree."""
 
 import json
+import math
 import tomllib
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import jsonschema
 import pytest
 from typer.testing import CliRunner
 
-from bridge.files import strict_json
+from bridge.results import in_json, strict_json
 from cockpit.cli import app
 from cockpit.commands import diagnose_output
 from cockpit.commands.as_json.schemas import FORMATS, JSON, TOML
+from cockpit.commands.as_json.types import schema_of
 from cockpit.run.scenario_file import deploy_folder
 from diagnosis import diagnose_many as many
-from diagnosis.result import to_json
 from plant.effects.library import EFFECTS
 from tests import made_up
 from tests.logs import short_log
@@ -121,11 +122,14 @@ def test_a_diagnosis_fits_and_one_more_key_does_not(tmp_path: Path) -> None:
     made_up.evidence_folder(folder)
     source = many.find_sources([folder])[0]
     diagnosis = made_up.diagnosis()
-    table = strict_json(to_json(diagnosis))
+    table = strict_json(diagnosis)
     check("diagnosis-2", table)
     assert not fits("diagnosis-2", table | {"more": 1})
-    outcomes = [many.FolderResult(source, diagnosis, None), many.FolderResult(source, None, ("BAD_EVIDENCE", "why"))]
-    check("diagnoses-2", diagnose_output.many_as_json(outcomes))
+    outcomes = [
+        many.FolderResult(source, diagnosis, None),
+        many.FolderResult(source, None, many.FolderFault("BAD_EVIDENCE", "why")),
+    ]
+    check("diagnoses-2", diagnose_output.Diagnoses(outcomes))
 
 
 @pytest.mark.parametrize(
@@ -157,6 +161,41 @@ def test_results_fit(name: str, arguments: list[str], tmp_path: Path, monkeypatc
     monkeypatch.chdir(tmp_path)
     (tmp_path / "run.mcap").write_bytes(short_log())
     check(name, json.loads(call(*arguments, "--json").stdout))
+
+
+class Inner(NamedTuple):
+    """A result inside of another."""
+
+    size: float
+    secret: Path
+    JSON_HIDDEN = ("secret",)
+
+    @in_json
+    def double(self) -> float:
+        return 2.0 * self.size
+
+
+class Outer(NamedTuple):
+    """A result with each difference between its fields and its JSON."""
+
+    inner: Inner
+    rows: tuple[Inner, ...]
+    place: Path
+    note: str | None = None
+    JSON_MERGED = "inner"
+    JSON_OPTIONAL = ("note",)
+
+
+def test_json_and_schema_follow_the_same_declarations() -> None:
+    inner = Inner(math.nan, Path("secret"))
+    table = strict_json(Outer(inner, (inner,), Path("a")))
+    assert table == {"double": None, "size": None, "rows": [{"double": None, "size": None}], "place": "a"}
+    fitting = jsonschema.Draft202012Validator(schema_of(Outer))
+    assert fitting.is_valid(table)
+    assert fitting.is_valid(table | {"note": "text"})
+    wrong = ({"note": None}, {"secret": "x"}, {"inner": {}}, {"place": 1})
+    assert not any(fitting.is_valid(table | more) for more in wrong)
+    assert not any(fitting.is_valid({key: table[key] for key in table if key != left_out}) for left_out in table)
 
 
 def test_without_a_name_they_are_listed_and_with_a_folder_written(tmp_path: Path) -> None:

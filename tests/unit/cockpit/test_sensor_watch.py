@@ -14,10 +14,10 @@ import pytest
 from bridge.log.check.channel import channels_of
 from bridge.log.logfile import RunData, read_run
 from cockpit.judge import judged
-from cockpit.judge.described import described
 from cockpit.judge.judged import judge_log
 from cockpit.judge.relations import ChannelRelations
 from cockpit.judge.sensor_watch import SensorVerdict
+from cockpit.judge.setup import described
 from cockpit.judge.verdict_words import in_words
 from cockpit.judge.window import APPLIED_ROW, COMMAND_ROW, TRACE_ROW, JudgedBlocks, Window
 from plant.config import SensorsConfig
@@ -60,8 +60,8 @@ def test_three_witnesses_count_the_same_slips() -> None:
     run = golden("slip-then-control")
     judge = judge_log(run.path).judge
     assert judge.cycles is not None
-    assert judge._sensor_watch is not None
-    verdict = judge._sensor_watch.result(judge.cycles.breakaway_t_s, [(0.0, math.inf)])
+    assert judge._begun is not None
+    verdict = judge._begun[2].sensors.result(judge.cycles.breakaway_t_s, [(0.0, math.inf)])
     assert verdict is not None
     assert verdict.by_force > 1
     assert verdict.by_position == verdict.by_force

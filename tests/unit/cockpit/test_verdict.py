@@ -1,7 +1,6 @@
 """The verdict on a run: what counts, what is left out, and what was not tested."""
 
 import json
-import re
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +8,7 @@ import pytest
 
 from bridge.log.logfile import read_run
 from bridge.wire import stickslip_pb2 as wire
+from cockpit.judge.verdict import NOT_OK
 from cockpit.judge.verdict_words import headline, in_words
 from cockpit.run.in_process import run_onboard
 from cockpit.run.replay import outcome
@@ -88,7 +88,7 @@ def test_a_stall_or_a_gap_in_the_log_is_a_warning_and_changes_no_status(tmp_path
     assert f"warning  {code}: for 24 ms" in in_words(verdict, verbose=True)
 
 
-def test_slips_of_a_drive_that_seems_to_stand_are_said(tmp_path: Path) -> None:
+def test_a_drive_beyond_the_end_of_its_transducer_is_not_ok(tmp_path: Path) -> None:
     """Here by a transducer that ends after 2 mm; 16 s at 0.5 mm/s are 8 mm."""
     log = tmp_path / "short-range.mcap"
     scenario = load_scenario("from-the-start", [])
@@ -97,10 +97,9 @@ def test_slips_of_a_drive_that_seems_to_stand_are_said(tmp_path: Path) -> None:
     )
     run_onboard(scenario.model_copy(update={"rig": rig}), log, {})
     verdict = verdict_of(read_run(log))
-    assert not verdict.good
-    assert re.search(
-        r"DRIVE_UNSEEN: \d+ slips at a constant drive position, first at [4-6]\.", "\n".join(verdict.faults)
-    )
+    assert verdict.control == NOT_OK
+    assert verdict.reason.startswith("DRIVE_DOUBTED: ")
+    assert any(line.startswith("SENSOR_CLIPPED: drive_position_m") for line in verdict.blind)
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,7 @@ import numpy as np
 
 from bridge.config import validate
 from bridge.kernel import kernel
-from bridge.wire.messages import COMMAND, TRACE, sensor_block
-from controller.codes import BLOCK
+from bridge.wire.messages import BLOCK, COMMAND, TRACE, sensor_block
 from controller.config import ControllerConfig
 from controller.core import step
 from controller.records import build

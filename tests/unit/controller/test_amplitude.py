@@ -10,8 +10,8 @@ import pytest
 from bridge.config import validate
 from bridge.kernel import Record, kernel
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import BLOCK
 from controller.amplitude import FIRST_SHARE, amplitude, listen, note_sent
-from controller.codes import BLOCK
 from controller.config import ControllerConfig
 from controller.limits import allow
 from controller.records import build

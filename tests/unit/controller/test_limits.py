@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from bridge.config import validate
 from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
-from controller.codes import BLOCK, RESET, STALE, STOP
+from bridge.wire.messages import BLOCK, RESET, STALE, STOP
 from controller.config import ControllerConfig
 from controller.limits import allow
 from controller.records import build

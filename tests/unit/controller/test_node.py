@@ -4,8 +4,7 @@ import pytest
 
 from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import sealed, sensor_block
-from controller.codes import BLOCK, LATE
+from bridge.wire.messages import BLOCK, LATE, sealed, sensor_block
 from controller.node import ControllerNode
 from tests.unit.controller.test_process import CONFIG, block
 

@@ -9,7 +9,8 @@ import pytest
 from bridge.config import validate
 from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import CHANNELS, sensor_block
+from bridge.wire.channels import CHANNELS
+from bridge.wire.messages import sensor_block
 from plant.config import RigConfig
 from plant.faults.exciter import FIELDS
 from plant.faults.kinds import ALL, SENSORS

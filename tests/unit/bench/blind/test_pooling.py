@@ -11,7 +11,7 @@ from bench.app import app
 from bench.blind.opening import OpenedSet, scored
 from bench.blind.pooling import kept_scores, pooled
 from bridge.faults import FAULTS
-from bridge.files import write_json
+from bridge.results import write_json
 from tests.blind.stand_ins import case
 
 CELLS = [["drive_force_N", "slip", "run-01", 9.0], ["mass_accel_mps2", "slip", "run-01", 6.0]]

@@ -10,9 +10,10 @@ from bench.blind.calibration import calibration_error, error_of_perfect, log_sco
 from bench.blind.intervals import Score, bootstrapped, mean, rate, ratio
 from bench.blind.locating import f1
 from bench.blind.outcomes import opened
-from bench.blind.scoring import as_json, score
+from bench.blind.scoring import score
 from bench.blind.table import ScoreRow, table
 from bridge.config import validate
+from bridge.results import strict_json
 from diagnosis.synthetic.folder import paper_rig
 from plant.config import RigConfig
 from plant.effects.library import EFFECTS
@@ -93,7 +94,7 @@ def test_scores_by_hand():
     marked = [line.split("  ")[0] for line in text.splitlines() if "missed" in line]
     assert "top-1, 2 limits or more" in marked
     assert "mean group size, same" not in marked
-    assert as_json({"diagnosis": scores})["diagnosis"]["visible"]["top_1"]["n"] == 4
+    assert strict_json({"diagnosis": scores})["diagnosis"]["visible"]["top_1"]["n"] == 4
 
 
 @pytest.mark.parametrize(

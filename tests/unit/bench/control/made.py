@@ -60,9 +60,9 @@ def judged(
 
     """
     blocks = len(slide_m) // SAMPLES
-    truth = np.zeros((len(TRUTH), blocks * SAMPLES))
-    truth[TRUTH.index("true_position_m")] = slide_m
-    truth[TRUTH.index("true_drive_position_m")] = drive_m
+    truth = np.zeros((blocks, len(TRUTH), SAMPLES))
+    truth[:, TRUTH.index("true_position_m")] = slide_m.reshape(blocks, SAMPLES)
+    truth[:, TRUTH.index("true_drive_position_m")] = drive_m.reshape(blocks, SAMPLES)
     traces = TRACE.blank(blocks)
     for name, value in trace.items():
         traces[name] = value

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bench.control.answer import end_stroke
-from controller.codes import EXCITE, HELD, PROBE, SMOOTH, STICK, STICK_SEEN, WATCH
+from bridge.wire.stickslip_pb2 import EXCITE, HELD, PROBE, SMOOTH, STICK, STICK_SEEN, WATCH
 from tests.unit.bench.control.made import along, at_speed, judged, times
 from tests.unit.bench.control.test_motion import stuck_from
 

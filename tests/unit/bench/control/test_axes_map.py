@@ -4,8 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
-from bench.control.axes_map import Noise, draw, needed_window_s, points, stick_s, window_s
+from bench.control.axes_map import Noise, draw, needed_window_s, points, reduce_colours, stick_s, window_s
 from bench.control.figures import Figures, refused
 from tests.bank import BANK
 
@@ -63,3 +65,15 @@ def test_it_is_a_picture(tmp_path: Path) -> None:
     path = tmp_path / "axes.svg"
     draw(BANK, [run("step-stiff", surges=1), run("pair-c45-0.5"), run("pair-c45-1")], path)
     assert "<dc:title>for which axes it works" in path.read_text()
+
+
+def test_fewer_colours_keep_a_pictures_texts_and_resolution(tmp_path: Path) -> None:
+    texts = PngInfo()
+    texts.add_text("Title", "which axes")
+    shades = Image.fromarray(np.random.default_rng(1).integers(0, 256, (80, 80, 4), np.uint8))
+    shades.save(tmp_path / "a.png", dpi=(110, 110), pnginfo=texts)
+    reduce_colours(tmp_path / "a.png")
+    with Image.open(tmp_path / "a.png") as image:
+        assert image.mode == "P"
+        assert len(image.getcolors() or ()) <= 64
+        assert (image.size, image.info["Title"], round(image.info["dpi"][0])) == ((80, 80), "which axes", 110)

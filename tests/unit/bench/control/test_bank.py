@@ -11,7 +11,7 @@ from bench.app import app
 from bench.control import rules
 from bench.control.bars import bars
 from bench.control.figures import Figures, refused
-from bench.control.least import Least
+from bench.control.oracle import Least
 from bench.control.scenario import chosen, load_bank
 from bench.schemas import FORMATS
 from bridge.faults import Fault

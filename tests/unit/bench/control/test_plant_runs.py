@@ -5,7 +5,7 @@ import pytest
 
 from bench.control import record, rules
 from bench.control.figures import SILENT, figures
-from bench.control.least import is_clean
+from bench.control.oracle import is_clean
 from bench.control.run import Judged, Subject, judge
 from bench.control.scenario import BankScenario
 from tests.bank import BANK

@@ -5,7 +5,10 @@ import math
 import pytest
 
 from bridge.guard.check import write_gain
-from bridge.guard.codes import (
+from bridge.guard.config import GuardConfig
+from bridge.guard.core import NO_COMMAND
+from bridge.wire.messages import sensor_block
+from bridge.wire.stickslip_pb2 import (
     ACTIVE,
     ARMED,
     ARMED_BY_SCENARIO,
@@ -16,9 +19,6 @@ from bridge.guard.codes import (
     VIBRATION_BEGAN,
     VIBRATION_ENDED,
 )
-from bridge.guard.config import GuardConfig
-from bridge.guard.core import NO_COMMAND
-from bridge.wire.messages import sensor_block
 from tests.unit.bridge.guard.rigs import NANO, RUN, Rig
 
 

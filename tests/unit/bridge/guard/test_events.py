@@ -2,10 +2,10 @@
 
 from typing import Any
 
-from bridge.guard.codes import BAND, HEAT, SLEW_RATE
 from bridge.guard.events import GuardEvents, changes
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import APPLIED
+from bridge.wire.stickslip_pb2 import BAND, HEAT, SLEW_RATE
 
 
 def applied(*rows: dict[str, Any]) -> Any:
@@ -19,8 +19,8 @@ def applied(*rows: dict[str, Any]) -> Any:
 
 def told(*rows: dict[str, Any]) -> list[list[str]]:
     """Codes of every row; all news are in the rows that `changes` finds."""
-    table, teller, other = applied(*rows), GuardEvents(), GuardEvents()
-    found = [[code for code, _ in teller.news(row)] for row in table]
+    table, events, other = applied(*rows), GuardEvents(), GuardEvents()
+    found = [[code for code, _ in events.news(row)] for row in table]
     picked = changes(table)
     assert [[code for code, _ in other.news(table[row])] for row in picked] == [found[row] for row in picked]
     assert all(not found[row] for row in set(range(len(table))) - set(picked.tolist()))
@@ -34,9 +34,9 @@ ACTIVE: dict[str, Any] = {"guard_state": wire.ACTIVE}
 def test_every_change_of_state_is_told_once_with_its_reason() -> None:
     fault = {"guard_state": wire.FAULT, "cause": wire.LOUD}
     assert told(ARMED, ARMED, ACTIVE, ACTIVE, fault, fault) == [["GUARD"], [], ["GUARD"], [], ["FAULT"], []]
-    teller = GuardEvents()
-    teller.news(applied(ACTIVE)[0])
-    assert teller.news(applied(fault)[0])[0][1].startswith("ACTIVE -> FAULT: LOUD: F: measured v_a above")
+    events = GuardEvents()
+    events.news(applied(ACTIVE)[0])
+    assert events.news(applied(fault)[0])[0][1].startswith("ACTIVE -> FAULT: LOUD: failure: measured v_a above")
 
 
 def test_another_gain_is_an_event_of_its_own() -> None:

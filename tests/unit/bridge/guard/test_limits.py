@@ -4,7 +4,11 @@ import math
 
 import pytest
 
-from bridge.guard.codes import (
+from bridge.guard.config import GuardConfig, HeatConfig, Level
+from bridge.guard.estimates import expect_drive
+from bridge.guard.limits import exciter_gain, passes, watch
+from bridge.guard.records import FIRST
+from bridge.wire.stickslip_pb2 import (
     ACTIVE,
     ARMED,
     BAND,
@@ -17,10 +21,6 @@ from bridge.guard.codes import (
     NO_CAUSE,
     OVERTRAVEL,
 )
-from bridge.guard.config import GuardConfig, HeatConfig, Level
-from bridge.guard.estimates import expect_drive
-from bridge.guard.limits import exciter_gain, passes, watch
-from bridge.guard.records import FIRST
 from tests.unit.bridge.guard.rigs import EXCITER, NANO, Rig
 
 TWO_PI = 2.0 * math.pi

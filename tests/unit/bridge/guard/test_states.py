@@ -6,16 +6,18 @@ from typing import Any
 import pytest
 
 from bridge.guard.check import follow_check, gain_change
-from bridge.guard.codes import (
-    ACCEPT_GAIN,
+from bridge.guard.config import GuardConfig
+from bridge.guard.core import NO_COMMAND
+from bridge.guard.records import build
+from bridge.guard.states import ACCEPT_GAIN, ARM, DISARM, LEAVE, RESET, STOP, apply_order, enter, trip
+from bridge.wire.messages import sensor_block
+from bridge.wire.stickslip_pb2 import (
     ACTIVE,
-    ARM,
     ARMED,
     ARMED_BY_PERSON,
     CHECK_PASSED,
     CHECKING,
     COMMAND_LOST,
-    DISARM,
     DISARMED,
     DISARMED_BY_PERSON,
     EXCITER_SILENT,
@@ -24,24 +26,16 @@ from bridge.guard.codes import (
     FIRST_CHECK,
     GAIN_ACCEPTED,
     GAIN_CHANGED,
-    LEAVE,
     LOUD,
     POWER_UP,
     READY,
-    RESET,
     RESET_BY_PERSON,
     RUN_ENDED,
     SENSOR_FROZEN,
     SENSOR_NOT_FINITE,
-    STOP,
     STOP_BY_PERSON,
     STOP_KEPT,
 )
-from bridge.guard.config import GuardConfig
-from bridge.guard.core import NO_COMMAND
-from bridge.guard.records import build
-from bridge.guard.states import apply_order, enter, trip
-from bridge.wire.messages import sensor_block
 from tests.unit.bridge.guard.rigs import EXCITER, Rig
 
 

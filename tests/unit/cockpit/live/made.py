@@ -12,7 +12,7 @@ from bridge.wire.messages import APPLIED, TRACE, sensor_block
 from bridge.wire.topics import APPLIED as APPLIED_TOPIC
 from bridge.wire.topics import PLANT_EVENT, SENSORS
 from bridge.wire.topics import TRACE as TRACE_TOPIC
-from cockpit.live.listener import Presence
+from cockpit.live.listener import Presence, Source
 
 BLOCK_NS = 1_000_000
 SAMPLES = 20
@@ -20,13 +20,12 @@ HERE = Presence(True, frozenset({"plant", "controller", "recorder"}), "")
 GONE = Presence(False, frozenset(), "")
 
 
-class Rig:
+class Rig(Source):
     """A source for a `View`, and its clock."""
 
     def __init__(self) -> None:
-        self.inbox = Inbox(1 << 14)
-        self.presence = HERE
-        self.headers: dict[str, Any] = {"plant": {"rig": {"name": "lathe", "piezo": {"amplitude_max_m": 1e-7}}}}
+        rig = {"name": "lathe", "piezo": {"amplitude_max_m": 1e-7}}
+        super().__init__(Inbox(1 << 14), HERE, {"plant": {"rig": rig}})
         self.now_s = 100.0
 
     def clock(self) -> float:
@@ -47,7 +46,7 @@ class Rig:
         trace = TRACE.blank()
         trace["sequence"] = trace["block"] = number
         trace["t_ns"], trace["slips"], trace["mode"] = (number + 1) * BLOCK_NS, slips, mode
-        trace["time_to_slip_s"] = -1.0
+        trace["time_to_slip_s"], trace["state"] = -1.0, wire.SMOOTH
         trace["vibration_velocity_mps"], trace["drive_velocity_mps"], trace["reason"] = 6e-4, 5e-4, wire.HELD
         for name, value in more.items():
             trace[name] = value

@@ -15,10 +15,10 @@ from bridge.faults import Fault
 from bridge.wire.bus_config import BusConfig
 from cockpit.live import operator_link, server, viewers
 from cockpit.live.gate import refusal
+from cockpit.live.operator import CommandOutcome
 from cockpit.live.page import Page
 from cockpit.live.server import Server, listening
 from cockpit.live.token import kept_token
-from cockpit.run.operator import CommandOutcome
 from tests.patience import PATIENCE_S
 from tests.system.ports import free_endpoint
 from tests.unit.cockpit.live.made import table_of_frame
@@ -116,7 +116,9 @@ def test_a_page_loads_nothing_and_sees_that_there_is_no_rig(port: int) -> None:
     async def look() -> None:
         async with page_of(port) as page:
             assert "drive_force_N.least" in (await next_of(page, "hello"))["columns"]
-            assert (await next_of(page, "now"))["phase"] == "waiting"
+            first, second = await next_of(page, "now"), await next_of(page, "now")
+            assert first["phase"] == "waiting"
+            assert second["sent_s"] > first["sent_s"]  # from which the page computes the age of what it shows
 
     asyncio.run(look())
 
@@ -155,7 +157,7 @@ def test_a_thirteenth_page_sees_nothing_and_may_stop(port: int, monkeypatch: pyt
             "here", word, True, "FAULT", "STOP_BY_PERSON", "a person stopped it", 0.0, 0.1, "", True, False
         )
 
-    monkeypatch.setattr(operator_link, "tell", apply_order)
+    monkeypatch.setattr(operator_link, "send_command", apply_order)
 
     async def look() -> None:
         pages = [await page_of(port) for _ in range(viewers.MOST_VIEWERS)]
@@ -214,25 +216,46 @@ def test_arming_needs_the_token_and_stop_waits_for_nobody(monkeypatch: pytest.Mo
             raise Fault("NO_PEER", "nobody there\x1b[2J")
         return CommandOutcome("here", word, True, "ARMED", "CHECK_PASSED", "", 0.0, 0.1, "", True, False)
 
-    monkeypatch.setattr(operator_link, "tell", apply_order)
+    monkeypatch.setattr(operator_link, "send_command", apply_order)
 
     async def look() -> None:
         words = operator_link.Words(BusConfig(), TOKEN)
         for token in ("guess", "", "\ud800"):  # the last is half of a pair, as JSON may hold it
-            wrong = await words.say(operator_link.Wish("ARM", token))
+            wrong = await words.deliver(operator_link.Wish("ARM", token))
             assert "wrong token" in wrong["lines"][0]
         assert said == []
-        arming = asyncio.create_task(words.say(operator_link.Wish("ARM", TOKEN)))
+        arming = asyncio.create_task(words.deliver(operator_link.Wish("ARM", TOKEN)))
         await asyncio.sleep(0.05)
-        assert "in progress" in (await words.say(operator_link.Wish("DISARM", TOKEN)))["lines"][0]
-        assert (await words.say(operator_link.Wish("STOP", "")))["done"]  # while the other word is under way
+        assert "in progress" in (await words.deliver(operator_link.Wish("DISARM", TOKEN)))["lines"][0]
+        assert (await words.deliver(operator_link.Wish("STOP", "")))["done"]  # while the other word is under way
         armed.set()
         assert (await arming)["done"]
-        failed = await words.say(operator_link.Wish("RESET", TOKEN))
+        failed = await words.deliver(operator_link.Wish("RESET", TOKEN))
         assert failed["lines"] == ["nobody there\\x1b[2J"]
 
     asyncio.run(look())
     assert said == ["ARM", "STOP", "RESET"]
+
+
+def test_a_stop_that_reaches_no_rig_is_sent_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(operator_link, "_STOP_AGAIN_S", 0.0)
+    sent: list[str] = []
+
+    def third_time(_bus: BusConfig, word: str) -> CommandOutcome:
+        sent.append(word)
+        if len(sent) < 3:
+            raise Fault("NO_PEER", "STOP NOT DELIVERED: no rig answered")
+        return CommandOutcome("here", word, True, "FAULT", "STOP_BY_PERSON", "", 0.0, 0.1, "", True, False)
+
+    monkeypatch.setattr(operator_link, "send_command", third_time)
+    stop = operator_link.Wish("STOP", "")
+    assert asyncio.run(operator_link.Words(BusConfig(), TOKEN).deliver(stop))["done"]
+    assert sent == ["STOP"] * 3
+    sent.clear()
+    monkeypatch.setattr(operator_link, "_STOP_S", -1.0)  # the time is over
+    failed = asyncio.run(operator_link.Words(BusConfig(), TOKEN).deliver(stop))
+    assert (failed["done"], failed["lines"]) == (False, ["STOP NOT DELIVERED: no rig answered"])
+    assert sent == ["STOP"]
 
 
 def test_a_wish_is_a_word_that_is_known() -> None:
@@ -270,7 +293,7 @@ def test_a_slow_reader_is_dropped_and_the_others_go_on(monkeypatch: pytest.Monke
         slow, quick = Socket("slow", False), Socket("quick", True)
         async with all_of_them.added(slow, [b""]), all_of_them.added(quick, [b""]):  # type: ignore[arg-type]
             for _ in range(200):
-                all_of_them.tell(b"frame")
+                all_of_them.broadcast(b"frame")
                 await asyncio.sleep(0)
             assert quick.got == 201
         assert all_of_them.dropped == 1

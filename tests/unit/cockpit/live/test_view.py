@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import sensor_block
+from bridge.wire.messages import APPLIED, TRACE, sensor_block
 from bridge.wire.topics import SENSORS
+from cockpit.figures.signals import PANELS
 from cockpit.live.buckets import COLUMNS
 from cockpit.live.frames import frame
 from cockpit.live.view import View
-from cockpit.review.panels import PANELS
-from tests.unit.cockpit.live.made import GONE, Rig, column, table_of_frame
+from tests.unit.cockpit.live.made import BLOCK_NS, GONE, Rig, column, table_of_frame
 
 
 @pytest.fixture
@@ -32,14 +32,14 @@ def test_a_bucket_has_the_smallest_mean_and_largest_sample(rig: Rig, view: View)
         rig.applied(number, amplitude_m=1e-9 * number)
     buckets = view.step().buckets
     assert buckets is not None
-    assert (buckets.first, buckets.end) == (0, 6)  # the last two wait for what answers them
+    assert (buckets.first, buckets.end) == (0, 5)  # the last three wait for what answers them
     least = column(buckets.values, COLUMNS, "drive_force_N.least")
     assert least[2] == 3.0
-    assert least[[0, 1, 3, 4, 5]].tolist() == [10.0] * 5
-    assert column(buckets.values, COLUMNS, "drive_force_N.most").tolist() == [10.0] * 6
+    assert least[[0, 1, 3, 4]].tolist() == [10.0] * 4
+    assert column(buckets.values, COLUMNS, "drive_force_N.most").tolist() == [10.0] * 5
     assert column(buckets.values, COLUMNS, "drive_force_N.mean")[2] == pytest.approx(10.0 - 7.0 / 100)
     # of what holds from block to block the last of the bucket
-    assert column(buckets.values, COLUMNS, "amplitude_m") == pytest.approx(1e-9 * np.array([4, 9, 14, 19, 24, 29]))
+    assert column(buckets.values, COLUMNS, "amplitude_m") == pytest.approx(1e-9 * np.array([4, 9, 14, 19, 24]))
     assert np.isnan(column(buckets.values, COLUMNS, "time_to_slip_s")).all()  # -1: not known
 
 
@@ -48,9 +48,32 @@ def test_blocks_that_did_not_come_are_a_hole_and_are_counted(rig: Rig, view: Vie
     step = view.step()
     assert step.buckets is not None
     force = column(step.buckets.values, COLUMNS, "drive_force_N.mean")
-    assert np.isnan(force).tolist() == [False] * 4 + [True] * 2 + [False] * 4
+    assert np.isnan(force).tolist() == [False] * 4 + [True] * 2 + [False] * 3
     lost = view.now()["lost"]
     assert (lost["viewer"], lost["controller"], lost["commands"]) == (10, 0, 50)
+
+
+def test_a_controller_whose_clock_ran_ahead_without_blocks_is_shown_with_its_blocks(rig: Rig, view: View) -> None:
+    rig.blocks(range(20))
+    for number in range(20, 160):  # stale steps
+        rig.answer(19, mode=wire.WATCH, sequence=number, t_ns=(number + 1) * BLOCK_NS)
+    for number in range(20, 60):
+        rig.block(number)
+        rig.answer(number, sequence=number + 140)
+    buckets = view.step().buckets
+    assert buckets is not None
+    assert column(buckets.values, COLUMNS, "mode").tolist() == [wire.EXCITE] * 9
+
+
+def test_without_a_controller_its_curves_end(rig: Rig, view: View) -> None:
+    rig.blocks(range(20))
+    for number in range(20, 60):
+        rig.block(number)
+        rig.applied(number)
+    buckets = view.step().buckets
+    assert buckets is not None
+    assert np.isnan(column(buckets.values, COLUMNS, "mode")).tolist() == [False] * 4 + [True] * 5
+    assert not np.isnan(column(buckets.values, COLUMNS, "guard_state")).any()
 
 
 def test_steps_join_without_a_seam(rig: Rig, view: View) -> None:
@@ -102,7 +125,7 @@ def test_a_controller_that_is_silent_decides_nothing(rig: Rig, view: View) -> No
 def test_an_end_is_an_end_and_another_run_begins_anew(rig: Rig, view: View) -> None:
     rig.blocks(range(400))
     rig.event("END", "blocks=400")
-    assert view.step().anew
+    assert view.step().new_run
     rig.presence = GONE
     rig.now_s += 2.0
     assert view.now()["phase"] == "ended"
@@ -111,7 +134,7 @@ def test_an_end_is_an_end_and_another_run_begins_anew(rig: Rig, view: View) -> N
     for number in range(20):  # more than eight in a row, while the old count is silent
         rig.blocks([number])
     step = view.step()
-    assert step.anew
+    assert step.new_run
     assert view.now()["phase"] == "live"
     assert view.run is not None
     assert view.run.newest["sensors"] == 19
@@ -125,7 +148,7 @@ def test_a_rig_of_other_blocks_is_another_run(rig: Rig, view: View) -> None:
         record["sequence"], record["t_ns"], record["drive_force_N"] = number, (number + 1) * 1_000_000, 7.0
         rig.say(SENSORS, record.tobytes())
     step = view.step()
-    assert step.anew
+    assert step.new_run
     assert step.buckets is not None
     assert set(column(step.buckets.values, COLUMNS, "drive_force_N.mean").tolist()) == {7.0}
 
@@ -168,11 +191,11 @@ def test_latency_is_counted_in_bars(rig: Rig, view: View) -> None:
         rig.applied(number, round_trip_ns=100_000 if number else 5_000_000, commands_late=0 if number else 1)
     view.step()
     assert view.run is not None
-    latency = view.run.tally.latency()
+    latency = view.run.tally.latency_us.bars("us")
     assert latency is not None
     assert sum(latency["counts"]) == 100
     assert len(latency["edges_us"]) == len(latency["counts"]) + 1
-    assert view.run.tally.percentile_us(0.5) == pytest.approx(112.2, abs=0.1)
+    assert view.run.tally.percentile_us(0.5) == pytest.approx(100.0, rel=0.005)
     assert view.now()["lost"]["late"] == 1
 
 
@@ -184,6 +207,7 @@ def test_a_frame_is_json_and_columns() -> None:
     assert json.dumps(table_of_frame(frame("now", {}))[0]["count"]) == "0"
 
 
-def test_every_curve_of_the_page_is_in_the_buckets() -> None:
-    names = {signal for panel in PANELS for signal in panel.signals}
+def test_every_curve_of_the_page_is_in_the_buckets_and_on_the_bus() -> None:
+    names = {signal.name for panel in PANELS for signal in panel.signals}
     assert names <= {column.removesuffix(".mean") for column in COLUMNS}
+    assert {name for name in COLUMNS if "." not in name} <= {*(APPLIED.dtype.names or ()), *(TRACE.dtype.names or ())}

@@ -93,7 +93,7 @@ def slow_accelerometer(data: Columns) -> None:
         (dead_sensor, "constant", "mass_accel_mps2: is 0 in every row; not used", "mass_accel_mps2", 4000),
         (accel_in_other_unit, "units", "mass_accel_mps2: reaches", "mass_accel_mps2", 4000),
         (clipped_force, "clipped", "drive_force_N: ", "", 4000),
-        (hole_in_time, "time-gap", "t_s: 1 gap in time, first at 0.4995 s: 0.1", "", 4000),
+        (hole_in_time, "time-gap", "t_s: 1 gap in time, first at 0.4995 s, the longest 0.1", "", 4000),
         (
             drive_in_mm,
             "units",

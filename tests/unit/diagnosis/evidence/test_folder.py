@@ -177,7 +177,7 @@ def in_micronewton(data: Columns) -> None:
         (time_in_ks, "0.002 s long: must be 1 s at least; give a longer run; a sample every 5e-07 s"),
         (another_speed(-1.0), "drive_position_m: moves at -0.0005 m/s on average, but drive_velocity_mps = 0.0005"),
         (another_speed(4.0), "drive_position_m: moves at 0.002 m/s on average, but drive_velocity_mps = 0.0005"),
-        (paused, "t_s: 1 gap in time, first at 0.4995 s: 1.8e+03 s without a sample, the longest 1.8e+03 s"),
+        (paused, "t_s: 1 gap in time, first at 0.4995 s, the longest 1.8e+03 s"),
         (full_of_holes, "19 % of the run in all: must be 1 s and 10 % at most; split the file there"),
         (short, "run-01.parquet: t_s: 9 rows: must have 16 at least"),
         (in_micronewton, "drive_force_N: largest value 1.70"),

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from diagnosis.look.look import LookResult, RecordFacts, look
-from diagnosis.look.turns import long_turns, turns
-from diagnosis.look.words import cannot_tell
+from diagnosis.look.slip_shape import StackedFalls, shape_of
+from diagnosis.look.words import limits_of_look
+from diagnosis.slips import turning_points, turns
 from plant.config import RigConfig
 from plant.simulate import simulate
 from tests.unit.diagnosis.look.rival import eight_lines
@@ -169,7 +170,7 @@ def test_friction_over_speed_and_over_stick_time() -> None:
     seen = ageing((2e-4, 5e-4, 2e-3), (0.0, 0.0))
     assert [round(1e3 * one.speed_mps, 1) for one in seen.at_speeds] == [0.2, 0.5, 2.0]
     assert "dwell_N_per_decade" not in seen.numbers
-    assert any("may be one on the speed; stop the drive" in line for line in cannot_tell(seen))
+    assert any("may be one on the speed; stop the drive" in line for line in limits_of_look(seen))
     halted = ageing((5e-4,), (0.0, 1.0, 4.0))
     assert halted.numbers["dwell_N_per_decade"].value == pytest.approx(1.0, rel=0.05)
     assert halted.numbers["stiffness_N_per_m"].value == pytest.approx(1e4, rel=0.1)
@@ -183,7 +184,7 @@ def test_one_stick_that_is_cut_short_shows_no_dependence_on_its_time() -> None:
     assert seen is not None
     assert len(seen.cycles) == 8
     assert "dwell_N_per_decade" not in seen.numbers
-    assert any("all sticks last alike" in line for line in cannot_tell(seen))
+    assert any("all sticks last alike" in line for line in limits_of_look(seen))
 
 
 def test_a_drive_that_stands_has_no_speed() -> None:
@@ -218,7 +219,7 @@ def test_a_drift_and_several_speeds_are_told_and_an_even_record_tells_neither() 
         force_N = np.concatenate(pieces) + 0.01 * np.random.default_rng(3).standard_normal(sum(map(len, pieces)))
         seen = look(np.arange(len(force_N)) / 2e3, force_N, None, RecordFacts(1e-3))
         assert seen is not None
-        return "; ".join(cannot_tell(seen))
+        return "; ".join(limits_of_look(seen))
 
     scatter = 17.0 + 0.1 * np.random.default_rng(5).standard_normal(30)
     even = told(scatter.tolist(), [1e-3] * 30)
@@ -249,4 +250,13 @@ def test_pieces_that_are_passed_over_hold_no_turn() -> None:
         values = np.round(np.cumsum(step * random.standard_normal(length)), 1)  # with equal ones
         at = [0] * (length + 1)
         count = turns(values.tolist(), drop, at)
-        assert long_turns(values, drop).tolist() == at[:count]
+        assert turning_points(values, drop).tolist() == at[:count]
+
+
+def test_a_fall_that_is_quicker_than_its_samples_shows_no_decay() -> None:
+    since_s = np.tile(np.linspace(-0.01, 0.01, 21), 6)
+    number = np.repeat(np.arange(6), 21)
+    shape, _, _ = shape_of(StackedFalls(since_s, np.where(since_s < 0.0, 10.0, 5.0), number, 6, 0.02, 10.0, 5.0))
+    assert shape is not None
+    assert shape.ratio == 0.0
+    assert shape.force_N == pytest.approx(7.5, abs=0.5)

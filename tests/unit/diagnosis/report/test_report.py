@@ -8,13 +8,14 @@ import pytest
 
 from bridge import units
 from bridge.log.finding import Finding
+from bridge.results import strict_json
 from cockpit.commands import diagnose_output
 from diagnosis.evidence.exciter_harmonics import DISTORTED
 from diagnosis.evidence.force_pickup import PICK_UP
 from diagnosis.report import words as in_words
 from diagnosis.report.page import report_page, rig_row, where_map, write_report
 from diagnosis.report.summary import summary
-from diagnosis.result import Candidate, Cell, Curve, Diagnosis, Estimate, Picture, RigNumber, Shrinkage, to_json
+from diagnosis.result import Candidate, Cell, Curve, Diagnosis, Estimate, Picture, RigNumber, Shrinkage
 from tests import made_up
 
 NAN = math.nan
@@ -101,7 +102,7 @@ def test_text_is_text(tmp_path):
         candidates=(Candidate(nasty, 0.5, nasty, {nasty: Estimate(1.0, (0.0, 2.0))}),),
         not_distinguishable=((nasty, nasty),),
         where=(Cell(nasty, nasty, (0.0, 1.0), nasty, 1.0),),
-        gap=made.gap._replace(definition=nasty, runs=(nasty,), compared=(Shrinkage(nasty, 1.0, 0.0, None),)),
+        gap=made.gap._replace(definition=nasty, files=(nasty,), compared=(Shrinkage(nasty, 1.0, 0.0, None),)),
         pictures=(Picture("residual", nasty, nasty, nasty, (curve,)),),
         findings=(made.findings[0]._replace(kind=nasty, where=nasty, text=nasty),),
     )
@@ -120,7 +121,7 @@ def test_a_diagnosis_with_nothing_in_it(verdict, tmp_path):
         candidates=(),
         not_distinguishable=(),
         where=(),
-        gap=made.gap._replace(runs=(), shrinkage=None, interval_90=None, compared=()),
+        gap=made.gap._replace(files=(), shrinkage=None, interval_90=None, compared=()),
         next_experiment=made.next_experiment._replace(gain=None),
         rig=(),
         findings=(),
@@ -156,7 +157,7 @@ def test_numbers_that_are_none(tmp_path):
 
 def test_without_a_held_out_run_there_is_no_chart_but_what_to_do(tmp_path):
     made = made_up.diagnosis()
-    alone = made.gap._replace(runs=(), nominal=NAN, retuned=NAN, with_effect=NAN, floor=NAN, compared=())
+    alone = made.gap._replace(files=(), nominal=NAN, retuned=NAN, with_effect=NAN, floor=NAN, compared=())
     page = page_of(made._replace(gap=alone), tmp_path)
     assert "Add a second run" in page
     assert "how much of that drive-backlash closes" in page
@@ -235,8 +236,8 @@ def test_a_name_that_leaves_more_than_a_right_one_says_so(left, effects, said):
 
 def test_runs_of_two_folders_keep_their_names_apart():
     made = made_up.diagnosis()
-    cells = [cell._replace(run=run) for cell, run in zip(made.where, ("a/1.csv", "b/1.csv"), strict=False)]
-    assert [cell["run"] for cell in to_json(made._replace(where=tuple(cells)))["where"]] == ["a/1", "b/1"]
+    cells = [cell._replace(file=run) for cell, run in zip(made.where, ("a/1.csv", "b/1.csv"), strict=False)]
+    assert [cell["run"] for cell in strict_json(made._replace(where=tuple(cells)))["where"]] == ["a/1", "b/1"]
 
 
 def test_runs_in_which_nothing_moves_are_in_the_summary():
@@ -319,5 +320,5 @@ def test_no_more_than_the_whole_gap_is_said_to_be_closed_and_json_has_the_number
         assert "106 %" not in text
         assert "176 %" not in text
         assert "100 %" in text
-    assert to_json(made)["gap"]["shrinkage"] == 1.06
-    assert to_json(made)["gap"]["interval_90"] == [0.43, 1.76]
+    assert strict_json(made)["gap"]["shrinkage"] == 1.06
+    assert strict_json(made)["gap"]["interval_90"] == [0.43, 1.76]

@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from diagnosis.evidence.folder import load_evidence
-from diagnosis.features.cycles import find_cycles
+from diagnosis.slips import find_cycles
 from diagnosis.synthetic import folder as making
 from diagnosis.synthetic.folder import Case, make_evidence
 from diagnosis.synthetic.protocols import FORCE_PROTOCOL, PROTOCOLS, RunPlan

@@ -5,35 +5,35 @@ import threading
 import pytest
 
 from cockpit.run import lifecycle_lines as module
-from cockpit.run.lifecycle_lines import telling
+from cockpit.run.lifecycle_lines import step_reports
 from tests.patience import PATIENCE_S
 
 
 def test_lines_are_printed_in_order_and_all_before_the_end(capsys: pytest.CaptureFixture[str]) -> None:
-    with telling(quiet=False) as tell:
-        tell("waiting", "for a rig")
-        tell("running", "\x1b[2J")
+    with step_reports(quiet=False) as report:
+        report("waiting", "for a rig")
+        report("running", "\x1b[2J")
     assert capsys.readouterr().err == "waiting  for a rig\nrunning  \\x1b[2J\n"
 
 
 def test_a_child_says_only_once_that_all_is_loaded(capsys: pytest.CaptureFixture[str]) -> None:
-    with telling(quiet=True) as tell:
-        tell("waiting", "for a rig")
-        tell("joined", "a rig")
+    with step_reports(quiet=True) as report:
+        report("waiting", "for a rig")
+        report("joined", "a rig")
     assert capsys.readouterr().err == "stickslip: loaded\n"
 
 
 def test_a_terminal_that_stands_still_holds_up_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
     goes_on, over = threading.Event(), threading.Event()
 
-    def say(_line: str) -> None:
+    def print_line(_line: str) -> None:
         goes_on.wait(PATIENCE_S)
         over.set()
 
-    monkeypatch.setattr(module, "say", say)
+    monkeypatch.setattr(module, "print_line", print_line)
     monkeypatch.setattr(module, "_LAST_LINES_S", 0.05)
-    with telling(quiet=False) as tell:
+    with step_reports(quiet=False) as report:
         for _ in range(100):
-            tell("running", "x")
+            report("running", "x")
     assert not over.is_set()
     goes_on.set()

@@ -4,13 +4,14 @@ Windows, noise, stiffness, forces, and the speeds at which a vibration was neede
 of exciter, loop delay and accelerometer stay: they do not depend on the doubted channels.
 """
 
-from bridge.kernel import Record, kernel
+from bridge.kernel import kernel
+from bridge.layouts import ControllerMemory, ControllerParams
 from controller.estimate.learning import begin
 from controller.estimate.windows import clear_windows
 
 
 @kernel
-def forget_motion(p: Record, s: Record) -> None:
+def forget_motion(p: ControllerParams, s: ControllerMemory) -> None:
     """Forget all values learnt from force and positions."""
     clear_windows(s)
     for table in (s.slope, s.sigma, s.noise):
@@ -26,7 +27,7 @@ def forget_motion(p: Record, s: Record) -> None:
 
 
 @kernel
-def _forget_velocities(s: Record) -> None:
+def _forget_velocities(s: ControllerMemory) -> None:
     s.drive_velocity_mps, s.held_mps, s.rising_mps, s.steady_mps = 0.0, 0.0, 0.0, 0.0
     s.steady_s, s.moved_s, s.stood_s = 0.0, 0.0, 0.0
     s.measured, s.moving, s.blind = 0, 0, 0
@@ -36,7 +37,7 @@ def _forget_velocities(s: Record) -> None:
 
 
 @kernel
-def _forget_forces(p: Record, s: Record) -> None:
+def _forget_forces(p: ControllerParams, s: ControllerMemory) -> None:
     begin(p, s)
     s.stiffness_learnt, s.stretched = 0, 0
     s.taught, s.taught_ratio, s.taught_square = 0.0, 0.0, 0.0
@@ -47,7 +48,7 @@ def _forget_forces(p: Record, s: Record) -> None:
 
 
 @kernel
-def forget_needs(p: Record, s: Record) -> None:
+def forget_needs(p: ControllerParams, s: ControllerMemory) -> None:
     """Forget where a vibration was needed, was not, or did not help: an exciter that was off taught some of it."""
     for needs in (s.edge_ratio, s.edge_held_s, s.probe_s, s.needed_to_mps, s.needless_from_mps, s.rough_with):
         needs[:] = 0.0

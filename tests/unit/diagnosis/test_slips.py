@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from diagnosis.features.cycles import find_cycles
+from diagnosis.slips import find_cycles
 
 FALL_S = 0.036  # a slip of the paper's rig
 
@@ -56,6 +56,12 @@ def test_a_slow_fall_is_no_slip():
     force_N = np.where(t_s < 3.0, 5.0 * t_s, 12.0 + 3.0 * np.exp(-(t_s - 3.0)))
     assert find_cycles(t_s, force_N).slips == 0
     assert find_cycles(t_s, force_N, slowest_fall_s=3.0).slips == 1
+
+
+def test_a_slow_fall_that_recovers_before_the_end_is_no_slip():
+    t_s = np.arange(9000) / 1000.0
+    force_N = np.interp(t_s, [0.0, 3.0, 8.0, 9.0], [0.0, 10.0, 5.0, 9.6])
+    assert find_cycles(t_s, force_N, minimum_drop_N=4.8).slips == 0
 
 
 def test_the_smallest_slip_can_be_set():

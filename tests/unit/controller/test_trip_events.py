@@ -22,20 +22,21 @@ def told(reasons: Sequence[int], limits: Sequence[int]) -> list[tuple[str, str]]
     trace = TRACE.blank(len(reasons))
     trace["t_ns"] = np.arange(len(reasons)) * MS_NS
     trace["reason"], trace["limit"] = reasons, limits
-    teller = TripEvents()
-    return [one for row in changes(trace) for one in teller.news(trace[row])]
+    events = TripEvents()
+    return [event for row in changes(trace) for event in events.news(trace[row])]
 
 
 def test_a_trip_is_told_once_and_its_end_too() -> None:
     said = told([wire.HELD] * 5 + [wire.OPEN_LOOP] * 300 + [wire.HELD] * 5, [wire.NO_LIMIT] * 310)
     assert [code for code, _ in said] == ["OPEN_LOOP", "CLEARED"]
-    assert said[0][1].startswith("F: far less v_a than commanded")
+    assert said[0][1].startswith("failure: far less v_a than commanded")
 
 
 def test_a_limit_is_told_once_it_has_held_for_a_while() -> None:
     short, long = [wire.GAIN_LIMIT] * 100, [wire.GAIN_LIMIT] * 250
     assert told([wire.HELD] * 110, [*short, *[wire.NO_LIMIT] * 10]) == []
     assert [code for code, _ in told([wire.HELD] * 250, long)] == ["GAIN_LIMIT"]
+    assert told([wire.HELD] * 250, [wire.RANGE] * 250)[0][1].startswith("amplitude limited by limits.amplitude_max_m")
 
 
 def test_every_trip_is_an_event_with_a_letter() -> None:

@@ -13,8 +13,9 @@ from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import APPLIED, OPERATOR, PLANT_EVENT
-from bridge.wire.words import words
-from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received, is_frozen
+from bridge.wire.words import help_of, word_of
+from bridge.wire.zenoh_link import BusConfig, Inbox, Received
+from cockpit.live.listener import connected
 
 # Timeout of the connection. Longer: the advice to cut the amplifier comes later. Shorter: fails on a busy computer.
 _DIAL_S = 2.0
@@ -78,26 +79,16 @@ class CommandOutcome(NamedTuple):
         return lines
 
 
-def tell(bus_config: BusConfig, name: str) -> CommandOutcome:
+def send_command(bus_config: BusConfig, name: str) -> CommandOutcome:
     """Send a command until the rig has carried it out or refuses it.
 
     Raises Fault NO_PEER if no rig answers, or if the rig falls silent, does not confirm the command, or vibrates after STOP.
     """
     where = bus_config.endpoint
     action = wire.Operator.Action.Value(name)
-    try:
-        bus = Bus(bus_config, "operator", lockstep=True, patience_s=_DIAL_S)
-    except Fault as fault:
-        if fault.kind.code != "NO_PEER":
-            raise
-        undelivered = f"{name} NOT DELIVERED: "
-        if is_frozen(bus_config):
-            line = f"{undelivered}the rig at {where} accepts connections but does not answer (frozen or overloaded)"
-            raise Fault("NO_PEER", f"{line}: must run; {_CUT_AMPLIFIER}") from None
-        line = f"{undelivered}no rig answered at {where} within {_DIAL_S:g} s: {bus_config.must_be} of the run"
-        by_hand = "if the exciter vibrates, cut its amplifier by hand now; otherwise check --endpoint"
-        raise Fault("NO_PEER", f"{line}; {by_hand if action in _QUIETING else _START_ONE}") from None
-    with bus:
+    by_hand = "if the exciter vibrates, cut its amplifier by hand now; otherwise check --endpoint"
+    absent = by_hand if action in _QUIETING else _START_ONE
+    with connected(bus_config, "operator", _DIAL_S, _CUT_AMPLIFIER, absent, f"{name} NOT DELIVERED: ") as bus:
         exchange = _Exchange(name)
         bus.listen(APPLIED, exchange.inbox.push)
         bus.listen(PLANT_EVENT, exchange.inbox.keep)
@@ -115,15 +106,14 @@ def tell(bus_config: BusConfig, name: str) -> CommandOutcome:
             f"{where}: the rig has been silent for {exchange.silent_s:.1f} s, before that {before}: must answer {name}"
         )
         raise Fault("NO_PEER", f"{line}; {_CUT_AMPLIFIER}; then check its process and the network")
-    named = {(row.column, row.number): row for row in words()}
-    cause = named[("cause", last.cause)]
+    cause = word_of("cause", last.cause)
     outcome = CommandOutcome(
         endpoint=where,
         word=name,
         done=exchange.done,
         state=wire.GuardState.Name(last.guard_state),
-        cause=cause.word,
-        help=cause.help,
+        cause=cause,
+        help=help_of("cause", cause),
         amplitude_m=last.amplitude_m,
         seconds=exchange.seconds,
         not_kept=exchange.not_kept,

@@ -1,0 +1,57 @@
+"""The sensor channels of a rig, one row each; a new channel begins here."""
+
+import math
+from typing import NamedTuple
+
+
+class Channel(NamedTuple):
+    """A column of measured data."""
+
+    name: str  # on the wire, in logs and in evidence, with its SI unit at the end
+    quantity: str  # as in `bridge.tables.unit_words`
+    turning: str  # quantity on a rig that turns
+    radius_power: int  # power of the radius by which a value of a turning rig is multiplied
+    largest: float = math.inf  # a larger value has a wrong unit: mm in place of m exceed it on a bench rig
+    has_spikes: bool = False  # a slip is a spike in it, so a single far value may be right
+    positive: str = ""  # direction
+    is_controlled: bool = False  # the controller needs it
+    sensor: str = ""  # start of its keys in [rig.sensors]: noise, resolution, range
+    has_lowest: bool = False  # its range need not be symmetric
+    without: str = ""  # consequence for a diagnosis of a rig with a drive spring
+    without_force_drive: str = ""  # the same for a rig that a given force drives
+
+
+_FORWARD = "forward"
+SENSOR_CHANNELS = {
+    channel.name: channel
+    for channel in (
+        Channel(
+            "drive_force_N", "force", "torque", -1,
+            positive="pulls the slide forward", is_controlled=True, sensor="force", has_lowest=True,
+            without="slips are seen in the acceleration only, and no force level or drive stiffness can be judged",
+        ),
+        Channel(
+            "mass_accel_mps2", "acceleration", "angular acceleration", 1, largest=1e5, has_spikes=True,
+            positive=_FORWARD, sensor="accel",
+            without="mass, normal-load fluctuation and the fast part of a slip are judged from the force alone",
+            without_force_drive="the acceleration is taken from the position, twice differentiated",
+        ),
+        Channel(
+            "base_accel_mps2", "acceleration", "angular acceleration", 1, largest=1e5, has_spikes=True,
+            positive=_FORWARD, is_controlled=True, sensor="accel",
+            without="the amplitude that the piezo delivers, and a base that gives way, cannot be seen",
+        ),
+        Channel(
+            "mass_position_m", "length", "angle", 1, largest=10.0,
+            positive=_FORWARD, is_controlled=True, sensor="position", has_lowest=True,
+            without="position-dependent friction and frame compliance are judged from the drive position only",
+            without_force_drive="the motion is taken from the acceleration: effects of place and slow drift cannot be judged",
+        ),
+        Channel(
+            "drive_position_m", "length", "angle", 1, largest=10.0,
+            positive=_FORWARD, is_controlled=True, sensor="position", has_lowest=True,
+            without="the drive counts as perfectly even: no speed ripple can be seen",
+        ),
+    )
+}  # fmt: skip
+CHANNELS = tuple(SENSOR_CHANNELS)  # names, in the order of the wire
