@@ -8,17 +8,17 @@ from bridge.plain import print_line
 
 PROGRESS = "compiling kernels, once for this version: "  # followed by `12 of 163 left`
 _LINES = 8  # lines for all kernels, if stderr is not a terminal
-_BAR = 20  # characters
+_BAR = 20  # length of the progress bar [characters]
 # Set by a command: within this context a signal ends the process at once. Without it signals wait for the end of a compilation.
 guard: Callable[[], AbstractContextManager[None]] = nullcontext
 
 
 class Progress:
-    """Progress: one line that is rewritten, on a terminal; a few lines elsewhere."""
+    """Shows progress: one line that is rewritten, on a terminal; a few lines elsewhere."""
 
     def __init__(self) -> None:
         self._on_terminal = sys.stderr is not None and sys.stderr.isatty()  # pyright: ignore[reportUnnecessaryComparison]
-        self._step = -1  # shown last; -1 before the first line and after the last
+        self._step = -1  # the step shown last; -1 before the first line and after the last line
 
     def show(self, left: int, total: int) -> None:
         """Show how many kernels are left; 0 ends the line."""
@@ -79,7 +79,7 @@ def compiling(module: str = "") -> Generator[str]:
     """Guard the compilation or loading of kernels and show its progress; yields the module of the outermost context.
 
     Args:
-        module: of these kernels, if known.
+        module: the module of these kernels, if known.
 
     """
     _work.depth += 1

@@ -14,9 +14,9 @@ from bridge.faults import Fault
 from bridge.files import check_file
 from bridge.plain import print_line
 
-_LARGEST_BYTES = 2 << 20  # of a TOML file; hand-written files of hundreds of runs have about 100 kB
-_DEEPEST = 32  # parts of a key, or nested brackets; files of this project need 5
-_MOST_PROBLEMS = 20  # reported for one table
+_LARGEST_BYTES = 2 << 20  # largest TOML file; hand-written files of hundreds of runs have about 100 kB
+_DEEPEST = 32  # most parts of a dotted key; files of this project need 5
+_MOST_PROBLEMS = 20  # most problems reported for one table
 _QUOTED = re.compile(r'"[^"\\\n]*(?:\\.[^"\\\n]*)*"|\'[^\'\n]*\'')
 _DOTS = re.compile(r"[ \t]*\.[ \t]*")
 _CHAIN = re.compile(r"[\w-]+(?:\.[\w-]+)*")
@@ -48,6 +48,7 @@ Two = Annotated[tuple[float, float], Field(strict=False)]
 # Similarity (`difflib`) from which an unknown key counts as a misspelling of a known one. Smaller: distinct keys match, such as
 # viscous_damping_Ns_per_m and contact_damping_Ns_per_m with 0.79. Larger: a wrong letter in a short key is missed.
 _MISSPELT = 0.8
+_NUMBER = re.compile(r"[-+]?[0-9.]+(e[-+]?[0-9]+)?", re.IGNORECASE)
 _COMMA = re.compile(r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?")
 
 T = TypeVar("T", bound=Strict)
@@ -60,9 +61,8 @@ in_short = _SHORT.repr
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Read one TOML file. Raises Fault CONFIG when it cannot be read or is not TOML."""
-    check_file(
-        path, "CONFIG", "give the path of a TOML file"
-    )  # refuses a pipe too, as reading one without a writer never ends
+    # refuses a pipe too: reading one without a writer never ends
+    check_file(path, "CONFIG", "give the path of a TOML file")
     text = ""
     try:
         with path.open("rb") as file:
@@ -77,10 +77,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise Fault("CONFIG", f"{path}: cannot be read: {error.strerror}; give the path of a TOML file") from None
     except UnicodeDecodeError as error:
         raise Fault("CONFIG", f"{path}: is not UTF-8 from byte {error.start + 1} on; save it as UTF-8") from None
-    except (
-        ValueError,
-        RecursionError,
-    ) as error:  # ValueError: also a number of 5000 digits; RecursionError: brackets 1000 deep
+    except (ValueError, RecursionError) as error:  # a number of 5000 digits, or brackets 1000 deep
         raise Fault("CONFIG", f"{path}: not valid TOML: {error}{_decimal_comma(text, str(error))}") from None
 
 
@@ -165,7 +162,7 @@ def _without_misspelt(problems: Sequence[Any]) -> list[Any]:
     unknown = [problem["loc"] for problem in problems if problem["type"] == "extra_forbidden"]
 
     def misspelt(table: tuple[str | int, ...], name: str) -> bool:
-        siblings = [other[-1] for other in unknown if other[:-1] == table]
+        siblings = [key[-1] for key in unknown if key[:-1] == table]
         return bool(get_close_matches(name, siblings, 1, _MISSPELT))
 
     return [item for item in problems if item["type"] != "missing" or not misspelt(item["loc"][:-1], item["loc"][-1])]
@@ -176,7 +173,7 @@ def _line(model: type[Strict], source: str, problem: Any) -> str:
     key = ".".join(path) or "(file)"
     kind: str = problem["type"]
     if kind == "extra_forbidden":
-        known = _sibling_keys(model, path)
+        known = sorted(_fields(_model_at(model, path[:-1])))
         near = get_close_matches(path[-1], known, 1, _MISSPELT)
         remedy = f"perhaps {near[0]}; " if near else ""
         shown = in_short(problem["input"])
@@ -188,7 +185,9 @@ def _line(model: type[Strict], source: str, problem: Any) -> str:
         return f"{source}: {key}: {message}" if path else f"{source}: {message}"
     if kind in {"float_type", "int_type"} and isinstance(problem["input"], str):
         comma = _COMMA.fullmatch(problem["input"].strip())
-        remedy = f"write a decimal point: {comma[0].replace(',', '.')}" if comma else "write it without quotes"
+        remedy = "write it without quotes" if _NUMBER.fullmatch(problem["input"].strip()) else "write digits, such as 1.5"
+        if comma:
+            remedy = f"write a decimal point: {comma[0].replace(',', '.')}"
         return f"{source}: {key} = {in_short(problem['input'])}: must be a number; {remedy}"
     if kind in {"model_type", "dict_type"}:
         needed = [name for name, field in _fields(_model_at(model, path)).items() if field.is_required()]
@@ -202,10 +201,6 @@ def _line(model: type[Strict], source: str, problem: Any) -> str:
     rule = message[:1].lower() + message[1:]
     rule = rule.replace("input should be", "must be")
     return f"{source}: {key} = {in_short(problem['input'])}: {rule}; change the value"
-
-
-def _sibling_keys(model: type[Strict], path: list[str]) -> list[str]:
-    return sorted(_fields(_model_at(model, path[:-1])))
 
 
 def _fields(model: Any) -> dict[str, Any]:

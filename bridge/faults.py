@@ -124,7 +124,7 @@ FAULTS = {
             12,
             "Without extras, stickslip controls, records, replays and judges runs. Diagnosis, tables and reports need further "
             "packages; the line names the first missing one. `pip install 'stickslip[all]'` adds them to the environment of "
-            "stickslip; with pipx or uv, reinstall stickslip with [all]. Nothing was started.",
+            "stickslip, in a clone `make check`; with pipx or uv, reinstall stickslip with [all]. Nothing was started.",
         ),
         FaultKind(
             "NO_MEMORY",
@@ -153,7 +153,7 @@ FAULTS = {
 class Fault(Exception):
     """A fault: its row of `FAULTS`, and one line for the user.
 
-    The line has the form `where = value: rule; what to do`. Raises KeyError for a code that is not in `FAULTS`.
+    The line has the form `where = value: rule; remedy`. Raises KeyError for a code that is not in `FAULTS`.
     """
 
     def __init__(self, code: str, line: str) -> None:

@@ -22,14 +22,14 @@ def check_file(path: Path, code: str, remedy: str) -> None:
     try:
         mode = path.stat().st_mode
     except (FileNotFoundError, NotADirectoryError, ValueError):  # ValueError: an impossible file name
-        why = "no such file"
+        problem = "no such file"
     except OSError as error:
-        why = f"cannot be read: {error.strerror}"
+        problem = f"cannot be read: {error.strerror}"
     else:
         if stat.S_ISREG(mode):
             return
-        why = "is a folder, must be a file" if stat.S_ISDIR(mode) else "must be a file on a disk"
-    raise Fault(code, f"{path}: {why}; {remedy}")
+        problem = "is a folder, must be a file" if stat.S_ISDIR(mode) else "must be a file on a disk"
+    raise Fault(code, f"{path}: {problem}; {remedy}")
 
 
 def read_json(path: Path) -> Any:
@@ -42,10 +42,10 @@ def read_json(path: Path) -> Any:
         raise ValueError("its brackets are too deep") from None
 
 
-_MOST_LINKS = 40  # followed in a row; the kernel's limit
-_LONGEST_STEM_BYTES = 100  # of a file's name, at the start of the name of its unfinished copy
+_MOST_LINKS = 40  # most links followed in a row; the kernel's limit
+_LONGEST_STEM_BYTES = 100  # longest part of a file's name that the name of its unfinished copy repeats
 LOG, JSON, PICTURE, PAGE = "run log", "JSON", "picture", "page"
-_BEGINS = {  # in lower case
+_BEGINS = {  # first bytes of a kind, in lower case
     LOG: (b"\x89mcap",),
     JSON: (b"{", b"["),
     PICTURE: (b"\x89png", b"%pdf", b"<?xml", b"<svg"),
@@ -60,7 +60,7 @@ def refuse_to_replace(path: Path, kind: str, place: str) -> None:
     gave the path, or the path.
     """
     with contextlib.suppress(OSError):  # the write that follows reports it
-        if kind == LOG and (path.is_fifo() or path.is_socket()):  # would wait for a reader, and cannot be read again
+        if kind == LOG and (path.is_fifo() or path.is_socket()):  # it waits for a reader and cannot be read back
             raise Fault("CONFIG", f"{place}: is a pipe or socket: a log must be a file on a disk; choose another file")
     if not _may_replace(path, 8, lambda begins: begins.lstrip().lower().startswith(_BEGINS[kind])):
         raise Fault("CONFIG", f"{place}: {path.name} exists and holds no {kind}: it would be lost; choose another file")
@@ -76,8 +76,8 @@ def refuse_to_replace_text(path: Path, begins: str, place: str) -> None:
 def refuse_to_replace_corrected(path: Path, text: str, place: str) -> None:
     """Raise Fault CONFIG if `path` is a file with another text than `text`: an operator may have corrected it."""
     if not _may_replace(path, -1, text.encode().__eq__):
-        which = "exists with another content, which would be lost; give it to --map, or remove it"
-        raise Fault("CONFIG", f"{place}: {path.name} {which}")
+        rule = "exists with another content, which would be lost; give it to --map, or remove it"
+        raise Fault("CONFIG", f"{place}: {path.name} {rule}")
 
 
 def _may_replace(path: Path, size: int, is_known: Callable[[bytes], bool]) -> bool:
@@ -96,10 +96,10 @@ def not_ours(path: Path, place: str) -> str:
     return f"{place}: {path.name} exists and was not written by this command: it would be lost; choose another file"
 
 
-def refuse_to_lose(inputs: Iterable[Path], what: str, option: str, path: Path | None) -> None:
-    """Raise Fault CONFIG if `path`, the value of `option`, is one of `inputs`, also through a link; `what` names the input."""
+def refuse_to_lose(inputs: Iterable[Path], kind: str, option: str, path: Path | None) -> None:
+    """Raise Fault CONFIG if `path`, the value of `option`, is one of `inputs`, also through a link; `kind` names the input."""
     if path is not None and any(same_file(path, source) for source in inputs):
-        raise Fault("CONFIG", f"{option} {path}: is {what}, which would be lost; choose another file")
+        raise Fault("CONFIG", f"{option} {path}: is {kind}, which would be lost; choose another file")
 
 
 def same_file(first: Path, second: Path) -> bool:

@@ -56,10 +56,10 @@ _layouts.__repr__ = _written_once
 # On loading its first kernel, numba imports SciPy's linear algebra to check whether it could compile a matrix product: 0.3 s of
 # CPU in every process that controls, simulates or replays. A kernel with a matrix product still triggers the import.
 _linear_algebra: Any = importlib.import_module("numba.np.linalg")
-_ask: Any = _linear_algebra.ensure_blas
+_check_for_library: Any = _linear_algebra.ensure_blas
 _linear_algebra.ensure_blas = lambda: None
 importlib.import_module("numba.np.arraymath")
-_linear_algebra.ensure_blas = _ask
+_linear_algebra.ensure_blas = _check_for_library
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:

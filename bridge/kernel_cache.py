@@ -76,34 +76,34 @@ class SourcesLocator(UserProvidedCacheLocator):
         return sources_digest(Path(self._py_file).resolve()).encode()
 
 
-def mark_of(what: str, path: Path, root: Path = ROOT) -> str:
-    """The name of the mark file that confirms that the kernels of `what`, in the source file `path`, are cached.
+def mark_of(owner: str, path: Path, root: Path = ROOT) -> str:
+    """The name of the mark file that confirms that the kernels of `owner`, in the source file `path`, are cached.
 
     Numba separates the kernels of two copies of this project, so the marks depend on `root`.
     """
     place = hashlib.sha256(str(root).encode()).hexdigest()[:8]
-    return f"{what}-{place}-{sources_digest(path, root)}"
+    return f"{owner}-{place}-{sources_digest(path, root)}"
 
 
-def compile_once(what: str, load: Callable[[], object]) -> None:
+def compile_once(owner: str, load: Callable[[], object]) -> None:
     """Call `load`, which calls kernels for the first time. Of several processes one compiles, and the others wait.
 
     Args:
-        what: owner of the kernels, as a part of a file name.
+        owner: name of the kernels' owner, as a part of a file name.
         load: compiles the kernels, or loads them from the cache.
 
     """
     folder = Path(os.environ[FOLDER])
-    done = folder / mark_of(what, Path(sys.modules[load.__module__].__file__ or ""))
+    done = folder / mark_of(owner, Path(sys.modules[load.__module__].__file__ or ""))
     with compiling(load.__module__):
         if done.exists():
             load()
             return
-        with (folder / f"{what}.lock").open("a") as lock:
+        with (folder / f"{owner}.lock").open("a") as lock:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
-                print_line(f"stickslip: {ANOTHER_COMPILES}{what}: waiting for it")
+                print_line(f"stickslip: {ANOTHER_COMPILES}{owner}: waiting for it")
                 fcntl.flock(lock, fcntl.LOCK_EX)
             except OSError:  # a file system without locks: each process compiles
                 pass

@@ -14,11 +14,11 @@ def whole_page(title: str, body: str, *, head: str = "", style: str = "", script
     """A page around `body`, which is HTML and contains one h1 and one main element.
 
     Args:
-        title: as plain text.
-        body: of the page.
+        title: plain text.
+        body: content of the body, HTML.
         head: more elements of the head.
-        style: of a library, before the style sheet of all pages.
-        scripts: run after the body.
+        style: style sheet of a library, before page.css.
+        scripts: scripts that run after the body.
 
     """
     ends = "".join(f"<script>\n{script}\n</script>\n" for script in scripts)
@@ -31,7 +31,7 @@ def whole_page(title: str, body: str, *, head: str = "", style: str = "", script
 
 def filled_page(template: Path, title: str, footer: str = "", /, **values: Any) -> str:
     """A page whose main element is a Jinja template with `values`; `footer` is HTML."""
-    from jinja2 import Environment, StrictUndefined  # noqa: PLC0415 - no dependency of a page of a log or of a running rig
+    from jinja2 import Environment, StrictUndefined  # noqa: PLC0415 - the pages of a log and of a running rig need no Jinja
 
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     main = environment.from_string(template.read_text(encoding="utf-8")).render(values)
@@ -39,7 +39,7 @@ def filled_page(template: Path, title: str, footer: str = "", /, **values: Any) 
 
 
 def png(figure: Any, dpi: float) -> str:
-    """A figure of matplotlib as base64 of a PNG; transparent, so that the ground of the page shows, dark or light."""
+    """A figure of matplotlib as base64 of a PNG; transparent, so that the page's background shows, dark or light."""
     memory = io.BytesIO()
     figure.savefig(memory, format="png", dpi=dpi, transparent=True)
     return base64.b64encode(memory.getvalue()).decode()

@@ -28,5 +28,5 @@ def print_line(line: str) -> None:
 StepReport = Callable[[str, str], None]
 
 
-def no_report(_what: str, _text: str) -> None:
+def no_report(_step: str, _text: str) -> None:
     """Discard the report."""

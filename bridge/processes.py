@@ -16,7 +16,7 @@ def this_process() -> str:
 
 
 def pid_here(role: str, identity_text: str) -> int:
-    """The pid in the identity `told`.
+    """The pid in an identity, a text of `this_process`; `role` names the process in messages.
 
     Raises Fault NO_PEER for an invalid identity, and for a process that has ended or is of another computer or user.
     """
@@ -24,7 +24,7 @@ def pid_here(role: str, identity_text: str) -> int:
         identity = json.loads(identity_text)
         pid, host, started = int(identity["pid"]), str(identity["host"]), identity["started"]
     except (ValueError, KeyError, TypeError):
-        line = f"{role}: sends no process identity: must be of this version; end it by hand"
+        line = f"{role}: sends no process identity: must be a process of this version; end it by hand"
         raise Fault("NO_PEER", line) from None
     if host != socket.gethostname():
         line = f"{role}: is process {pid} of {host[:64]}: must be on this computer; give the command there"

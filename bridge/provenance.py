@@ -15,7 +15,7 @@ from bridge.plain import plain
 
 # arguments of the running `stickslip` command; None if the functions are called without a command
 COMMAND: ContextVar[Sequence[str] | None] = ContextVar("command", default=None)
-_SHOWN_DIGITS = 12  # of a hash in visible text; the metadata of a picture hold all 64
+_SHOWN_DIGITS = 12  # digits of a hash in visible text; the metadata of a picture hold all 64
 _EPOCH = "SOURCE_DATE_EPOCH"  # https://reproducible-builds.org/specs/source-date-epoch
 
 
@@ -30,13 +30,13 @@ class Provenance(NamedTuple):
     """The origin of a page or a picture."""
 
     version: str
-    command: str  # as typed; empty without a command
+    command: str  # the command line; empty without a command
     date: datetime  # UTC, whole seconds
     inputs: list[Input]
 
     @property
     def date_text(self) -> str:
-        """`2026-03-01 12:00:00 UTC`."""
+        """The date as text: `2026-03-01 12:00:00 UTC`."""
         return f"{self.date:%Y-%m-%d %H:%M:%S} UTC"
 
     def in_words(self) -> str:
@@ -62,7 +62,7 @@ class Provenance(NamedTuple):
         return "; ".join(parts)
 
     def metadata(self, suffix: str, title: str) -> dict[str, str | datetime]:
-        """For `savefig` of matplotlib; `suffix` is .png, .svg or .pdf."""
+        """The metadata of a picture for matplotlib's `savefig`; `suffix` is .png, .svg or .pdf."""
         made_by = f"stickslip {self.version}"
         if suffix == ".pdf":
             return {"Title": title, "Creator": made_by, "Subject": self.whole(), "CreationDate": self.date}

@@ -15,24 +15,23 @@ def main(app: typer.Typer = stickslip) -> None:
     """Run the command line of `app` and end the process; `python -m bench` passes another app."""
     # joblib starts its workers with `python -m`, which would import a plant.py or numpy.py from the current folder first
     os.environ["PYTHONSAFEPATH"] = "1"
-    os.environ["MPLBACKEND"] = (
-        "Agg"  # pictures are only written to files; matplotlib fails at import if the variable holds an unknown name
-    )
-    # numpy's import takes 90 ms on two cores; 35 ms of them start the second thread of linear algebra. Two threads also add in
+    # pictures are only written to files; matplotlib fails at import if the variable holds an unknown name
+    os.environ["MPLBACKEND"] = "Agg"
+    # numpy's import takes 90 ms on two cores, of which 35 ms start the second thread of linear algebra. Two threads also add in
     # another order than one. diagnosis/processes.py sets one thread for a diagnosis that is called from other programs.
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     os.environ["PYDANTIC_DISABLE_PLUGINS"] = "1"  # the search for plugins takes 10 ms, which would delay a stop
     # a read-only home holds no font cache; matplotlib warns of it in two lines, but the picture is the same
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     prepare_stdout()
-    status = 1  # for an exception that no command catches
+    status = 1  # exit status after an exception that no command catches
 
     def end() -> None:
         sys.stdout.flush()
         os._exit(status)
 
     # Registered first, so it runs last, and ends the process before the interpreter is torn down: an Arrow thread that frees a
-    # table during the teardown aborts the process. With both cores busy 7 of 48 commands that read a CSV ended by SIGABRT.
+    # table during the teardown aborts the process: on a busy computer one in seven commands that read a CSV.
     atexit.register(end)
     status = exit_status_of(lambda: _status(app))
     sys.exit(status)

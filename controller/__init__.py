@@ -2,23 +2,23 @@
 
 config         the controller file, checked
 records        the derived numbers (`PARAMS`) and all memory (`STATE`)
-announced      v_d as the rig has announced it
+announced      the announced v_d
 estimate/      windows, motion, contact, learning: the motion of drive and slide
 vibration      the measured v_a
 frequency      the cheapest allowed frequency
-modes          going from one mode to another
-needs/         at which speeds vibration is needed, how much, whether at all, and when none helps
+modes          changes of the mode
+needs/         at which speeds vibration is needed, how much, whether it is needed at all, and when it does not help
 policy         the wanted v_a
 amplitude      the wanted amplitude, by the learnt gain and delay of the exciter
 trips/         faults of sensors and exciter, and the response to them
 limits         the allowed vibration
-core           one step of all of these
+core           one step of the controller
 telemetry      the state for plots and the memory for replay
 node, app      the controller as a participant of the bus; the process
 freshness      whether blocks come in time; stalls of the controller itself
-replay         the controller on the frames of a log, piece by piece; replay_steps: its steps compared with the log's
-loop_design    margins of the amplitude loop where its delay is off
-message_faults faults of the messages that it receives; rig_header: whether it can control the rig
+replay         the controller on the frames of a log; replay_steps: comparison of its steps with the log
+loop_design    margins of the amplitude loop if its delay is wrong
+message_faults faults of received messages; rig_header: whether the controller can control the rig
 
     v_d  drive velocity [m/s]          s    1 - v_s / v_d, the force rate (dF_d/dt) / (k_d v_d) [-]
     v_s  velocity of the slide [m/s]   k_d  stiffness of the drive [N/m]

@@ -1,9 +1,9 @@
-"""The commanded amplitude for a wanted v_a: by the exciter's gain, learnt from the delivered v_a.
+"""The commanded amplitude for a wanted v_a, by the exciter's gain, which is learnt from the delivered v_a.
 
 The measured v_a is compared with all commands within the longest loop delay that the loop is designed for. The gain is learnt
-only from a v_a that none of these commands explains (set membership: the delay is unknown but bounded). So the learnt gain never
-passes the true gain, for any delay and any change of it, and the command needs no integrator behind the delay. A gain that was
-never measured starts at a tenth of the rigid mount's stroke, as a mount may resonate tenfold.
+only from a v_a that none of these commands explains (set membership: the delay is unknown but bounded). So the learnt gain does
+not overshoot the true gain, for any delay and any change of it, and the loop needs no integrator. A gain that was never measured
+starts at a tenth of the rigid mount's stroke, as a mount may resonate tenfold.
 """
 
 import math
@@ -17,33 +17,33 @@ from controller.trips.doubts import ACCELEROMETER
 from controller.trips.stall import is_judged
 
 TWO_PI = 2.0 * math.pi
-REMEMBERED = 512  # steps of the command: 0.1 s of blocks of 0.25 ms
-FIRST_SHARE = 0.1  # of the model's stroke, for a gain never measured
-_GROWTH = 1.25  # a loop delay, while the gain is not known
+REMEMBERED = 512  # remembered steps of the command: 0.1 s of blocks of 0.25 ms
+FIRST_SHARE = 0.1  # first stroke over the stroke of the rigid mount, for a gain that was never measured
+_GROWTH = 1.25  # factor of the stroke in each loop delay, while the gain is not known
 _UNKNOWN_DELAY_S = 0.05  # loop delay until it is measured: the longest that the loop is designed for
-SETTLE_S = 0.004  # of vibration until a first gain is believed
+SETTLE_S = 0.004  # shortest vibration until a first gain is accepted
 LEARN_S = 0.01  # time constant of the learnt gain
-MOST_DELAY_S = 0.05  # loop delay that the loop is made for. Longer: a gain that changes while v_d does is learnt later
+MOST_DELAY_S = 0.05  # longest loop delay. Larger: a gain that changes together with v_d is learnt later
 TAIL = 3.0  # time constants of the demodulator's low-pass after which earlier commands have no effect
-SLOTS = 18  # of extremes of the command; a fixed number, so that a scan costs the same at any block length
-_HEARD = 5.0  # sigmas of the silent accelerometer from which a vibration counts as heard
-_LEAST_HEARD_MPS = 1e-7  # below it no accelerometer hears a vibration of some kHz
-_MEAN_STEPS = 50  # silent blocks that the noise is a mean of
-_FEW_STEPS = 10  # up to which the blocks before a vibration arrives count as silent as well
-# Silent blocks at which a vibration must be twice as loud. Smaller: noise is heard after the first of them, and teaches a delay
-# of nothing; at 5 that happens in 0.1 % of the first starts in the second block of a run.
+SLOTS = 18  # slots for extremes of the command; a fixed number, so that a scan costs the same at any block length
+_HEARD = 5.0  # smallest detected vibration, in sigmas of the silent accelerometer
+_LEAST_HEARD_MPS = 1e-7  # no accelerometer detects a weaker vibration of some kHz
+_MEAN_STEPS = 50  # silent blocks over which the noise is averaged
+_FEW_STEPS = 10  # silent blocks until which the blocks before a vibration arrives count as silent, too
+# Number of silent blocks at which a vibration must be twice as strong to be detected. Smaller: noise is detected in the first
+# blocks, and a delay of 0 is learnt; at 5 that happens in 0.1 % of the first starts in the second block of a run.
 _UNSURE_STEPS = 5.0
-_LOUDER, _MUCH_LOUDER = 1.3, 2.0  # measured over wanted v_a at which the command is corrected, or cut, at once
-LOUD_S = 0.003  # for which it is louder
-SILENCE_S = 0.1  # of zero commands until the base counts as at rest
-_LARGEST_LOG_GAIN = 4.6  # a factor of 100 either way
-_WEAK_S = 0.05  # until a piezo is called weak, and until no longer
+_LOUDER, _MUCH_LOUDER = 1.3, 2.0  # measured over wanted v_a above which the command is corrected, or cut, at once
+LOUD_S = 0.003  # time for which v_a must exceed this ratio
+SILENCE_S = 0.1  # duration of zero commands until the base counts as at rest
+_LARGEST_LOG_GAIN = 4.6  # largest logarithm of the gain, either sign: a factor of 100
+_WEAK_S = 0.05  # time until a piezo counts as weak, and until it no longer does
 _ALARM_RATIO = 1.05  # v_a / v_d below which a vibration is too weak
 
 
 @kernel
 def note_sent(p: ControllerParams, s: ControllerMemory) -> None:
-    """Remember the commanded and the wanted v_a of this step [m/s]."""
+    """Store the commanded and the wanted v_a of this step [m/s]."""
     s.sent_m[s.steps % REMEMBERED] = s.allowed_m
     sent_mps, slot = TWO_PI * s.allowed_Hz * s.allowed_m, s.steps // p.slot_steps % p.slots
     is_new_slot = s.steps % p.slot_steps == 0
@@ -73,10 +73,10 @@ def _least(p: ControllerParams, slots: Record) -> float:
 def listen(p: ControllerParams, s: ControllerMemory, late: bool) -> None:
     """Learn loop delay and gain from the v_a of this block, and correct the gain where v_a is too large.
 
-    A block that comes `late` shows a v_a that was commanded longer ago than is known: nothing is learnt from it. Soon after a
-    stall no gain is learnt, as the rig may not vibrate again yet; too much v_a is cut all the same.
+    A `late` block shows a v_a that was commanded at an unknown earlier time: nothing is learnt from it. Soon after a stall no
+    gain is learnt, as the rig may not vibrate again yet; too large a v_a is still cut.
     """
-    if s.guard_state == CHECKING:  # the rig's check vibrates with its tones, which are no answer to a command
+    if s.guard_state == CHECKING:  # the tones of the rig's check do not answer a command
         s.silent_steps, s.heard_steps, s.loud_steps, s.even_steps = 0, 0, 0, 0
         s.expected_mps, s.in_phase_mps2, s.quadrature_mps2 = 0.0, 0.0, 0.0
         return
@@ -100,7 +100,7 @@ def listen(p: ControllerParams, s: ControllerMemory, late: bool) -> None:
             _note_silence(s)
     s.heard_steps = s.heard_steps + 1 if heard and s.listening == 0 else 0
     doubted = s.doubted & ACCELEROMETER != 0
-    # a first gain waits longer: a command that came late once may come earlier or later the next time, by half of its delay
+    # a first gain waits longer, as the loop delay may vary by half of its value
     steps = p.settle_steps if s.gain_known[s.candidate] == 1 else max(p.settle_steps, s.loop_delay_steps // 2)
     if s.heard_steps < steps or s.demodulated_Hz != s.allowed_Hz or doubted:
         s.loud_steps = 0
@@ -146,7 +146,7 @@ def _bounded(log_gain: float) -> float:
 
 @kernel
 def _note_delay(s: ControllerMemory) -> None:
-    """The first vibration is heard: the steps since it was commanded are the loop delay."""
+    """Set the loop delay at the first detected vibration: the steps since it was commanded."""
     if s.loop_delay_steps < 0:
         s.loop_delay_steps = s.onset_steps
     else:
@@ -163,7 +163,7 @@ def _hold_down(p: ControllerParams, s: ControllerMemory, i: int, most_mps: float
     s.loud_steps = s.loud_steps + 1 if ratio > _LOUDER else 0
     if s.loud_steps >= p.loud_steps and most_mps > 0.0:
         s.log_gain[i] = max(s.log_gain[i], _bounded(math.log(s.fast_mps / most_mps)))
-        s.loud_steps = -s.loop_delay_steps  # the correction is heard one delay later
+        s.loud_steps = -s.loop_delay_steps  # the correction takes effect after one delay
         if ratio > _MUCH_LOUDER:
             s.cut_steps = s.loop_delay_steps + p.settle_steps
 
@@ -185,7 +185,7 @@ def amplitude(p: ControllerParams, s: ControllerMemory) -> None:
         s.wanted_m = model_m * math.exp(-s.log_gain[s.candidate])
     else:
         delay_s = _UNKNOWN_DELAY_S if s.loop_delay_steps < 0 else (s.loop_delay_steps + 1) * p.block_s + SETTLE_S
-        if s.heard_steps == 0:  # no growth once v_a is measured: commands of the last loop delay still act later
+        if s.heard_steps == 0:  # no growth once v_a is detected: commands within the last loop delay have yet to act
             s.growth = min(s.growth * _GROWTH ** (p.block_s / delay_s), 1.0)
         s.wanted_m = model_m * s.growth
     s.wanted_m = banded(p, s, s.wanted_m, model_m)

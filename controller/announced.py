@@ -6,16 +6,16 @@ from typing import Final
 from bridge.kernel import kernel
 from bridge.layouts import ControllerMemory
 
-# Announcements that are kept. A rig whose velocity changes in every block announces one a block: the ring then looks so many
-# blocks ahead, and a rig file is refused that would look further.
+# Number of stored announcements. A rig whose velocity changes in every block sends one for each block: the ring then reaches as
+# many blocks ahead, and a rig file that would need more is refused.
 MOST_ANNOUNCED: Final = 64
 
 
 @kernel
 def take_announcement(s: ControllerMemory, holds_from_ns: int, drive_velocity_mps: float) -> None:
-    """Remember an announcement in place of the oldest one: from when the drive has which velocity.
+    """Store an announcement in place of the oldest: a velocity of the drive, and the time from which it holds.
 
-    The n-th of all, from 0, is at place n % MOST_ANNOUNCED; `s.announced_count` of them came so far.
+    The n-th announcement, from 0, is at index n % MOST_ANNOUNCED; `s.announced_count` have been received.
     """
     at = s.announced_count % MOST_ANNOUNCED
     s.announced_from_ns[at] = holds_from_ns
@@ -25,7 +25,7 @@ def take_announcement(s: ControllerMemory, holds_from_ns: int, drive_velocity_mp
 
 @kernel
 def announced_ahead(s: ControllerMemory, t_ns: int, until_ns: int) -> float:
-    """The fastest announced velocity of the drive between two times [m/s], backwards below 0; 0 where none is announced."""
+    """The fastest announced velocity of the drive between two times [m/s], backwards below 0; 0 without an announcement."""
     holding_ns, holding_mps, fastest_mps = -1, 0.0, 0.0
     for i in range(min(s.announced_count, MOST_ANNOUNCED)):
         from_ns, velocity_mps = s.announced_from_ns[i], s.announced_mps[i]

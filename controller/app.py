@@ -32,13 +32,15 @@ from controller.node import ControllerNode
 from controller.rig_header import RigAgain, refuse_another_rig
 
 _PLANT_LOST_S = 1.0  # silence after which a plant that has left the bus counts as lost
-_GIVEN_UP_S = 30.0  # without a rig this process ends then, as long as one waits for a rig at the start
-_HEADER_S = 1.0  # longest wait for the header of the rig; a rig without one delays the start by all of it
-_TOKEN_WAIT_S = 1.0  # longest wait for a plant at the start; a rig without a liveliness token costs all of it
-_AT_ONCE_S = 0.05  # time for a second controller of the same moment to appear, and the period of looking again
-_ANSWER_EVERY_S = 0.4  # between two answers to one command, which is repeated every 0.5 s until answered
-_MOST_ANSWERS = 16  # answers to operators a second; commands beyond are applied without an answer
-_LONGEST_WHO = 200  # letters of a name
+_GIVEN_UP_S = 30.0  # time without a rig after which this process ends; equals the wait for a rig at the start
+_HEADER_S = 1.0  # longest wait for the header of the rig; a rig without a header delays the start by all of it
+_TOKEN_WAIT_S = (
+    1.0  # longest wait for a plant at the start; a rig without a liveliness token delays the start by all of it
+)
+_AT_ONCE_S = 0.05  # time for a controller that starts at the same moment to appear, and period of checking again
+_ANSWER_EVERY_S = 0.4  # least time between two answers to a command, which is repeated every 0.5 s until answered
+_MOST_ANSWERS = 16  # most answers to operators in a second; further commands are applied without an answer
+_LONGEST_WHO = 200  # most letters of an operator's name in an answer
 _UNSEEN = "is its transducer at the end of its range, or loose? without v_d there is no vibration"
 # Wait for another controller to leave. Shorter: a frozen controller refuses this one, though its lease is about to end. Longer: a
 # second controller is refused later.
@@ -85,8 +87,8 @@ def run(
 def _refuse_a_second(bus: Bus, endpoint: str) -> None:
     """Raise Fault ENDPOINT_BUSY where another controller is on the bus.
 
-    Two controllers would pull one piezo to and fro, each inside its own slew limit. Two controllers that start at the same
-    time see each other's claims: the controller with the higher claim yields.
+    Two controllers would command different amplitudes to one piezo in turn. Two controllers that start at the same time see
+    each other's claims: the controller with the higher claim ends.
     """
     mine, others = bus.claim()
     bus.wait_for(["plant"], _TOKEN_WAIT_S)  # by then all others are known, except a controller that starts now
@@ -97,7 +99,7 @@ def _refuse_a_second(bus: Bus, endpoint: str) -> None:
         patience_s = _OTHER_GONE_S if any(rival < mine for rival in rivals) else 2.0 * _OTHER_GONE_S
         if time.monotonic() > since_s + patience_s:
             line = f"{endpoint}: another controller is on this bus: must be one"
-            raise Fault("ENDPOINT_BUSY", f"{line}; end that one, or choose another --endpoint or --prefix")
+            raise Fault("ENDPOINT_BUSY", f"{line}; end it, or choose another --endpoint or --prefix")
 
 
 class ControllerProcess:
@@ -105,10 +107,10 @@ class ControllerProcess:
 
     Args:
         config, node: the controller.
-        bus: its session.
-        lockstep: whether each block waits for its command.
-        inbox: where its messages wait; by default a new one.
-        tell: reports the life of this process and its important events to the operator.
+        bus: the controller's session.
+        lockstep: whether the rig waits for the command of each block.
+        inbox: queue of received messages; by default a new inbox.
+        report: reports the life of this process and its important events to the operator.
 
     """
 
@@ -131,16 +133,16 @@ class ControllerProcess:
         self._send: dict[str, Callable[[bytes], None]] = {}
         self._events = 0
         self._doubts = MessageFaults(node, self._inbox, self.event)
-        self._reported_s: dict[str, float] = {}  # answers to operators within the last second, and when
+        self._reported_s: dict[str, float] = {}  # time of each answer to operators within the last second, by text
         self._end_sent_s: float | None = None
         self._restarts = 0
         self._rig_again = RigAgain(self._rig_header, config)
         self._rig_came = 0
         self._rig_lost = ""  # the reason, from RIG_LOST until blocks arrive
         self._blocks = Freshness(config.block_s, config.limits.stale_after_s)
-        self._unreadable = False  # NOT_FINITE was published, and no FRESH since
+        self._unreadable = False  # whether NOT_FINITE was published, and no FRESH since
         self._unreadable_reported_s = -1.0
-        self._numbers_again = 0  # blocks in a row with finite samples only
+        self._numbers_again = 0  # number of successive blocks with finite samples only
 
     def prepare(self) -> None:
         """Open the publishers and listen to plant and operator."""
@@ -163,7 +165,7 @@ class ControllerProcess:
             self._report(code, text)
 
     def loop(self, stop: threading.Event, granted: str) -> None:
-        """Consume blocks in order and answer each block; the plant applies the newest answer that it has.
+        """Take blocks in order and answer each block; the plant applies the newest answer.
 
         `granted`: the priority of this process, published when the run begins.
         """
@@ -197,7 +199,7 @@ class ControllerProcess:
                     started = True
                     self._report("running", granted or "in lockstep")
                     if not self._lockstep:
-                        # now, as the plant sends its first block only when the recorder listens
+                        # only now, as the plant sends its first block when the recorder is subscribed
                         self.event("START", granted)
                 self._doubts.look()
                 self._rig_again.refuse()
@@ -205,7 +207,7 @@ class ControllerProcess:
                 blocks.heard_s = time.monotonic()
                 if not self._lockstep:
                     blocks.stalled(blocks.heard_s - waited_until_s)
-            # a rig that has left sends nothing: it is noticed at the latest when its next block does not come
+            # a rig that has left sends no block, so checking when a block is missing is enough
             if time.monotonic() < blocks.due_s or self._ended:
                 continue
             self._check_rig(blocks.heard_s)
@@ -225,7 +227,7 @@ class ControllerProcess:
         self._send_rest(0)
 
     def _fade_out(self) -> None:
-        """Ramp to zero before leaving, for any reason: not every rig ends its last command by itself."""
+        """Ramp to zero before this process ends for any reason, as not every rig ends its last command by itself."""
         while self._node.amplitude_m > 0.0 and not (self._lockstep or self._ended):
             self._ramp(1)
             time.sleep(self._block_s)
@@ -289,9 +291,7 @@ class ControllerProcess:
             self._end_sent_s = time.monotonic()
         elif event.code == "START" and self._lockstep and event.text != "lockstep":
             line = f"{PLANT_EVENT.name}: START {event.text!r}: must be 'lockstep', as a controller --lockstep waits"
-            raise Fault(
-                "CONFIG", f"{line} for ever where blocks stop coming; leave --lockstep away, or give it to the rig too"
-            )
+            raise Fault("CONFIG", f"{line} for ever if blocks stop; remove --lockstep, or give it to the rig too")
 
     def _report_unreadable(self) -> None:
         """Report blocks with NaN or infinite samples, and FRESH once blocks were finite for `stale_after_s`."""
@@ -308,14 +308,14 @@ class ControllerProcess:
                 self.event("FRESH", "every sample is a number again")
 
     def _apply(self, payload: bytes) -> None:
-        """Apply an operator's command; report it where the rig does not, repetitions sparsely. Raises Fault BAD_MESSAGE."""
-        word = parsed(wire.Operator, payload, OPERATOR.name)
-        if word.action not in wire.Operator.Action.values():
-            raise Fault("BAD_MESSAGE", f"{OPERATOR.name}: action = {word.action}: not known")
-        self._node.operator(word.action)
+        """Apply an operator's command; report it if the rig does not, repetitions at a limited rate. Raises Fault BAD_MESSAGE."""
+        command = parsed(wire.Operator, payload, OPERATOR.name)
+        if command.action not in wire.Operator.Action.values():
+            raise Fault("BAD_MESSAGE", f"{OPERATOR.name}: action = {command.action}: not known")
+        self._node.operator(command.action)
         if self._node.rig_reports and self._blocks.is_fresh:  # a rig with a guard reports it
             return
-        report = f"{wire.Operator.Action.Name(word.action)} by {word.who[:_LONGEST_WHO] or 'an unnamed operator'}"
+        report = f"{wire.Operator.Action.Name(command.action)} by {command.who[:_LONGEST_WHO] or 'an unnamed operator'}"
         now_s = time.monotonic()
         if now_s - self._reported_s.get(report, -_ANSWER_EVERY_S) < _ANSWER_EVERY_S:
             return
@@ -330,7 +330,7 @@ class ControllerProcess:
             self._send[message.topic.name](message.payload)
 
     def _check_rig(self, heard_s: float) -> None:
-        """Report a rig that left, and end after half a minute without it; called while no block comes."""
+        """Report a rig that left, and end after half a minute without it; called while blocks are missing."""
         if self._bus.came("plant") != self._rig_came:
             self._rig_came = self._bus.came("plant")
             self._node.rig_was_away()

@@ -1,4 +1,4 @@
-"""The controller file, in units of people."""
+"""The controller file, checked; numbers are in practical units."""
 
 import math
 from typing import Annotated, Literal, get_args
@@ -11,7 +11,7 @@ Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 Share = Annotated[float, Field(gt=0, le=1)]
 MOST_BANDS = 8  # forbidden bands of frequency
-_FEWEST_SILENT_BLOCKS = 2  # in `stale_after_s`; with fewer every block would come too late
+_FEWEST_SILENT_BLOCKS = 2  # fewest block periods in `stale_after_s`; with fewer every block would be too late
 Mode = Literal["on-demand", "moving", "start-only", "settle"]
 MODES: tuple[Mode, ...] = get_args(Mode)
 
@@ -21,9 +21,9 @@ class EstimatorConfig(Strict):
 
     use_force: bool = Field(default=True, description="false: the rig has no force sensor; positions decide.")
     use_slide_position: bool = Field(
-        default=True, description="false: the rig has none; force and drive_stiffness_N_per_m decide."
+        default=True, description="false: the rig has no slide position; force and drive_stiffness_N_per_m decide."
     )
-    # 0.5 um/s is the drift of a transducer that warms up; no axis feeds that slowly (30 um a minute)
+    # 0.5 um/s is the drift of a transducer during warm-up; no axis feeds as slowly (30 um a minute)
     least_feed_mps: Positive = Field(default=5e-7, description="Drive speed up to which the drive counts as at rest.")
 
 
@@ -38,25 +38,29 @@ class PolicyConfig(Strict):
 
     mode: Mode = Field(
         default="on-demand",
-        description="on-demand: when it sticks; moving: while the drive moves; start-only: for start_s after each start; "
-        "settle: on-demand, and for settle_s less and less after each move.",
+        description="on-demand: when the slide sticks; moving: while the drive moves; start-only: for start_s after each start; "
+        "settle: on-demand, and fading out over settle_s after each move.",
     )
-    enabled_from_s: NotNegative = Field(default=0.0, le=1e9, description="From the start of the run.")
-    first_probe_s: Positive = Field(default=0.5, description="After the first vibration at a speed.")
+    enabled_from_s: NotNegative = Field(
+        default=0.0, le=1e9, description="Time of the run from which vibration is allowed."
+    )
+    first_probe_s: Positive = Field(
+        default=0.5, description="Time from the first vibration at a speed to its first probe."
+    )
     probe_every_s: Positive = Field(
         default=10.0,
-        description="Doubles with every probe that finds the vibration still needed, up to probe_every_max_s.",
+        description="Time between probes; doubles when a probe finds the vibration still needed, up to probe_every_max_s.",
     )
     probe_every_max_s: Positive = 600.0
     probe_fade_s: Positive = Field(default=0.5, description="Shortest time in which a probe fades out.")
     probe_hold_s: Positive = Field(default=0.5, description="Shortest time without vibration until it is not needed.")
-    # 1.00 fails on the paper's rig, 1.02 holds at some frequencies, 1.05 at all where friction is even; 1.07 leaves it a margin
+    # on the paper's rig 1.00 fails, 1.02 works at some frequencies, 1.05 at all with even friction; 1.07 adds a margin
     least_ratio: Annotated[float, Field(ge=1.02, le=1.5)] = Field(default=1.07, description="Least v_a / v_d held.")
     most_ratio: Annotated[float, Field(ge=1.2, le=3.0)] = Field(
         default=2.4, description="Largest v_a / v_d, after slips in spite of the vibration."
     )
-    start_s: Positive = Field(default=0.3, description="Of mode start-only.")
-    settle_s: Positive = Field(default=0.3, description="Of mode settle.")
+    start_s: Positive = Field(default=0.3, description="Duration of the vibration in mode start-only.")
+    settle_s: Positive = Field(default=0.3, description="Duration of the fading vibration in mode settle.")
 
 
 class AmplitudeConfig(Strict):
@@ -77,10 +81,10 @@ class AmplitudeConfig(Strict):
     )
     accel_bandwidth_Hz: Positive = Field(
         default=10000.0,
-        description="Of the base accelerometer; its roll-off at the vibration's frequency is corrected.",
+        description="Bandwidth of the base accelerometer; its roll-off at the vibration's frequency is corrected.",
     )
     accel_range_mps2: Positive = Field(
-        default=490.3325, description="Of the base accelerometer; the frequency is chosen to stay inside."
+        default=490.3325, description="Range of the base accelerometer; the frequency is chosen to stay inside."
     )
 
 
@@ -99,23 +103,24 @@ class LimitsConfig(Strict):
     )
     travel_m: Two | None = Field(
         default=None,
-        description="Lowest and highest place of the drive in which it is vibrated. Not given: everywhere.",
+        description="Lowest and highest position of the drive with vibration. Not given: everywhere.",
     )
-    # silence after which the vibration ramps down: longer vibrates a rig that has frozen, shorter ramps down for a late block
+    # larger: a rig that hangs goes on vibrating; smaller: a late block ramps the vibration down
     stale_after_s: Annotated[float, Field(gt=0, le=5.0)] = Field(
         default=0.02, description="Silence after which the vibration ramps down."
     )
 
 
 class ControllerConfig(Strict):
-    """One controller."""
+    """All keys of a controller file."""
 
     gone = {"onset": "the windows follow from the measured noise; see estimator"}
     block_s: Annotated[float, Field(ge=2.5e-4, le=0.02)] = 1e-3
     samples_per_block: Annotated[int, Field(ge=4, le=400)] = 20
     drive_stiffness_N_per_m: Positive = 11700.0
     contact_resonance_Hz: NotNegative = Field(
-        default=1144.0, description="sqrt(k_t / m) / 2 pi of the contact; the vibration keeps above 2.2 times this."
+        default=1144.0,
+        description="sqrt(k_t / m) / 2 pi of the contact; the vibration stays above 2.2 times this frequency.",
     )
     estimator: EstimatorConfig = EstimatorConfig()
     policy: PolicyConfig = PolicyConfig()
@@ -140,7 +145,7 @@ class ControllerConfig(Strict):
         if limits.stale_after_s < _FEWEST_SILENT_BLOCKS * self.block_s:
             raise ValueError(
                 f"limits.stale_after_s = {limits.stale_after_s:g}: must hold {_FEWEST_SILENT_BLOCKS} blocks of "
-                f"{self.block_s:g} s, or every block comes too late; raise it"
+                f"{self.block_s:g} s, or every block is too late; raise it"
             )
         if limits.travel_m is not None and limits.travel_m[1] <= limits.travel_m[0]:
             raise ValueError(f"limits.travel_m = {list(limits.travel_m)}: the second must be above the first")
@@ -162,7 +167,7 @@ class ControllerConfig(Strict):
             )
         if not (self.estimator.use_force or self.estimator.use_slide_position):
             raise ValueError(
-                "estimator.use_force = false: use_slide_position is false as well, so nothing shows a stick; set one to true"
+                "estimator.use_force = false: use_slide_position is false as well, so no channel shows a stick; set one to true"
             )
         return self
 
@@ -171,11 +176,11 @@ MOST_CANDIDATES = 64  # frequencies to choose from; more: finer steps, more memo
 # Lowest candidate over the contact resonance. Smaller: the v_a / v_d that stops stick-slip depends on the damping. Larger: fewer
 # frequencies are left. From about 2 up, v_a / v_d = 1.05 stops stick-slip for any damping.
 _ABOVE_RESONANCE = 2.2
-_LEAST_GAP_HZ = 2.0  # between bands: a frequency in a band moves to 1 Hz outside, which must not lie in the next band
+_LEAST_GAP_HZ = 2.0  # least gap between bands: a frequency in a band moves to 1 Hz outside, not into the next band
 
 
 def forbidden_bands_Hz(limits: LimitsConfig) -> list[tuple[float, float]]:
-    """The forbidden bands from low to high; bands that overlap, or are less than 2 Hz apart, become one."""
+    """The forbidden bands from low to high; bands that overlap, or are less than 2 Hz apart, are merged."""
     bands: list[tuple[float, float]] = []
     for low, high in sorted(limits.forbidden_Hz):
         if bands and low < bands[-1][1] + _LEAST_GAP_HZ:
@@ -186,7 +191,7 @@ def forbidden_bands_Hz(limits: LimitsConfig) -> list[tuple[float, float]]:
 
 
 def _lowest_candidate(config: ControllerConfig) -> tuple[float, str]:
-    """The lower end of the candidates [Hz], and where it comes from, in words."""
+    """The lower end of the candidates [Hz], and a text on its origin."""
     limits = config.limits
     above_Hz = _ABOVE_RESONANCE * config.contact_resonance_Hz
     if limits.frequency_min_Hz < above_Hz < limits.frequency_max_Hz:
@@ -200,7 +205,7 @@ def _candidate_step_Hz(config: ControllerConfig) -> float:
 
 
 def candidate_frequencies_Hz(config: ControllerConfig) -> list[float]:
-    """The frequencies to choose from, lowest first [Hz]: above the contact resonance where the range allows, none forbidden."""
+    """The allowed frequencies to choose from, lowest first [Hz]; above the contact resonance where the range allows."""
     bands, step_Hz = forbidden_bands_Hz(config.limits), _candidate_step_Hz(config)
     first = math.ceil(_lowest_candidate(config)[0] / step_Hz)
     last = math.floor(config.limits.frequency_max_Hz / step_Hz)

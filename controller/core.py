@@ -23,7 +23,7 @@ from controller.trips.stall import is_judged, note_stall
 from controller.trips.watch import reported_reason, restrain, watch
 from controller.vibration import measure, skip
 
-_STEPS_LOOK = 16  # blocks for one look at the resolution, which does not change
+_STEPS_LOOK = 16  # blocks between two measurements of resolution and noise of the samples
 _MOST_BRIDGED_BINS = 640  # 64 ms of bins of 0.1 ms: v_d is then still known from the longer windows
 
 
@@ -46,7 +46,7 @@ def step(
         events: bits of `bridge.wire.messages`: BLOCK, GAP, STALE, STOP, RESET, ANNOUNCED, LATE.
         gap_blocks: number of lost blocks just before this block.
         t_ns: time of the frame.
-        command, trace: one message record each; all is filled except the trace's lateness.
+        command, trace: one message record each; all fields are set except the trace's lateness.
 
     """
     p: ControllerParams = params[0]
@@ -130,12 +130,12 @@ def step(
 
 @kernel
 def _begin(p: ControllerParams, s: ControllerMemory) -> None:
-    """Set the memory that is not zero at the start."""
+    """Set all memory whose initial value is not zero."""
     begin(p, s)
     begin_known(p, s)
     s.followed, s.confirmed, s.went_m[:] = -1, 1.0, -1.0
     s.listening, s.onset_steps, s.loop_delay_steps = 1, -1, -1
-    s.silent_steps = p.silence_steps  # nothing was ever commanded
+    s.silent_steps = p.silence_steps  # no vibration was ever commanded
     s.level, s.swing_level = -1, -1
     s.growth, s.quiet_s = FIRST_SHARE, math.inf
     s.demodulated_Hz = 0.0
@@ -148,7 +148,7 @@ def _begin(p: ControllerParams, s: ControllerMemory) -> None:
 def _mean(
     p: ControllerParams, s: ControllerMemory, block: SensorRow, first: int, samples: int
 ) -> tuple[float, float, float]:
-    """Means of force [N], slide and drive position [m] over some samples; without a force sensor the spring's own force."""
+    """Means of force [N], slide and drive position [m] over some samples; without a force sensor by the spring's elongation."""
     force_N, slide_m, drive_m = 0.0, 0.0, 0.0
     for i in range(first, first + samples):
         drive_m += float(block.drive_position_m[i])
@@ -168,12 +168,12 @@ def _mean(
 
 @kernel
 def _bridge(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> None:
-    """Fill the windows evenly over lost blocks; empty them where more are lost than the shortest windows remember."""
+    """Fill the windows with a straight line over lost blocks; empty them after too many lost blocks."""
     bins = s.missing_blocks * (p.samples_per_block // p.bin_samples)
     if bins > _MOST_BRIDGED_BINS or s.pushed[0] < BINS:
         clear_windows(s)
         return
-    # from the mean of the last window to the mean of as many samples: single samples would bend the windows by their noise
+    # from the mean of the last window to the mean of as many samples, as the noise of single samples would bend the windows
     force_N, slide_m, drive_m = 0.0, 0.0, 0.0
     for i in range(BINS):
         force_N += s.bins[FORCE, 0, i] / BINS

@@ -1,4 +1,4 @@
-"""Which of the allowed frequencies to vibrate at."""
+"""Choice of the vibration's frequency among the allowed frequencies."""
 
 import math
 
@@ -10,9 +10,9 @@ TWO_PI = 2.0 * math.pi
 
 @kernel
 def cost(p: ControllerParams, s: ControllerMemory, i: int, velocity_mps: float) -> float:
-    """Cost of a v_a [m/s] at a candidate: the shares of stroke and of the accelerometer's range that it takes, squared.
+    """Cost of a v_a [m/s] at a candidate: squared shares of the stroke and of the accelerometer's range.
 
-    A resonance that was measured takes less stroke but its gain moves; so no gain counts as more than 1.
+    A resonance needs less stroke, but its gain varies; so a gain above 1 counts as 1.
     """
     frequency_Hz = p.candidate_Hz[i]
     gain = min(math.exp(s.log_gain[i]), 1.0) if s.gain_known[i] == 1 else 1.0
@@ -23,7 +23,7 @@ def cost(p: ControllerParams, s: ControllerMemory, i: int, velocity_mps: float) 
 
 @kernel
 def cheapest(p: ControllerParams, s: ControllerMemory, velocity_mps: float, but: int) -> int:
-    """The candidate of least cost, the lowest of equals; never candidate `but` where there is another."""
+    """The candidate of least cost, the lowest of equals; not candidate `but` unless it is the only one."""
     best, least = -1, math.inf
     for i in range(p.candidates):
         if i == but and p.candidates > 1:

@@ -1,4 +1,4 @@
-"""The limits, whatever the policy wants. Every command on the bus has passed `allow`."""
+"""The limits of the vibration, which no policy can exceed. Every command on the bus has passed `allow`."""
 
 import math
 
@@ -26,7 +26,7 @@ TWO_PI = 2.0 * math.pi
 def _allowed_frequency(p: ControllerParams, frequency_Hz: float) -> float:
     """The nearest frequency inside the range and outside every forbidden band, upwards first [Hz]."""
     result = min(max(frequency_Hz, p.frequency_min_Hz), p.frequency_max_Hz)
-    for i in range(p.bands):  # the bands are 2 Hz or more apart, so 1 Hz outside a band lies in no other
+    for i in range(p.bands):  # the bands are 2 Hz or more apart, so 1 Hz outside of a band is not in the next
         low, high = p.band_Hz[i, 0], p.band_Hz[i, 1]
         if low <= result <= high:
             if high < p.frequency_max_Hz:
@@ -71,7 +71,7 @@ def allow(p: ControllerParams, s: ControllerMemory, events: int, wanted_Hz: floa
         s.allowed_Hz = inside_Hz
         largest_m = min(p.amplitude_max_m, p.velocity_max_mps / (TWO_PI * inside_Hz))
     else:
-        largest_m = 0.0  # no vibration was ever wanted, so there is no frequency
+        largest_m = 0.0  # the frequency is unknown before the first vibration
     if target_m > largest_m:
         target_m = largest_m
         if limit == NO_LIMIT:

@@ -1,4 +1,4 @@
-"""The margins of the amplitude loop when the loop's delay differs from the assumed delay.
+"""Margins of the amplitude loop whose delay differs from the assumed delay.
 
 The loop runs once a block in the logarithm of v_a, where the exciter's unknown gain is an additive constant:
 
@@ -11,9 +11,9 @@ The expected v_a is the command `assumed` blocks before, so with the true delay 
 
     L(z) = a / (z - 1 + a) * F(z) * (z^-delay - z^-assumed)
 
-whose size is about the delay's error over the time constant of learning, 10 ms, whatever the delay itself. The controller
-learns less than that: only the part that no delay up to 50 ms explains (`amplitude`). So these margins are lower bounds, and the
-loop does not oscillate even if the delay is off by more.
+whose size is about the delay's error over the time constant of learning, 10 ms, for any delay. The controller learns only the
+part that no delay up to 50 ms explains (`amplitude`). So these margins are lower bounds, and the loop does not oscillate even
+with a larger error of the delay.
 
 This is a design tool. The controller never imports python-control, which takes a second to load.
 """
@@ -24,7 +24,7 @@ import numpy as np
 
 
 class LoopMargins(NamedTuple):
-    """How far the loop is from oscillating."""
+    """Stability margins of the loop."""
 
     gain_margin: float  # factor on the learn share at which it oscillates
     phase_margin_deg: float  # 180 where the open loop stays below 1
@@ -46,7 +46,7 @@ def open_loop(learn_share: float, filter_share: float, delay_blocks: int, assume
 def margins(
     learn_share: float, filter_share: float, delay_blocks: int, assumed_blocks: int, block_s: float = 1e-3
 ) -> LoopMargins:
-    """The margins for a delay that the controller takes for another one. Raises ValueError for negative delays."""
+    """The margins for a true and an assumed delay. Raises ValueError for negative delays."""
     import control  # noqa: PLC0415
 
     if min(delay_blocks, assumed_blocks) < 0:

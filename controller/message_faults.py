@@ -14,7 +14,7 @@ class MessageFaults:
 
     Args:
         node: the controller.
-        inbox: where its messages wait.
+        inbox: queue of received messages.
         publish: publishes an event with a code and a text.
 
     """
@@ -26,7 +26,7 @@ class MessageFaults:
         self._seen: dict[str, int] = {}
 
     def unreadable(self, topic: Topic, fault: Fault) -> None:
-        """A message cannot be read, and is dropped."""
+        """Report a message that cannot be read, and was dropped."""
         self.complaints.note(BAD_MESSAGE, topic.name, f"{fault.line.partition(': ')[2]}: dropped")
 
     def look(self) -> None:
@@ -36,7 +36,7 @@ class MessageFaults:
             if new := self._since(f"dropped {topic}", dropped):
                 note(FLOOD, topic, "more messages than can be answered: dropped", new)
         if new := self._since("strays", node.strays):
-            text = f"blocks far from block {node.last_block}, the last one: dropped; is a second rig on this prefix?"
+            text = f"blocks with numbers far from the last block {node.last_block}: dropped; is a second rig on this prefix?"
             note(FOREIGN, SENSORS.name, text, new)
         if new := self._since("again", node.duplicates):
             note(
@@ -50,7 +50,9 @@ class MessageFaults:
             note(CLOCK, SENSORS.name, f"block {node.last_block}: {late}; trace and log keep the rig's times")
             node.clock_jump_ns = 0
         if node.age.is_late:
-            text = f"blocks come {node.age.late_ns * 1e-6:.0f} ms later than before: v_a oscillates more than it should"
+            text = (
+                f"blocks arrive {node.age.late_ns * 1e-6:.0f} ms later than before: v_a oscillates more than it should"
+            )
             note("LATE", SENSORS.name, text)
         self.complaints.report_when_due()
 

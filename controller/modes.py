@@ -1,4 +1,4 @@
-"""How the controller goes from one mode to another, and which frequency it vibrates at."""
+"""Changes of the mode, and of the vibration's frequency."""
 
 from bridge.kernel import kernel
 from bridge.layouts import ControllerMemory, ControllerParams
@@ -6,7 +6,7 @@ from bridge.wire.stickslip_pb2 import EXCITE, WATCH
 from controller.frequency import cheapest
 from controller.needs.need import swing_held, way_of
 
-_RETRY_S = 60.0  # until a vibration that could not help is tried again; doubles
+_RETRY_S = 60.0  # time until a vibration that did not help is tried again; doubles each time
 
 
 @kernel
@@ -24,10 +24,10 @@ def enter(s: ControllerMemory, mode: int, reason: int) -> None:
 
 @kernel
 def excite(p: ControllerParams, s: ControllerMemory, reason: int, ratio: float) -> None:
-    """Begin, or go on, to vibrate at least at `ratio`."""
+    """Begin or continue a vibration at `ratio` or more."""
     way = way_of(s)
     s.ratio[way] = max(s.ratio[way], ratio)
-    s.swing = max(s.swing, swing_held(s.ratio[way]))  # from which the ratio falls
+    s.swing = max(s.swing, swing_held(s.ratio[way]))  # the ratio falls as the swing decays
     if s.mode != EXCITE:
         s.waiting_s = 0.0
     enter(s, EXCITE, reason)
@@ -45,7 +45,7 @@ def tune_to(p: ControllerParams, s: ControllerMemory, candidate: int) -> None:
 
 @kernel
 def stop_helping(s: ControllerMemory, reason: int) -> None:
-    """Leave the axis alone for a time that doubles."""
+    """End the vibration for a time that doubles with each call."""
     way = way_of(s)
     s.off_s[way] = _RETRY_S if s.off_s[way] == 0.0 else 2.0 * s.off_s[way]
     s.off_left_s[way] = s.off_s[way]

@@ -21,11 +21,13 @@ from controller.trips.age import MARGIN_NS, Age
 from controller.trips.stall import SETTLED_S
 from controller.trips.trip_events import TripEvents
 
-_RESTART_BLOCKS = 1024  # counted as lost before the first block of a restarted rig, which empties every window
-_MOST_GAP_BLOCKS = 1 << 20  # lost blocks that are counted at once; more do not fit into a trace
-# Blocks in a row of one wrong length from which the rig's blocks have that length, and no clock jumped
+_RESTART_BLOCKS = (
+    1024  # blocks counted as lost before the first block of a restarted rig, so that every window is emptied
+)
+_MOST_GAP_BLOCKS = 1 << 20  # most lost blocks that are counted at once; more do not fit into a trace
+# Number of successive blocks of the same wrong length from which the rig's blocks have this length; fewer are clock jumps
 _WRONG_LENGTHS = 3
-_FASTEST_MPS = 100.0  # of a drive; faster announcements are refused
+_FASTEST_MPS = 100.0  # largest announced velocity of a drive; faster announcements are refused
 
 
 class ControllerNode:
@@ -35,16 +37,16 @@ class ControllerNode:
 
     Args:
         config: the controller.
-        lockstep: whether the rig waits for each command: no block is late then, however long the machine paused.
+        lockstep: whether the rig waits for each command: no block is late then, however long the computer stalled.
 
     """
 
     def __init__(self, config: ControllerConfig, lockstep: bool = False) -> None:
-        self.duplicates = 0  # blocks repeated, or too late: already counted as a gap
-        self.restarts = 0  # restarts of the rig
-        self.clock_jump_ns = 0  # of the last block: t_ns minus the time by its number
+        self.duplicates = 0  # number of repeated blocks, and of late blocks that were counted as a gap
+        self.restarts = 0  # number of restarts of the rig
+        self.clock_jump_ns = 0  # t_ns of the last block minus the time by its number
         self.steps = 0
-        self.t_ns = 0  # of the last frame
+        self.t_ns = 0  # time of the last frame
         self._params, self._state = build(config)
         self._block_ns = round(config.block_s * 1e9)
         self._layout = sensor_block(config.samples_per_block)
@@ -53,17 +55,17 @@ class ControllerNode:
         self._trace = TRACE_LAYOUT.blank()
         self._lateness_ns = self._trace["lateness_ns"]
         self._numbers = BlockNumbers()
-        self.block_t_ns = 0  # of the last block
-        self._seals = False  # whether the rig gives its blocks a checksum
+        self.block_t_ns = 0  # time of the last block
+        self._seals = False  # whether the rig's blocks have a checksum
         self._length_checked = False
         self._wrong_lengths_ns: list[int] = []
         self._operator_events = 0
-        self._announced = 0  # the bit ANNOUNCED where announcements came since the last frame
+        self._announced = 0  # ANNOUNCED if announcements arrived since the last frame, else 0
         self._trip_events = TripEvents()
         self.age = Age()
         self._lockstep = lockstep
-        self.slide_accel_unread = False  # the slide's accelerometer shows no numbers
-        self.slipped_unmoved = False  # in the last step a slip began at a constant drive position
+        self.slide_accel_unread = False  # whether samples of the slide's accelerometer are not finite
+        self.slipped_unmoved = False  # whether a slip began in the last step at a constant drive position
 
     @property
     def amplitude_m(self) -> float:
@@ -87,7 +89,7 @@ class ControllerNode:
 
     @property
     def strays(self) -> int:
-        """Blocks whose numbers fit no known rig."""
+        """Number of blocks that belong to another rig, by their block number."""
         return self._numbers.strays
 
     @property
@@ -112,7 +114,7 @@ class ControllerNode:
         self._params, _ = build(config)
 
     def operator(self, action: int) -> None:
-        """Take an operator's action (`wire.Operator.Action`); it acts with the next frame, where the log shows it."""
+        """Take an operator's action (`wire.Operator.Action`); it takes effect, and is logged, with the next frame."""
         self._operator_events = obeyed(self._operator_events, action)
 
     def announcement(self, payload: bytes) -> None:
@@ -120,7 +122,7 @@ class ControllerNode:
         message = ANNOUNCE_LAYOUT.read(payload, ANNOUNCE.name)[0]
         if not abs(message.drive_velocity_mps) <= _FASTEST_MPS:
             line = f"{ANNOUNCE.name}: drive_velocity_mps = {message.drive_velocity_mps:g}: must be at most {_FASTEST_MPS:g}"
-            raise Fault("BAD_MESSAGE", f"{line} either way; announce m/s")
+            raise Fault("BAD_MESSAGE", f"{line} in either direction; announce m/s")
         if message.holds_from_ns < message.t_ns:
             line = f"{ANNOUNCE.name}: holds_from_ns = {message.holds_from_ns}: must not be before t_ns = {message.t_ns}"
             raise Fault("BAD_MESSAGE", f"{line}; announce the future velocity")
@@ -128,7 +130,7 @@ class ControllerNode:
         self._announced = ANNOUNCED
 
     def rig_was_away(self) -> None:
-        """Note that the rig left the bus and came back: blocks that count from 0 again belong to a new run."""
+        """Prepare for a rig that has left and rejoined the bus: blocks that count from 0 again belong to a new run."""
         self._numbers.sender_was_away()
         self._seals = False
 
@@ -139,8 +141,8 @@ class ControllerNode:
 
         Args:
             payload: the block.
-            arrival_ns: when it came (time.perf_counter_ns); 0 in lockstep.
-            answered_ns: the present time; the age of a block counts until now, as one that waited in this process is late too.
+            arrival_ns: time of its arrival (time.perf_counter_ns); 0 in lockstep.
+            answered_ns: the present time; the age of a block counts until now, including its time in the queue.
 
         """
         payload = self._layout.canonical(payload, SENSORS.name)
@@ -172,10 +174,10 @@ class ControllerNode:
         return self._step(sensors, events, gap_blocks)
 
     def _refuse_changed(self, payload: bytes) -> None:
-        """Raise Fault BAD_MESSAGE for a block that was changed on its way; a rig that gave one checksum gives all."""
+        """Raise Fault BAD_MESSAGE for a block that was changed in transit; after the first checksum every block needs one."""
         if not is_whole(payload):
             line = f"{SENSORS.name}: checksum: does not match the block's bytes, which were changed in transit"
-            raise Fault("BAD_MESSAGE", f"{line}; look at link and adapter")
+            raise Fault("BAD_MESSAGE", f"{line}; check link and adapter")
         self._seals = True
 
     def _check_clock(self, apart_ns: int, lost: int) -> None:
@@ -217,7 +219,7 @@ class ControllerNode:
         return self._trip_events.news(self._trace[0], bool(self._state[0]["quiet_s"] < SETTLED_S))
 
     def rest(self, lateness_ns: int) -> list[Outgoing]:
-        """The messages after the command: the trace, and at their rates the plotted state and a snapshot of the memory."""
+        """The messages after the command: the trace, and at lower rates the plotted state and a snapshot of the memory."""
         self._lateness_ns[0] = lateness_ns
         messages = [Outgoing(TRACE, self._trace.tobytes())]
         if self.steps % STATE_EVERY == 0:
@@ -228,7 +230,7 @@ class ControllerNode:
 
 
 def obeyed(events: int, action: int) -> int:
-    """The operator's bits for the next frame, after one more action (`wire.Operator.Action`); a STOP is not taken back."""
+    """The operator's bits for the next frame, after a further action (`wire.Operator.Action`); a STOP is not revoked."""
     if action == wire.Operator.STOP:
         return STOP
     return RESET if action == wire.Operator.RESET and not events & STOP else events

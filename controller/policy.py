@@ -1,6 +1,6 @@
-"""When to vibrate, and how strongly. A wrong policy does no harm: `limits` decides which vibration is allowed.
+"""When to vibrate, and how strongly. A wrong policy does no harm, as `limits` bounds the vibration.
 
-WATCH   no vibration; a stick or a slip leads to EXCITE at once: an early release is a small slip, a late one a large one
+WATCH   no vibration; a stick or a slip leads to EXCITE at once: an early release is a small slip, a late release a large slip
 EXCITE  hold v_a at a ratio to v_d that falls step by step to the least that is needed, and rises at every stick, slip or surge
 PROBE   fade out, no faster than the slide follows, to see whether the vibration is needed at all
 """
@@ -59,26 +59,26 @@ from controller.trips.stall import is_judged
 TWO_PI = 2.0 * math.pi
 ON_DEMAND, WHILE_MOVING, START_ONLY, SETTLE = range(len(MODES))
 
-_STICK_STEP, _SLIP_STEP = 0.08, 0.4  # by which the ratio rises at a stick, and at a slip or a surge
-# The start of a move; the force over the sliding force from which the spring is wound up; the factor on the ratio until then.
+_STICK_STEP, _SLIP_STEP = 0.08, 0.4  # rise of the ratio at a stick, and at a slip or a surge
+# Duration of the start of a move; force over sliding force from which the spring is wound up; factor on the ratio until then.
 _STARTS_S, _WOUND, _AHEAD = 0.2, 0.5, 1.25
 _BEGINS_S = 0.02  # first part of a move, in which the spring's force decides whether it is wound up
-_RISING = 1.05  # held over measured v_d; above, the drive slows down
-_ABOVE_SLIDE = 1.1  # v_a over v_s of a slide that is late
+_RISING = 1.05  # held over measured v_d above which the drive slows down
+_ABOVE_SLIDE = 1.1  # least v_a over v_s of a slide that slows down after its drive
 _TURNING_S = 0.05  # longest rest of a drive at a reversal
-_STARTING_S = 0.15  # of a vibration; slips until then release the force stored before it
-# Of the expected stick, after which the force is 5 % up: from then on it contradicts that none is needed
+_STARTING_S = 0.15  # start of a vibration, in which slips release the force stored before it
+# Shortest stick, over the expected stick, that contradicts "not needed": the force has risen by 5 % then
 _REAL_STICK = 0.25
 _CALM_SHARE = 6.0  # expected stick lengths without an event until the vibration counts as helpful
 _LEAST_CALM_S, _MOST_CALM_S = 0.5, 4.0
-_LOOK_STEPS = 16  # blocks for one look at which windows show a swing
-_LEAST_SLIDING = 0.5  # v_s over v_d; a slower slide gives no information on the swing
-_EVEN = 0.1  # share of v_d by which the slide is off where it follows
+_LOOK_STEPS = 16  # blocks between two selections of the windows for the swing
+_LEAST_SLIDING = 0.5  # least v_s over v_d; a slower slide gives no information on the swing
+_EVEN = 0.1  # largest deviation of v_s from v_d, over v_d, of a slide that follows
 # Memory of a swing: two periods of the slowest swing that the spring does not level out; 10 s at most, as it costs energy.
 _PERIODS, _LONGEST_S = 2.0, 10.0
-_SEEING_S = 2.0  # without being blind until it counts as seeing
-_HELPLESS = 3  # events at the limit, at one frequency, until another is tried, then until it cannot help
-_WORSE = 1.1  # roughness with vibration over that without from which the vibration is called worse
+_SEEING_S = 2.0  # time without blindness until BLIND ends
+_HELPLESS = 3  # events at the limit until another frequency is tried, and again until CANNOT_HELP
+_WORSE = 1.1  # roughness with vibration over roughness without, from which the vibration counts as harmful
 
 
 @kernel
@@ -133,9 +133,9 @@ def decide(p: ControllerParams, s: ControllerMemory, t_ns: int, force_N: float, 
 
 @kernel
 def _still_sliding_mps(s: ControllerMemory) -> float:
-    """Velocity of a slide that still slows down after its drive: v_a must not fall below it, or the slide is lost.
+    """Velocity of a slide that still slows down after its drive: v_a must not fall below it, or the slide sticks.
 
-    Only a decrease counts: a slide that speeds up is released by the vibration itself, and more v_a would release more.
+    Only a decrease counts: the vibration releases a slide that speeds up, and more v_a would release it more.
     """
     if s.steady_s > STEADY_S or s.mode != EXCITE or s.mode_s < STEADY_S:
         s.late_mps = math.inf
@@ -146,10 +146,10 @@ def _still_sliding_mps(s: ControllerMemory) -> float:
 
 @kernel
 def _held_ratio(p: ControllerParams, s: ControllerMemory, way: int, force_N: float, speed_mps: float) -> float:
-    """The ratio in EXCITE. v_d is measured a window late, so a drive that speeds up needs more."""
+    """The ratio in EXCITE. The measured v_d lags by a window, so a drive that speeds up needs a larger ratio."""
     if s.steady_s > STEADY_S or s.held_mps > _RISING * speed_mps:
         return s.ratio[way]
-    # more v_a only until the spring is wound up: then the slide would run ahead
+    # more v_a only until the spring is wound up; after that the slide would run ahead
     if s.moved_s <= _BEGINS_S:
         s.wound = 1 if s.direction * force_N >= _WOUND * s.slid_N[way] else 0
     starts = s.moved_s < _STARTS_S and s.wound == 0
@@ -160,7 +160,7 @@ def _held_ratio(p: ControllerParams, s: ControllerMemory, way: int, force_N: flo
 def _look_ahead_s(p: ControllerParams, s: ControllerMemory) -> float:
     """Time from a command to v_a: loop delay, and for a drive at rest also the slew to the largest amplitude.
 
-    A moving drive gets no more, as an early v_a would release a slide that a smaller v_a holds.
+    For a moving drive it is the loop delay alone, as an early v_a would release a slide that a smaller v_a holds.
     """
     if s.moving == 1:
         return (max(s.loop_delay_steps, 0) + 1) * p.block_s
@@ -184,7 +184,7 @@ def _stand(p: ControllerParams, s: ControllerMemory) -> None:
 def _watch(
     p: ControllerParams, s: ControllerMemory, way: int, speed_mps: float, ahead_mps: float, block_s: float
 ) -> float:
-    """Without vibration; returns the ratio of a vibration that dies out after a move."""
+    """Step of the mode WATCH; returns the ratio of a vibration that fades out after a move."""
     if s.reason == SETTLING:
         s.settle_left_s = max(s.settle_left_s - block_s, 0.0)
         if s.settle_left_s == 0.0:
@@ -217,10 +217,10 @@ def _watch(
     elif is_needed(s, speed_mps):
         excite(p, s, NEEDED_BEFORE, 0.0)
     elif needless_from_mps(s) > 0.0 and not steady:
-        pass  # a pair that did without may stick while the drive speeds up or slows down
+        pass  # a pair that needs no vibration may stick while the drive speeds up or slows down
     elif s.slip_began == 1 or (s.contact == STICK and not is_needless(s, speed_mps)):
         excite(p, s, STICK_SEEN, p.v_ratio)
-    # it slid at this speed, and sticks again: for longer than a slide that only swings on its spring is slow
+    # the slide slid at this speed and sticks again, for longer than a swing on its spring would last
     elif (
         s.contact == STICK
         and s.stick_s > _REAL_STICK * s.expected_stick_s
@@ -240,7 +240,7 @@ def _hold(p: ControllerParams, s: ControllerMemory, way: int, force_N: float, sp
         return
     s.waiting_s = max(s.waiting_s - block_s, 0.0)
     forget_failures(s, block_s)
-    changed = s.steady_s < STEADY_S  # a slide that lags behind, or runs on after, a change of the drive
+    changed = s.steady_s < STEADY_S  # the slide may still lag behind a change of the drive
     # before its first even sliding a slide may stick because its spring still winds up, except at the exciter's limit
     sticks = s.stick_began == 1 and (s.even_s > 0.0 or s.at_limit == 1)
     begun = (s.slip_began == 1 or sticks) and not changed
@@ -256,7 +256,7 @@ def _hold(p: ControllerParams, s: ControllerMemory, way: int, force_N: float, sp
         if s.mode != EXCITE:
             return
     if changed:
-        s.swing = max(s.swing, swing_held(p.v_ratio))  # another speed: from there down
+        s.swing = max(s.swing, swing_held(p.v_ratio))  # at a new speed the ratio falls from the set point
         s.even_s, s.lead, s.top = 0.0, 0.0, -1.0
     settle_s = settling_s(p, s, force_N, speed_mps)
     s.lead *= max(1.0 - block_s / settle_s, 0.0)
@@ -282,7 +282,7 @@ def _hold(p: ControllerParams, s: ControllerMemory, way: int, force_N: float, sp
 def _note_swing(
     p: ControllerParams, s: ControllerMemory, force_N: float, speed_mps: float, block_s: float, settle_s: float
 ) -> None:
-    """Remember the swing of friction that makes v_s swing, without the swing caused by the ratio or its wobble."""
+    """Update the swing of friction from the swing of v_s, without the swing caused by the ratio or its wobble."""
     share = min(block_s / min(max(_PERIODS * TWO_PI * settle_s, _LEAST_CALM_S), _LONGEST_S), 1.0)
     if s.steps % _LOOK_STEPS == 0 or s.swing_level < 0:
         s.swing_level = windows_for(p, s, speed_mps)
@@ -306,7 +306,7 @@ def _note_swing(
 
 @kernel
 def _more(p: ControllerParams, s: ControllerMemory, way: int, by: float) -> None:
-    """The vibration does not do: more of it, then another frequency, then none."""
+    """Respond to a vibration that is not enough: raise the ratio, then try another frequency, then end the vibration."""
     if s.at_limit == 0 and s.ratio[way] < p.most_ratio:
         raise_ratio(p, s, by)
         return
@@ -323,7 +323,7 @@ def _more(p: ControllerParams, s: ControllerMemory, way: int, by: float) -> None
 
 @kernel
 def _note_roughness(s: ControllerMemory, speed_mps: float, block_s: float) -> None:
-    """Add up (v_s / v_d - 1)^2, which shows whether a vibration makes the motion worse."""
+    """Integrate (v_s / v_d - 1)^2, which shows whether a vibration makes the motion worse."""
     if s.level < 0 or s.moving == 0:
         return
     off = s.sliding_mps / speed_mps - 1.0

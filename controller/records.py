@@ -23,7 +23,7 @@ from controller.estimate.windows import BINS, LEVELS, MOST_FRESH, ROWS
 from controller.trips import band, confirmed, delivered, doubts, frozen, spring
 
 _BIN_S = 1e-4  # shortest bin: a window of four sees the slips of a drive of 50 N/um
-_TICK_S = 1e-3  # the contact is judged so often, whatever the length of a block
+_TICK_S = 1e-3  # period of the estimate of the contact, for any length of a block
 _LONGEST_WINDOW_S = 3.3  # a feed of 0.5 um/s exceeds 0.5 um of noise in 0.1 s; drift makes longer windows useless
 
 
@@ -77,35 +77,35 @@ STATE = np.dtype(
         ("bins", "f8", (ROWS, LEVELS, BINS)),
         ("fresh", "f8", (ROWS, MOST_FRESH)),  # bins that are being added
         ("slope", "f8", (ROWS, LEVELS)),
-        ("slope_before", "f8", (ROWS, LEVELS, 2)),  # of the window just before, and of that before it
-        ("sigma", "f8", (ROWS, LEVELS)),  # of a slope, measured
+        ("slope_before", "f8", (ROWS, LEVELS, 2)),  # slopes of the last window, and of the window before it
+        ("sigma", "f8", (ROWS, LEVELS)),  # measured noise of a slope
         (
             "noise",
             "f8",
             (ROWS, LEVELS),
-        ),  # of a slope: sigma, or the sigma of a shorter window extrapolated, and the resolution; 0: unknown
+        ),  # noise of a slope: sigma, or the extrapolated sigma of a shorter window, and the resolution; 0: unknown
         ("law_mps", "f8", (LEVELS,)),  # sigma of the slope of x_s + F / k_d - x_d, which is 0 without noise
-        ("agreements", "i8", (LEVELS,)),  # that it was learnt from
-        ("pushed", "i8", (LEVELS,)),
-        ("differences", "i8", (LEVELS,)),  # that sigma was learnt from
+        ("agreements", "i8", (LEVELS,)),  # number of differences in law_mps
+        ("pushed", "i8", (LEVELS,)),  # number of bins since the start
+        ("differences", "i8", (LEVELS,)),  # number of differences in sigma
         ("resolution", "f8", (ROWS,)),
         # spikes: single samples far from their neighbours
-        ("bends", "f8", (ROWS,)),  # from sample to sample, mean; 0: unknown
-        ("most_bend", "f8", (ROWS,)),  # more bends a spike
-        ("tail", "f8", (ROWS, 2)),  # last two samples of the block before; no numbers: unknown
+        ("bends", "f8", (ROWS,)),  # mean second difference of the samples; 0: unknown
+        ("most_bend", "f8", (ROWS,)),  # second difference above which a sample is a spike
+        ("tail", "f8", (ROWS, 2)),  # last two samples of the block before; NaN: unknown
         ("spiked", "i8"),  # whether any channel has a spike in this block
-        ("spike_at", "i8", (ROWS,)),  # sample of it; -1: none
-        ("spike", "f8", (ROWS,)),  # its replacement
-        ("spike_step", "i8", (ROWS,)),  # of the last one
+        ("spike_at", "i8", (ROWS,)),  # sample of the spike; -1: no spike
+        ("spike", "f8", (ROWS,)),  # replacement of the spike
+        ("spike_step", "i8", (ROWS,)),  # step of the last spike
         # motion
         ("drive_velocity_mps", "f8"),
         ("drive_velocity_sigma_mps", "f8"),
-        ("held_mps", "f8"),  # |v_d|, rises at once, falls slowly
-        ("rising_mps", "f8"),  # |v_d|, ahead of its windows where it grows
-        ("late_mps", "f8"),  # least |v_s| of a slide since its drive changes its speed
+        ("held_mps", "f8"),  # |v_d| that rises at once and falls slowly
+        ("rising_mps", "f8"),  # |v_d| extrapolated to the end of its windows while it grows
+        ("late_mps", "f8"),  # least |v_s| since the drive began to change its speed
         ("steady_mps", "f8"),
-        ("steady_s", "f8"),  # since v_d last changed
-        ("moved_s", "f8"),  # since the drive started or turned
+        ("steady_s", "f8"),  # time since v_d last changed
+        ("moved_s", "f8"),  # time since the drive started or turned
         ("stood_s", "f8"),
         ("rested", "i8"),  # 1 if the slide must have been at rest when the drive started or turned
         ("measured", "i8"),
@@ -113,17 +113,17 @@ STATE = np.dtype(
         ("direction", "i8"),
         # contact
         ("contact", "i8"),  # ContactState
-        ("level", "i8"),  # shortest window that sees a stick; -1 for none
+        ("level", "i8"),  # level of the shortest window that resolves a stick; -1: no level
         ("window_s", "f8"),
-        ("sliding_mps", "f8"),  # of the slide, along the drive's direction
-        ("fine_mps", "f8"),  # as sliding_mps, over a longer window with less noise
+        ("sliding_mps", "f8"),  # velocity of the slide along the drive's direction
+        ("fine_mps", "f8"),  # sliding_mps over a longer window with less noise
         ("fine_sigma_mps", "f8"),
         ("force_rate", "f8"),
         ("score", "f8"),
         ("stick_s", "f8"),
         ("since_stick_s", "f8"),
         ("smooth_s", "f8"),
-        ("slid_s", "f8"),  # in this move, without vibration
+        ("slid_s", "f8"),  # duration of sliding in this move, without vibration
         ("expected_stick_s", "f8"),
         ("unseen_s", "f8"),
         ("time_to_slip_s", "f8"),
@@ -133,18 +133,18 @@ STATE = np.dtype(
         ("stick_began", "i8"),
         ("slips", "i8"),
         ("surges", "i8"),
-        # learnt of the axis
+        # learnt values of the axis
         ("stiffness_N_per_m", "f8"),
         ("stiffness_sigma", "f8"),  # over the stiffness
         ("stiffness_learnt", "i8"),
         ("taught", "f8"),
         ("taught_ratio", "f8"),
         ("taught_square", "f8"),
-        ("relaxed_m", "f8"),  # elongation at which the spring holds nothing, for a rig without a force sensor
+        ("relaxed_m", "f8"),  # elongation of the relaxed spring, for a rig without a force sensor
         ("shortest_m", "f8"),
         ("longest_m", "f8"),
         ("stretched", "i8"),  # 1 once an elongation was seen
-        ("dragged", "i8", (_WAYS,)),  # 1 once the slide slid that way
+        ("dragged", "i8", (_WAYS,)),  # 1 once the slide slid in this direction
         ("peak_N", "f8"),  # highest force of this stick
         ("slip_from_N", "f8"),  # highest force before the last slip without vibration; 0 once the next stick began
         ("swing_N", "f8", (_WAYS,)),  # fall of the force in a slip
@@ -161,32 +161,32 @@ STATE = np.dtype(
         ("mode", "i8"),
         ("reason", "i8"),
         ("mode_s", "f8"),
-        ("calm_s", "f8"),  # without stick or slip, since the ratio last changed
+        ("calm_s", "f8"),  # time without stick or slip since the ratio last changed
         ("waiting_s", "f8"),
-        ("swing", "f8"),  # share of v_d by which the slide was off while vibrating, forgotten in time
-        ("even_s", "f8"),  # with little of it, in this mode
+        ("swing", "f8"),  # relative swing of friction under vibration; decays
+        ("even_s", "f8"),  # time with a small swing in this mode
         ("swung", "f8"),  # mean square of the swing of v_s, over v_d
-        ("swung_least", "f8"),  # the least of it since a trial fade began; infinite in a fade after a wobble
+        ("swung_least", "f8"),  # least `swung` since a trial fade began; infinite in a fade after a wobble
         ("fade", "f8"),  # ratio of a vibration that fades
         ("fade_from_N", "f8"),
         ("fade_per_s", "f8"),
-        ("unasked_s", "f8"),  # of vibration since the last probe or wobble
+        ("unasked_s", "f8"),  # time of vibration since the last probe or wobble
         ("wobbles", "i8"),  # whether v_a wobbles
-        ("wobble_level", "i8"),  # windows that show the answer
+        ("wobble_level", "i8"),  # level of the windows for v_s
         ("wobble_s", "f8"),
         ("wobble_period_s", "f8"),
-        ("wobble_a", "f8", (3,)),  # v_a: in step, a quarter of a period later, mean
-        ("wobble_v", "f8", (3,)),  # v_s, likewise
+        ("wobble_a", "f8", (3,)),  # sums of v_a: in phase, a quarter of a period later, mean
+        ("wobble_v", "f8", (3,)),  # the same sums of v_s
         ("lead", "f8"),  # share of v_d by which the slide is ahead because the ratio rises
-        ("swing_level", "i8"),  # windows that show a swing; -1 for none
+        ("swing_level", "i8"),  # level of the windows for the swing; -1: no level
         ("wound", "i8"),  # whether the spring was wound up at the begin of this move
         ("slid_N", "f8", (_WAYS,)),  # force at which the vibrated slide followed
-        ("top", "f8"),  # largest share of v_d by which it was ahead, forgotten in time; -1 for a slide at rest
+        ("top", "f8"),  # largest share of v_d by which the slide was ahead; decays; -1: at rest
         ("settle_left_s", "f8"),
         ("settle_mps", "f8"),
         ("helpless", "i8"),
-        ("failed", "i8"),  # times that the most vibration did not do
-        ("failed_left_s", "f8"),  # until that is forgotten
+        ("failed", "i8"),  # number of slips that more vibration could not have prevented
+        ("failed_left_s", "f8"),  # time until this number restarts
         ("roughness", "f8"),
         ("roughness_s", "f8"),
         ("rough_with", "f8", (_WAYS,)),
@@ -194,7 +194,7 @@ STATE = np.dtype(
         ("off_s", "f8", (_WAYS,)),
         ("off_left_s", "f8", (_WAYS,)),
         ("ratio", "f8", (_WAYS,)),  # set point of v_a / v_d
-        ("edge_ratio", "f8", (_WAYS,)),  # the largest that was too little; 0 for none
+        ("edge_ratio", "f8", (_WAYS,)),  # largest ratio that was too small; 0: unknown
         ("edge_held_s", "f8", (_WAYS,)),
         ("probe_s", "f8", (_WAYS,)),
         ("needed_to_mps", "f8", (_WAYS,)),
@@ -211,12 +211,12 @@ STATE = np.dtype(
         ("gain_known", "i8", (MOST_CANDIDATES,)),
         ("growth", "f8"),
         ("sent_m", "f8", (REMEMBERED,)),
-        ("least_sent_mps", "f8", (SLOTS,)),  # v_a as commanded, over slot_steps each
+        ("least_sent_mps", "f8", (SLOTS,)),  # extremes of the commanded v_a over slot_steps
         ("most_sent_mps", "f8", (SLOTS,)),
         ("most_wanted_mps", "f8", (SLOTS,)),
         ("expected_mps", "f8"),
-        ("noise_mps", "f8"),  # of the base at rest, mean
-        ("noise_steps", "i8"),  # that it is known from
+        ("noise_mps", "f8"),  # mean v_a that is measured with the base at rest
+        ("noise_steps", "i8"),  # number of steps in this mean
         ("silent_steps", "i8"),
         ("listening", "i8"),
         ("onset_steps", "i8"),
@@ -225,59 +225,62 @@ STATE = np.dtype(
         ("cut_steps", "i8"),
         ("loop_delay_steps", "i8"),  # -1 while unknown
         ("at_limit", "i8"),
-        ("weak_s", "f8"),  # for which the piezo was too weak; below 0: for which it was not
+        ("weak_s", "f8"),  # time for which the piezo was too weak; negative: for which it was not
         # trips
-        ("trip", "i8"),  # Reason of the first that holds; 0: none
+        ("trip", "i8"),  # Reason of the reported trip; 0: no trip
         ("doubted", "i8"),  # bits of `controller.trips.doubts`
-        ("known_gain", "f8", (MOST_CANDIDATES,)),  # delivered over commanded v_a, and the steps that it is a mean of
-        ("known_steps", "i8", (MOST_CANDIDATES,)),
+        ("known_gain", "f8", (MOST_CANDIDATES,)),  # delivered over commanded v_a
+        ("known_steps", "i8", (MOST_CANDIDATES,)),  # number of steps in the mean `known_gain`
         ("checked_blocks", "i8"),  # blocks with a tone of the loop check
-        ("tone_Hz", "f8", (MOST_CANDIDATES, 2)),  # of it below and above a candidate; 0: none
-        ("tone_gain", "f8", (MOST_CANDIDATES, 2)),  # delivered over commanded v_a there
-        ("gain_other_s", "f8"),  # for which GAIN_OTHER is still reported
-        ("banded", "i8"),  # whether the band holds the amplitude back
-        ("even_steps", "i8"),  # for which the command that is heard has been even
-        ("followed", "i8"),  # candidate of the next
-        ("followed_gain", "f8"),  # as measured, over a second
-        ("low_steps", "i8"),
-        ("high_steps", "i8"),  # of too much v_a; below 0: reported, until so many steps without it
-        ("rest_mps2_2", "f8"),  # mean square of the rest without the sine, over a second
-        ("rest_steps", "i8"),  # for which there is far more of it
-        ("kept_mps", "f8", (ROWS,)),  # of slide and drive, when they last kept the spring's law
-        ("kept_N_per_m", "f8"),  # stiffness then
-        ("broken_steps", "i8"),  # for which the law is broken
-        ("broken_drive", "i8"),  # of them, steps in which the drive changed, minus the others
-        ("broken_slide", "i8"),  # of them, steps in which the slide is faster than drive and spring explain
-        ("shaken_s", "f8"),  # for which the drive has moved under vibration
+        ("tone_Hz", "f8", (MOST_CANDIDATES, 2)),  # nearest tones of the check below and above a candidate; 0: no tone
+        ("tone_gain", "f8", (MOST_CANDIDATES, 2)),  # delivered over commanded v_a at these tones
+        ("gain_other_s", "f8"),  # time for which GAIN_OTHER is still reported
+        ("banded", "i8"),  # whether the gain band limits the amplitude
+        ("even_steps", "i8"),  # steps for which the expected v_a has been even
+        ("followed", "i8"),  # candidate of `followed_gain`
+        ("followed_gain", "f8"),  # measured gain, averaged over a second
+        ("low_steps", "i8"),  # steps of too small a v_a
+        ("high_steps", "i8"),  # steps of too large a v_a; negative: reported, until as many steps without
+        ("rest_mps2_2", "f8"),  # mean square of the acceleration without the sine, over a second
+        ("rest_steps", "i8"),  # steps for which it is far larger
+        ("kept_mps", "f8", (ROWS,)),  # velocities of slide and drive when the spring's law last held
+        ("kept_N_per_m", "f8"),  # stiffness when the spring's law last held
+        ("broken_steps", "i8"),  # steps for which the law is broken
+        ("broken_drive", "i8"),  # steps in which the drive changed during this break, minus the other steps
+        (
+            "broken_slide",
+            "i8",
+        ),  # steps in which the slide is faster than drive and spring explain, minus the other steps
+        ("shaken_s", "f8"),  # time for which the drive has moved under vibration
         ("confirmed", "f8"),  # share of v_d that slide and force confirm, with its margin
-        ("apart_s", "f8"),  # for which they do not
-        ("apart_by", "i8"),  # row of the signal that changed then; below 0: unknown
-        ("agreed_mps", "f8", (ROWS,)),  # along the drive's direction, when they last did
-        ("stiffest_N_per_m", "f8"),  # largest stiffness learnt
-        ("went_m", "f8", (2,)),  # by the drive's place in the last two blocks; below 0: unknown
-        ("jumps", "f8"),  # of it in the last second
-        ("jumped_s", "f8"),  # for which v_d is that before the last one
-        ("drops", "f8"),  # times that the base accelerometer dropped out in the last second
-        ("dropped", "i8"),  # whether it did in the last block
-        ("grown_steps", "i8"),  # for which there is somewhat too much v_a
-        ("spring_level", "i8"),  # windows that show it
-        ("bend_m", "f8"),  # of the drive's place from sample to sample, mean
-        ("bent", "i8"),  # looks in a row with much more of it
-        ("slip_count", "f8"),  # in the last second
-        ("slips_wound", "f8"),  # for which the spring could wind up in it
-        ("unbelieved_s", "f8"),  # for which slips count as noise
-        ("quiet_s", "f8"),  # since the last stall of the computer or the link
-        ("stalling_s", "f8"),  # for which blocks have not been compared with commands, because of such stalls
-        ("noise_told_s", "f8"),  # for which grown noise is still reported
-        ("slide_accel_unread", "i8"),  # whether the slide's accelerometer shows no numbers
+        ("apart_s", "f8"),  # time for which slide and force do not confirm v_d
+        ("apart_by", "i8"),  # row of the signal that changed at its begin; negative: unknown
+        ("agreed_mps", "f8", (ROWS,)),  # velocities along the drive's direction when v_d was last confirmed
+        ("stiffest_N_per_m", "f8"),  # largest learnt stiffness
+        ("went_m", "f8", (2,)),  # steps of the drive's position in the last two blocks; negative: unknown
+        ("jumps", "f8"),  # number of jumps of the drive's position in the last second
+        ("jumped_s", "f8"),  # time for which v_d before the last jump is still used
+        ("drops", "f8"),  # number of dropouts of the base accelerometer in the last second
+        ("dropped", "i8"),  # whether it dropped out in the last block
+        ("grown_steps", "i8"),  # steps of a slightly too large v_a
+        ("spring_level", "i8"),  # level of the windows in which the spring's law is checked
+        ("bend_m", "f8"),  # mean second difference of the drive's position
+        ("bent", "i8"),  # number of successive blocks with a far larger one
+        ("slip_count", "f8"),  # number of slips in the last second
+        ("slips_wound", "f8"),  # number of slips for which the spring could wind up in the last second
+        ("unbelieved_s", "f8"),  # time for which slips still count as noise
+        ("quiet_s", "f8"),  # time since the last stall of the computer or the link
+        ("stalling_s", "f8"),  # time for which blocks have not been compared with commands, because of stalls
+        ("noise_told_s", "f8"),  # time for which grown noise is still reported
+        ("slide_accel_unread", "i8"),  # whether samples of the slide's accelerometer are not finite
         ("outside", "i8"),  # whether the drive is outside of its travel
-        ("first_sample", "f8", (doubts.CHANNELS,)),
-        ("seen_block", "i8"),  # that these are of
-        ("first_seen", "i8"),
-        ("same_steps", "i8", (doubts.CHANNELS,)),
-        ("lively", "f8", (doubts.CHANNELS, 2)),  # share of looks that showed noise, at rest and in motion
-        ("looks", "i8", (doubts.CHANNELS, 2)),
-        ("looked", "i8"),  # looks at any channel
+        ("first_sample", "f8", (doubts.CHANNELS,)),  # first sample of the last block
+        ("seen_block", "i8"),  # block of `first_sample`
+        ("first_seen", "i8"),  # whether there is a `first_sample`
+        ("same_steps", "i8", (doubts.CHANNELS,)),  # successive blocks with the same first sample
+        ("lively", "f8", (doubts.CHANNELS, 2)),  # share of `looks` that showed noise, at rest and in motion
+        ("looks", "i8", (doubts.CHANNELS, 2)),  # number of checks of the noise, at rest and in motion
+        ("looked", "i8"),  # number of checks of all channels
         # limits
         ("allowed_Hz", "f8"),
         ("allowed_m", "f8"),
@@ -303,7 +306,7 @@ LAYOUT_ID = hashlib.sha256(repr(STATE).encode()).hexdigest()
 
 
 def build(config: ControllerConfig) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    """Derive the parameters and an empty memory from a configuration."""
+    """The parameters and an empty memory for a configuration."""
     params = record(PARAMS)
     p: Any = params[0]
 

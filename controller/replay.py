@@ -1,10 +1,10 @@
-"""Today's controller on the frames that a log holds as consumed: does it give the same commands and traces?
+"""Replay of a log: does today's controller give the same commands and traces for the frames of the log?
 
-Inputs are fed, outputs are compared; no output is ever copied from the log. The only field that is not compared is the
-lateness in the trace, which comes from a clock and decides nothing.
+Inputs are fed, outputs are compared; no output is copied from the log. The only field that is not compared is the lateness in
+the trace, which comes from a clock and has no effect on a command.
 
-A log is replayed piece by piece. A step goes through the controller once its block, its command and its announcements are there,
-and is then forgotten, so that the memory does not grow with the log.
+A log is replayed piece by piece. A step is replayed once its block, its command and its announcements have been read, and is then
+dropped, so that the memory does not grow with the log.
 """
 
 from collections import deque
@@ -31,24 +31,24 @@ from controller.replay_steps import (
     StepComparer,
 )
 
-# Steps by which a message may be late in the log, 10 s of blocks of 1 ms; a later one counts as lost. Larger: a log that lacks
-# messages needs more memory. Smaller: a log with a step further from its block is read a second time, in whole. Not swept.
+# Largest delay of a message in the log [steps], 10 s of blocks of 1 ms; a later message counts as lost. Larger: a log that lacks
+# messages needs more memory. Smaller: a log with a step farther from its block is read a second time, as a whole. Not swept.
 WINDOW: Final = 10_000
 _DEFAULT_SAMPLES = 20
 
 
 class Change(NamedTuple):
-    """A change of configuration at `t_ns`; the memory stays."""
+    """A change of configuration at `t_ns`; the memory is kept."""
 
     t_ns: int
     config: ControllerConfig
 
 
 class Replay(NamedTuple):
-    """How the answers of today's controller compare with those in a log."""
+    """Comparison of today's controller with the commands and traces of a log."""
 
-    compared: int  # steps
-    skipped: int  # steps of the log that cannot be rebuilt: their block or their memory is not in the log
+    compared: int  # number of compared steps
+    skipped: int  # number of steps that cannot be replayed: their block or their memory is not in the log
     difference: ReplayDifference | None
 
     @property
@@ -58,55 +58,55 @@ class Replay(NamedTuple):
 
 
 class OutOfOrder(Exception):
-    """A message comes in the log after steps that needed it: only the log in whole can be replayed."""
+    """A message follows in the log after steps that needed it: the log can only be replayed as a whole."""
 
 
 class _Waiting:
-    """Messages of one topic that no step has used so far, in order of their sequence."""
+    """Messages of a topic that no step has used so far, in order of their sequence."""
 
     def __init__(self, empty: Records) -> None:
         self._parts = [empty]
         self.passed = -1  # largest sequence that no later step uses
-        self.lacked: list[npt.NDArray[np.uint64]] = []  # sequences that were missing for steps that were taken
+        self.lacked: list[npt.NDArray[np.uint64]] = []  # sequences that were missing for replayed steps
 
     def add(self, records: Records) -> None:
-        """Messages in the order of the log."""
+        """Add messages, in the order of the log."""
         if len(records):
             self._parts.append(records)
 
     def records(self) -> Records:
-        """All that wait; those with equal sequences are in the order of the log."""
+        """All waiting messages by sequence; messages with equal sequences are in the order of the log."""
         if len(self._parts) > 1:
             parts = [part for part in self._parts if len(part)]
             dtype = parts[0].dtype
             raw = f"V{dtype.itemsize}"  # joined and moved as bytes: numpy would drop the tags between the fields
-            whole = parts[0] if len(parts) == 1 else np.concatenate([part.view(raw) for part in parts]).view(dtype)
-            sequence = whole["sequence"]
+            joined = parts[0] if len(parts) == 1 else np.concatenate([part.view(raw) for part in parts]).view(dtype)
+            sequence = joined["sequence"]
             if not (sequence[1:] > sequence[:-1]).all():
-                whole = whole.view(raw)[np.argsort(sequence, kind="stable")].view(dtype)
-            self._parts = [whole]
+                joined = joined.view(raw)[np.argsort(sequence, kind="stable")].view(dtype)
+            self._parts = [joined]
         return self._parts[0]
 
     def forget(self, count: int) -> None:
-        """Forget the first `count`."""
+        """Drop the first `count` messages."""
         if count:
-            whole = self.records()
-            self.passed = max(self.passed, int(whole["sequence"][count - 1]))
-            self._parts = [whole[count:]]
+            records = self.records()
+            self.passed = max(self.passed, int(records["sequence"][count - 1]))
+            self._parts = [records[count:]]
 
     def forget_until(self, sequence: int) -> None:
-        """Forget those up to a sequence, and any of them that come later."""
+        """Drop all messages up to a sequence, including messages that follow later."""
         self.forget(int(np.searchsorted(self.records()["sequence"], np.uint64(sequence), "right")))
         self.passed = max(self.passed, sequence)
 
 
 class Replayer:
-    """A replay that takes a log piece by piece, in its order. Methods raise OutOfOrder, but not with `whole`.
+    """Replay of a log piece by piece, in its order. Methods raise OutOfOrder, but not with `whole`.
 
     Args:
         changes: configurations in order of time; the first holds from the start.
-        from_s: only steps from this time on are compared. It starts at the last snapshot before, or at the run's start.
-        whole: take all of the log into memory first. It may then be in any order.
+        from_s: only steps from this time on are compared. The replay starts at the last snapshot before, or at the run's start.
+        whole: whether all of the log is read into memory first; it may then be in any order.
 
     """
 
@@ -124,15 +124,15 @@ class Replayer:
             "trace": self._trace, "sensors": self._sensors, "command": self._command, "announce": self._announce,
         }  # fmt: skip
         self._snapshots: deque[wire.Snapshot] = deque()
-        self._before: wire.Snapshot | None = None  # the last one before `from_s`
-        self._newest_step = -1  # of a snapshot
+        self._before: wire.Snapshot | None = None  # last snapshot before `from_s`
+        self._newest_step = -1  # step of the newest snapshot
         self._phase: Callable[[int], bool] = self._start
-        self._lost_from = 0  # step; the memory comes from a snapshot at or after it
+        self._lost_from = 0  # step from which the memory is lost, until a snapshot at or after it
         self._compared = self._skipped = 0
-        self._newest = 0  # steps of the newest piece, the other topics of which may follow
+        self._newest = 0  # number of steps in the newest piece, whose other topics may follow
 
     def add(self, topic: str, records: Records) -> None:
-        """Take messages of a streaming topic; messages of other topics are skipped."""
+        """Add messages of a streaming topic; messages of other topics are skipped."""
         waiting = self._tables.get(topic)
         if waiting is None or not len(records):
             return
@@ -144,7 +144,7 @@ class Replayer:
             self._advance(end=False)
 
     def add_snapshot(self, snapshot: wire.Snapshot) -> None:
-        """Take a memory of the controller; one of another version is skipped."""
+        """Add a snapshot of the controller's memory; a snapshot of another version is skipped."""
         if snapshot.layout != LAYOUT_ID:
             return
         early = snapshot.t_ns < self._from_ns
@@ -166,7 +166,7 @@ class Replayer:
         return Replay(self._compared, self._skipped, self._comparer.difference)
 
     def _in_time(self, topic: str, waiting: _Waiting, records: Records) -> Records:
-        """Those that can still be used; a message that comes a second time is skipped, as the first counts."""
+        """The messages that can still be used; repetitions of a message are skipped."""
         sequence = records["sequence"]
         if topic == "announce":  # steps refer to them by their number
             steps = np.diff(sequence, prepend=waiting.records()["sequence"][-1:]).astype(np.int64)
@@ -181,7 +181,7 @@ class Replayer:
         return records.view(f"V{records.dtype.itemsize}")[~late].view(records.dtype)
 
     def _advance(self, end: bool) -> None:
-        """Take every step that is complete; with `end` all of them, as no message follows."""
+        """Replay every complete step; with `end` all steps, as no message follows."""
         while len(trace := self._trace.records()):
             sequence = trace["sequence"]
             twice = np.flatnonzero(sequence[1:] == sequence[:-1])
@@ -191,20 +191,20 @@ class Replayer:
                 self._refuse_two(trace[twice[0]], trace[twice[0] + 1])
             if not self._phase(len(trace) if end else max(len(trace) - max(WINDOW, self._newest), 0)):
                 break
-        for waiting in (self._sensors, self._command):  # of blocks that no controller answered
+        for waiting in (self._sensors, self._command):  # drops old blocks that no controller answered
             waiting.forget(max(len(waiting.records()) - 2 * WINDOW, 0) if not self._whole else 0)
 
     @staticmethod
     def _refuse_two(first: Any, second: Any) -> None:
         at_s, again_s = 1e-9 * int(first["t_ns"]), 1e-9 * int(second["t_ns"])
         line = f"/trace: step {first['sequence']} is recorded at {at_s:.3f} s and again at {again_s:.3f} s"
-        why = "the controller was started again, or two answered"
+        why = "the controller was started again, or two controllers answered"
         raise Fault("BAD_LOG", f"{line}: {why}; record every controller in a separate log")
 
     # each phase takes the number of steps for which no message can follow, and returns whether another phase follows
 
     def _start(self, sure: int) -> bool:
-        """Find where the replay begins."""
+        """Find the step at which the replay begins."""
         first = int(self._trace.records()["sequence"][0])
         if not sure and (first or self._from_ns > 0):
             return False
@@ -220,7 +220,7 @@ class Replayer:
         return True
 
     def _run(self, sure: int) -> bool:
-        """Take the steps that follow the memory, up to one that cannot be rebuilt, and forget them."""
+        """Replay the steps from the memory on, up to a step that cannot be replayed, and drop them."""
         trace, sensors, command, announce = (waiting.records() for waiting in self._tables.values())
         if not len(sensors) and self._sensors.passed < 0 and not sure:
             return False  # the number of samples of a block is not known
@@ -251,7 +251,7 @@ class Replayer:
         return taken.why in {GAP, NO_BLOCK, DIFFERS}
 
     def _lost(self, sure: int) -> bool:
-        """Pass over steps until a snapshot gives the memory back."""
+        """Skip steps until a snapshot restores the memory."""
         sequence = self._trace.records()["sequence"]
         while self._snapshots:
             snapshot = self._snapshots[0]
@@ -266,7 +266,7 @@ class Replayer:
                     self._memory[:] = np.frombuffer(snapshot.memory, STATE)
                     self._phase = self._run
                     return True
-                if sure <= place and sure < len(sequence):  # it may still come
+                if sure <= place and sure < len(sequence):  # the step may still follow
                     break
                 if snapshot is self._before and place < len(sequence):
                     self._lost_from = int(sequence[place])
@@ -275,7 +275,7 @@ class Replayer:
         return False
 
     def _pass_over(self, count: int) -> None:
-        """Forget the first steps, which cannot be rebuilt."""
+        """Drop the first steps, which cannot be replayed."""
         steps = self._trace.records()[:count]
         if not len(steps):
             return

@@ -1,4 +1,4 @@
-"""Steps of today's controller on the frames of a log: each answer is compared at once and then forgotten."""
+"""Steps of today's controller on the frames of a log; each result is compared at once and then dropped."""
 
 from collections.abc import Iterable
 from typing import Any, Final, NamedTuple
@@ -14,9 +14,9 @@ from controller.core import step
 
 _OF_A_CLOCK = "lateness_ns"  # the field that is not compared
 
-# why steps end: more may come, a step is lost, its block is lost, a forgotten message is needed, a bit differs
+# why steps end: more may follow, a step is lost, its block is lost, a dropped message is needed, a bit differs
 WAITS, GAP, NO_BLOCK, AGAIN, DIFFERS = range(5)
-NO_COMMAND: Final = 1  # bits of the messages that were missing for steps that were taken
+NO_COMMAND: Final = 1  # bits of messages that were missing for replayed steps
 NO_ANNOUNCEMENT: Final = 2
 
 
@@ -33,18 +33,18 @@ class ReplayDifference(NamedTuple):
 
 
 class Taken(NamedTuple):
-    """The steps that were taken."""
+    """The replayed steps."""
 
-    steps: int
-    why: int  # they end there
-    compared: int
-    blocks: int  # places of sensor blocks up to the last that was used
-    lacks: int  # bits of the messages that were missing
+    steps: int  # number of replayed steps
+    why: int  # reason why they end
+    compared: int  # number of compared steps
+    blocks: int  # number of sensor blocks up to the last used block
+    lacks: int  # bits of missing messages
 
 
 @kernel
 def _place(records: npt.NDArray[Any], likely: int, sequence: int) -> int:
-    """The place of the first message with this sequence; -1 without one."""
+    """Index of the first message with this sequence; -1 if it is missing. `likely` is tried first."""
     if likely < records.shape[0] and records[likely].sequence == sequence:
         return likely
     low, high = 0, records.shape[0]
@@ -80,12 +80,12 @@ def _steps(
     trace_bytes: npt.NDArray[np.uint8],
     command_bytes: npt.NDArray[np.uint8],
 ) -> tuple[int, int, int, int, int]:
-    """Steps up to the first that differs, whose answer `command` and `trace` then hold, or that cannot be taken; see `Taken`."""
+    """Replay steps up to the first that differs (its result is then in `command`, `trace`) or is incomplete; see `Taken`."""
     s: ControllerMemory = state[0]
     compared, lacks, block_at, command_at = 0, 0, -1, -1
     for i in range(logged_trace.shape[0]):
         t: TraceRow = logged_trace[i]
-        # of the type that the process has: for another the whole step would be compiled once more
+        # same types as in the process: other types would make Numba compile the step again
         events: Any = np.int64(t.events)
         gap_blocks: Any = np.int64(t.gap_blocks)
         if t.sequence != s.steps:
@@ -109,7 +109,7 @@ def _steps(
         change = params.shape[0] - 1
         while change > 0 and t.t_ns < params_from_ns[change]:
             change -= 1
-        # a step without a block does not read its place
+        # a step without a block does not read `block`
         settings, block = params[change : change + 1], sensors[place : place + 1]
         step(settings, state, block, events, gap_blocks, t.t_ns, command, trace)
         if t.t_ns < compared_from_ns:
@@ -131,10 +131,10 @@ class StepComparer:
     """Today's controller, fed with the frames of a log; steps after the first difference are not compared.
 
     Args:
-        params: of the controller, [changes].
-        params_from_ns: the times from which they hold, [changes].
-        memory: of the controller, one record; it is changed in place.
-        compared_from_s: steps before are fed and not compared.
+        params: parameters of the controller, [changes].
+        params_from_ns: times from which they hold, [changes].
+        memory: memory of the controller, one record, changed in place.
+        compared_from_s: steps before this time are replayed and not compared.
 
     """
 
@@ -152,12 +152,12 @@ class StepComparer:
         self._masks = _mask(TRACE), _mask(COMMAND)
 
     def take(self, tables: Iterable[Records], sure: int, first_block: int, first_command: int) -> Taken:
-        """Take steps from the first one on.
+        """Replay steps, from the first of the tables on.
 
         Args:
             tables: trace, sensors, command and announcements of the log, each in order of sequence.
             sure: steps for which no message can follow.
-            first_block, first_command: sequences from which on no message was forgotten.
+            first_block, first_command: sequences from which on no message was dropped.
 
         """
         trace, sensors, command, announce = map(writable, tables)
@@ -187,7 +187,7 @@ class StepComparer:
 
 
 def _mask(layout: Layout) -> npt.NDArray[np.uint8]:
-    """Which bytes of a message are compared, [size]: the bytes of its fields, except for the field of a clock."""
+    """Mask of the compared bytes of a message, [size]: the bytes of its fields, except for the field of a clock."""
     mask = np.zeros(layout.size, np.uint8)
     for name, (kind, first, *_) in (layout.dtype.fields or {}).items():
         mask[first : first + kind.itemsize] = 0 if name == _OF_A_CLOCK else 0xFF
@@ -199,5 +199,5 @@ def _rows_of_bytes(records: Records) -> npt.NDArray[np.uint8]:
 
 
 def writable(records: Records) -> Records:
-    """The same messages in memory that may be written: numba would compile kernels again for arrays that may only be read."""
+    """The messages in writable memory: Numba would compile kernels again for read-only arrays."""
     return records if records.flags.writeable else np.frombuffer(bytearray(records.tobytes()), records.dtype)

@@ -13,7 +13,7 @@ from controller.config import ControllerConfig
 
 
 def refuse_another_rig(header: wire.Header | None, config: ControllerConfig) -> None:
-    """Raise Fault where a rig's blocks cannot be those that the controller was configured for.
+    """Raise Fault if a rig's blocks do not match the controller's configuration.
 
     BAD_MESSAGE: another schema version; CONFIG: blocks of another length or number of samples. A rig without a header is
     accepted; its blocks are checked as they arrive.
@@ -38,7 +38,7 @@ class RigAgain:
 
     Args:
         ask: returns the rig's header, or None. It may take a second.
-        config: of the controller.
+        config: configuration of the controller.
 
     """
 
@@ -48,11 +48,11 @@ class RigAgain:
         self._refusal: Fault | None = None
 
     def begin(self) -> None:
-        """Ask now; the answer comes by itself."""
+        """Start reading the header; `refuse` reports the result."""
         threading.Thread(target=self._compare, name="rig again", daemon=True).start()
 
     def refuse(self) -> None:
-        """Raise the Fault of `refuse_another_rig` once an answer shows it."""
+        """Raise the Fault of `refuse_another_rig` once the header shows it."""
         if self._refusal is not None:
             raise self._refusal
 

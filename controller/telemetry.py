@@ -9,8 +9,8 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import STATE, Records
 from controller.records import LAYOUT_ID
 
-STATE_EVERY = 10  # steps: 100 Hz
-SNAPSHOT_EVERY = 1000  # steps: once a second
+STATE_EVERY = 10  # steps between state messages: 100 Hz with blocks of 1 ms
+SNAPSHOT_EVERY = 1000  # steps between snapshots: one a second with blocks of 1 ms
 
 _COPIED = (
     *("t_ns", "drive_force_N", "vibration_velocity_mps", "drive_velocity_mps", "force_rate", "score"),
@@ -22,8 +22,8 @@ def plotted(traces: Records, steps: int) -> Records:
     """The state messages of some steps.
 
     Args:
-        traces: of every step that a message is of, [n], STATE_EVERY apart.
-        steps: that were made with the first of them.
+        traces: trace of each of these steps, [n], STATE_EVERY apart.
+        steps: number of steps up to the first of them.
 
     """
     states = STATE.blank(len(traces))
@@ -32,7 +32,7 @@ def plotted(traces: Records, steps: int) -> Records:
         states[name] = traces[name]
     drive_mps = np.abs(traces["drive_velocity_mps"])
     moving = (traces["state"] > wire.STANDSTILL) & (drive_mps > 0.0)
-    # otherwise the trace repeats an old value
+    # during these limits the trace repeats an old value
     measured = (traces["limit"] != wire.STALE_INPUT) & (traces["limit"] != wire.NOT_FINITE)
     ratio = traces["vibration_velocity_mps"] / np.where(moving, drive_mps, 1.0)
     states["velocity_ratio"] = np.where(moving & measured, ratio, 0.0)
@@ -40,7 +40,7 @@ def plotted(traces: Records, steps: int) -> Records:
 
 
 def snapshot(memory: npt.NDArray[Any], steps: int, t_ns: int) -> bytes:
-    """The message that holds the controller's memory after `steps` steps, the last one of the frame at `t_ns`."""
+    """The message with the controller's memory after `steps` steps; `t_ns` is the time of the last frame."""
     message = wire.Snapshot(
         sequence=steps // SNAPSHOT_EVERY - 1, t_ns=t_ns, step=steps - 1, layout=LAYOUT_ID, memory=memory.tobytes()
     )

@@ -1,4 +1,4 @@
-"""The vibration as the accelerometer of the base measures it: the delivered v_a."""
+"""The delivered v_a, measured by the accelerometer of the base."""
 
 import math
 
@@ -12,8 +12,8 @@ TWO_PI = 2.0 * math.pi
 def _fit(samples: Record, step_rad: float, start_rad: float) -> tuple[float, float]:
     """Fit a cos + b sin at one frequency to `samples` by least squares; return a and b.
 
-    The fit is exact for a pure sine over any share of a period, where a plain correlation leaks. The angle is turned from
-    sample to sample: two sines a block instead of forty, as the sines set the speed of a replay.
+    The fit is exact for a pure sine over any share of a period, unlike a plain correlation. The angle is rotated from sample to
+    sample: two sines a block instead of forty, as they limit the speed of a replay.
     """
     c, sn = math.cos(start_rad), math.sin(start_rad)
     turn_c, turn_sn = math.cos(step_rad), math.sin(step_rad)
@@ -57,7 +57,7 @@ def measure(p: ControllerParams, s: ControllerMemory, base_accel_mps2: Record) -
 
 @kernel
 def _velocity(p: ControllerParams, frequency_Hz: float, in_phase_mps2: float, quadrature_mps2: float) -> float:
-    """v_a of an acceleration, with the accelerometer's roll-off undone."""
+    """v_a of an acceleration, corrected for the accelerometer's roll-off."""
     rolled_off = frequency_Hz / p.accel_bandwidth_Hz
     amplitude_mps2 = math.sqrt(in_phase_mps2 * in_phase_mps2 + quadrature_mps2 * quadrature_mps2)
     return amplitude_mps2 * math.sqrt(1.0 + rolled_off * rolled_off) / (TWO_PI * frequency_Hz)
@@ -65,12 +65,12 @@ def _velocity(p: ControllerParams, frequency_Hz: float, in_phase_mps2: float, qu
 
 @kernel
 def velocity_of(p: ControllerParams, frequency_Hz: float, samples: Record) -> float:
-    """v_a of one block of an accelerometer [m/s], by itself."""
+    """v_a of a single block of an accelerometer [m/s]."""
     a, b = _fit(samples, TWO_PI * frequency_Hz * p.sample_s, 0.0)
     return _velocity(p, frequency_Hz, a, b)
 
 
 @kernel
 def skip(p: ControllerParams, s: ControllerMemory, blocks: int) -> None:
-    """Turn the demodulator's phase through lost blocks, during which the exciter went on."""
+    """Advance the demodulator's phase over lost blocks, during which the exciter continued."""
     s.phase_rad = (s.phase_rad + TWO_PI * s.allowed_Hz * p.block_s * blocks) % TWO_PI

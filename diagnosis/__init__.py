@@ -1,22 +1,22 @@
 """From an evidence folder to the place and the cause of the gap between rig and model.
 
-diagnose        the whole way, in order             result      the answer and its JSON
-diagnose_many   many folders, on cores or Dask      processes   the same work in any number of processes
+diagnose        all steps of a diagnosis, in order  result      the answer and its JSON
+diagnose_many   many folders, on cores or Dask      processes   one function on many items, in several processes
 version         the version of a result: a hash over the definitions that make a diagnosis
 slips           turning points of a record, and the slips of a force record
 
 The packages, each built on those before it:
 
-look/           stick-slip of one measured record at a glance
+look/           slips and friction numbers of one measured record
 evidence/       a folder of measured runs, read strictly
 features/       a run as numbers that do not depend on the instants of its slips
 model/          prediction of one run under the commands of that run, as its sensors would show it
 synthetic/      evidence made from the plant
 gap/            measured features against predicted features, in noise floors
-relations/      relations between channels as regressions over all samples, without a simulation; shares of their causes
-latent/         latent friction: shares of place, direction, time, speed and load in the friction, by one mixed model
+relations/      relations between channels as regressions over all samples, without a simulation; share of each cause
+latent/         latent friction: shares of place, direction, time, speed and load in the friction, from a mixed model
 hypotheses/     nuisances, effects in every form, and the points where their fits start
-fits/           refits: one, many at once, the search over all
+fits/           refits: a single fit, many at once, the search over all effects
 pictures/       measured and predicted curves; residuals over the variable that explains them
 verdict/        whether there is a gap, which effect closes it, how sure that is, and the check on held-out runs
 experiments/    the next run to measure, and checks by hand

@@ -1,4 +1,4 @@
-"""The whole way from an evidence to a diagnosis.
+"""All steps from an evidence to a diagnosis, in order.
 
 Search the relations between channels, fit the baseline, look for a gap, find the effects, check them on held-out runs and against
 the relations, put the answer together.
@@ -91,12 +91,12 @@ def _diagnosed(evidence: Evidence, progress: Progress, jobs: int, budget_s: floa
 
 
 def _by_fits(
-    whole: Evidence, seen: _Seen, progress: Progress, jobs: int, time_s: tuple[float, float]
+    full: Evidence, seen: _Seen, progress: Progress, jobs: int, time_s: tuple[float, float]
 ) -> Diagnosis | None:
-    """The diagnosis by simulated fits, begun at the first and ended by the second of `time_s`; None where no fit ends in time."""
+    """The diagnosis by simulated fits; `time_s`: instants of its begin and its deadline. None where no fit ends in time."""
     began, until_s = time_s
-    evidence = excerpt(whole)
-    runs = seen.runs if evidence is whole else prepare(evidence)
+    evidence = excerpt(full)
+    runs = seen.runs if evidence is full else prepare(evidence)
     problem = Problem(evidence.rig, [run for run in runs if not run.holdout])
     problem.until_s = began + _FOR_FITS * (until_s - began)
     hidden = set(cannot_show(evidence.rig, runs, evidence.assumed)) | ruled_out(seen.relations, seen.decision)
@@ -135,7 +135,7 @@ def _by_fits(
 
 
 def _closed(held_out: HeldOut | None, fit: Fit | None) -> float | None:
-    """Share of the held-out gap that a fit closes; None where that is not known."""
+    """Share of the held-out gap that a fit closes; None without held-out runs or time."""
     if held_out is None or fit is None:
         return None
     with suppress(OutOfTimeError):
@@ -149,12 +149,12 @@ def _known(seen: _Seen) -> Hints:
 
 
 def with_vibration_findings(verdict: Verdict, runs: Sequence[MeasuredRun]) -> Verdict:
-    """The verdict in view of vibration that no model makes: in the force signal, or of the base at other frequencies.
+    """The verdict, corrected for vibration that the model lacks: in the force signal, or of the base at other frequencies.
 
     With such a vibration, "no gap" becomes "unexplained"; with a base at other frequencies, so does an effect of the piezo alone.
 
     Args:
-        verdict: from the features, which do not show such vibration.
+        verdict: verdict from the features, which do not show such vibration.
         runs: all runs of the evidence.
 
     """

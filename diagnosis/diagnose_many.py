@@ -28,9 +28,9 @@ from diagnosis.result import Diagnosis
 
 Progress = Callable[[str, float], None]
 Diagnose = Callable[[Evidence, Progress, int], Diagnosis]
-# For joblib's tracker process: it removes the folders of a worker that was ended at work, and warns of each.
+# Silences joblib's tracker process, which removes the folders of each killed worker and warns of each.
 _NO_WARNING = "ignore:resource_tracker:UserWarning"
-_CLUSTER_WAIT_S = 5  # time for the scheduler to answer, and again for a first worker; too short fails on a busy network
+_CLUSTER_WAIT_S = 5  # timeout for the scheduler, and again for its first worker; too short fails on a busy network
 
 
 class EvidenceFolder(NamedTuple):
@@ -43,7 +43,7 @@ class EvidenceFolder(NamedTuple):
 class FolderFault(NamedTuple):
     """Why a folder has no diagnosis."""
 
-    fault: str  # code
+    fault: str  # code of the fault
     line: str
 
 
@@ -96,8 +96,8 @@ def diagnose_many(
 ) -> Generator[FolderResult]:
     """Yield the result of every source, in the order in which they finish.
 
-    A folder has one process. If the last folders are at most half as many as the processes, they start when all others are
-    done, and share the processes: two folders on eight processes have four each.
+    Each folder has one process. If the last folders are at most half as many as the processes, they start when all others are
+    done and share the processes: two folders on eight processes have four each.
 
     A folder that cannot be diagnosed, or that kills its worker again and again, yields a fault and stops no other folder. Closing
     the generator, or Ctrl-C, ends the local workers; a cluster drops the folders that it has not begun.
@@ -109,14 +109,14 @@ def diagnose_many(
         jobs: processes on this computer; without effect with `cluster`.
         cluster: address of a Dask scheduler; empty: none.
         diagnose: a function at the top level of a module, so that it can be sent to a worker.
-        certs: folder of the certificates for a cluster at tls://; empty: the user's own.
-        shared: whether last folders share the processes; else each has one, as where times are compared.
+        certs: folder of the certificates for a cluster at tls://; empty: the user's default folder.
+        shared: whether the last folders share the processes; False: one process each, so that times are comparable.
 
     """
     waiting = list(sources)
     with _workers(jobs, cluster, certs) as workers:
         last = len(waiting) % workers.cores
-        if not shared or 2 * last > workers.cores:  # one process each is all that they could have
+        if not shared or 2 * last > workers.cores:  # there are not two processes for each
             last = 0
         first = len(waiting) - last
         yield from _several(waiting[:first], _Task(diagnose, 1, workers.inner), workers)
@@ -128,8 +128,8 @@ class _Task(NamedTuple):
     """How a worker diagnoses a folder."""
 
     diagnose: Diagnose
-    jobs: int  # for one folder
-    inner: dict[str, Any]  # for joblib's `parallel_config`, where there are several jobs
+    jobs: int  # processes for each folder
+    inner: dict[str, Any]  # arguments of joblib's `parallel_config`, where there are several jobs
 
 
 def _several(sources: list[EvidenceFolder], task: _Task, workers: "_Workers") -> Generator[FolderResult]:
@@ -142,7 +142,7 @@ def _several(sources: list[EvidenceFolder], task: _Task, workers: "_Workers") ->
                 del waiting[outcome.source.name]
                 yield outcome
         except workers.breakdowns:
-            # The folder that killed its worker is not known: all folders that may have been under way are repeated, one by one.
+            # It is not known which folder killed its worker: all folders that may have been running are repeated, one by one.
             for source in list(waiting.values())[: workers.dispatched]:
                 yield _alone(source, task, workers)
                 del waiting[source.name]
@@ -181,15 +181,15 @@ def _died(source: EvidenceFolder, error: Exception) -> FolderResult:
 class _Workers(NamedTuple):
     """A pool of workers, local or on a cluster."""
 
-    pool: Callable[[int], Any]  # a joblib.Parallel with at most this number of tasks under way
+    pool: Callable[[int], Any]  # makes a joblib.Parallel; argument: largest number of dispatched tasks
     cores: int
-    dispatched: int  # largest useful number of tasks under way
-    inner: dict[str, Any]  # of `_Task`
-    breakdowns: tuple[type[Exception], ...]  # the exceptions that are raised when a worker has died for good
+    dispatched: int  # largest useful number of dispatched tasks
+    inner: dict[str, Any]  # `_Task.inner` for several jobs a folder
+    breakdowns: tuple[type[Exception], ...]  # exceptions that report a dead worker
 
 
 def _cluster_security(cluster: str, certs: str) -> Any:
-    """Dask's `Security` for a scheduler at tls://; None for one of this computer alone.
+    """Dask's `Security` for a scheduler at tls://; None for a scheduler that only this computer can reach.
 
     A scheduler, or an attacker on the network between it and this computer, can run code on both. Raises Fault NOT_SECURE for
     any other address.
@@ -251,17 +251,17 @@ def _workers(jobs: int, cluster: str, certs: str) -> Generator[_Workers]:
             return _pool({"backend": Cluster(client=client, wait_for_workers_timeout=_CLUSTER_WAIT_S)}, dispatched)
 
         cores = sum(client.ncores().values())
-        # nothing inside a worker, where joblib spreads over the workers of the cluster; TimeoutError: not one worker is left
+        # inner is empty: inside a worker joblib uses the workers of the cluster; TimeoutError: all workers are lost
         yield _Workers(pool, cores, 2 * cores, {}, (KilledWorker, TimeoutError))
 
 
 def _pool(config: dict[str, Any], dispatched: int) -> Any:
-    # one task in a batch: a task takes seconds, and every task in the batch of a dead worker is done again
+    # one task in a batch: a task takes seconds, and all tasks in the batch of a dead worker are repeated
     with parallel_config(**config):
         return Parallel(return_as="generator_unordered", batch_size=cast(Any, 1), pre_dispatch=cast(Any, dispatched))
 
 
 def _leave_interrupt_to_parent() -> None:
-    """Let a worker ignore Ctrl-C, which reaches every process of the terminal; the parent ends its workers."""
+    """Make a worker ignore Ctrl-C, which reaches every process of the terminal; the parent ends its workers."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.SIG_IGN)

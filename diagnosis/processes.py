@@ -1,4 +1,4 @@
-"""The same work on many items, in several processes; the result does not depend on the number of processes."""
+"""One function on many items, in several processes; the result does not depend on the number of processes."""
 
 from collections.abc import Callable, Sequence
 from typing import TypeVar
@@ -14,7 +14,7 @@ R = TypeVar("R")
 def one_thread() -> threadpool_limits:
     """A context in which linear algebra has one thread.
 
-    More threads add in another order, and a fit amplifies a change in the last bit (docs/method/diagnosis.md).
+    Several threads add in another order, and a fit amplifies a change in the last bit (docs/method/diagnosis.md).
     """
     return threadpool_limits(limits=1)
 

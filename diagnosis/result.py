@@ -13,7 +13,7 @@ PARAMETERS = "parameters alone"  # the baseline in the comparison on the held-ou
 
 
 def _name(file: str) -> str:
-    """The file of a run, relative to the evidence folder, without its suffix."""
+    """Name of a run: its file, relative to the evidence folder, without the suffix."""
     return str(PurePath(file).with_suffix(""))
 
 
@@ -36,18 +36,18 @@ class Candidate(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """One place where the gap lies; the shares of all cells add up to 1."""
+    """Share of the gap in one signal, regime, band and run; the shares of all cells add up to 1."""
 
     signal: str
     regime: str  # stick, breakaway, slip, restick, steady
     band_Hz: tuple[float, float]
     file: str  # data file of the run
-    share: float
+    share: float  # share of the gap
     JSON_HIDDEN = ("file",)
 
     @in_json
     def run(self) -> str:
-        """The run goes by the name of its file without the suffix."""
+        """Name of the run: its file without the suffix."""
         return _name(self.file)
 
 
@@ -68,8 +68,8 @@ class Gap(NamedTuple):
 
     definition: str
     files: tuple[str, ...] = ()  # data files of the held-out runs
-    nominal: float = math.nan  # of the rig as described
-    retuned: float = math.nan  # of the baseline
+    nominal: float = math.nan  # gap of the rig as described
+    retuned: float = math.nan  # gap of the baseline
     with_effect: float = math.nan
     floor: float = 1.0
     shrinkage: float | None = None
@@ -85,7 +85,7 @@ class Gap(NamedTuple):
 
 
 class RigNumber(NamedTuple):
-    """A number of the rig table: as described, and refitted within its tolerance."""
+    """A number of the rig table: the described value, and the value refitted within its tolerance."""
 
     name: str
     described: float
@@ -98,11 +98,11 @@ class Experiment(NamedTuple):
 
     what: str
     why: str
-    gain: float | None  # distance of the leading candidates after it, in standard deviations
+    gain: float | None  # distance of the leading candidates after the experiment, in standard deviations
 
 
 class Curve(NamedTuple):
-    """A line or a cloud of a picture."""
+    """A line or a point cloud of a picture."""
 
     label: str
     x: Floats
@@ -121,13 +121,13 @@ class Picture(NamedTuple):
 
 
 class Share(NamedTuple):
-    """Share of a relation's residual on the held-out runs: the mean square that the baseline leaves there is 1."""
+    """Share of a relation's residual on the held-out runs; 1 is the mean square that the baseline leaves."""
 
     signal: str  # spring relation, motion relation, drive relation, exciter, base
     what: str  # a cause, "noise" or "unexplained"
     share: float
     interval_90: tuple[float, float] | None  # None for noise
-    # share that the same noise without that cause stays below in 9 of 10 draws; None for noise and unexplained
+    # share that noise alone, without the cause, stays below in 9 of 10 draws; None for noise and unexplained
     null_90: float | None
 
     @property
@@ -139,11 +139,11 @@ class Share(NamedTuple):
 class Remainder(NamedTuple):
     """The largest residual that no known cause explains."""
 
-    share: float | None  # of that relation on the held-out runs; None without such runs
+    share: float | None  # share of the relation's residual on the held-out runs; None without such runs
     where: str  # the relation
     what: str  # the variable that it depends on, or "in bursts"; empty without a pattern
-    size: float  # rms
-    noise: float  # rms
+    size: float  # rms of the residual
+    noise: float  # rms of the noise
     unit: str
 
 
@@ -160,14 +160,14 @@ class RelationRow(NamedTuple):
 
 
 class LeftOut(NamedTuple):
-    """A relation that the channels do not allow."""
+    """A relation that cannot be computed from the channels, and the reason."""
 
     relation: str
     why: str
 
 
 class RelationNumber(NamedTuple):
-    """A number of the rig table as one relation alone shows it."""
+    """A number of the rig table, fitted by one relation alone."""
 
     name: str
     relation: str
@@ -202,5 +202,5 @@ class Diagnosis(NamedTuple):
 
     @in_json
     def format(self) -> Literal["diagnosis/2"]:
-        """The contract that the JSON keeps."""
+        """Name and version of the JSON format."""
         return FORMAT

@@ -16,8 +16,8 @@ from bridge.log.watches.arrays import median, noise_of
 # Smallest slip, in standard deviations of the noise. Too small: noise counts as slips; too large: small slips are lost.
 # White noise spans 8 to 9 standard deviations over 10^5 samples.
 NOISE_SPANS = 10.0
-_PIECE = 32  # samples that are reduced to two where the values turn once at most; 16 and 64 are slower
-# Seconds over which samples are averaged first. Too small: noise; too large: the peaks of a slip are cut.
+_PIECE = 32  # samples of a piece that is reduced to two samples if it turns at most once; 16 and 64 are slower
+# Width over which samples are averaged first [s]. Too small: noise; too large: the peaks of a slip are cut.
 # A slip of the paper's rig lasts pi sqrt(m / k_d) = 36 ms and its peaks are round: 1 ms cuts them by less than 3 mN and
 # reduces noise of 20 mN rms at 20 kHz to 4.5 mN.
 _BIN_S = 1e-3
@@ -29,33 +29,33 @@ def turns(values: Any, drop: float, at: Any) -> int:
     """Find maxima and minima that alternate and differ by at least `drop`; the first is a maximum.
 
     Args:
-        values: of the record, [samples]; a list, which plain Python reads faster, or an array, where this function is compiled.
-        drop: in the unit of the values.
+        values: the record, [samples]: a list, which plain Python reads faster, or an array where this function is compiled.
+        drop: smallest difference, in the unit of the values.
         at: filled with the indices of the turning points, [samples].
 
-    Returns how many there are.
+    Returns their number.
 
     """
     count = 0
     sign = 1.0  # while the values rise
-    extreme, place = -math.inf, 0
+    extreme, extreme_at = -math.inf, 0
     for i in range(len(values)):
         value = sign * values[i]
         if value > extreme:
-            extreme, place = value, i
+            extreme, extreme_at = value, i
         elif value < extreme - drop:
-            at[count] = place
+            at[count] = extreme_at
             count += 1
             sign = -sign
-            extreme, place = -value, i
+            extreme, extreme_at = -value, i
     return count
 
 
 def turning_points(values: Floats, drop: float) -> Indices:
     """Indices of the turning points that `turns` finds.
 
-    Takes a seventh of the time of `turns` for 10 min at 10 kHz, and no compiler, whose import takes 0.3 s. A piece whose values
-    differ by `drop` at most turns once at most, so its largest and its smallest value replace it.
+    Takes a seventh of the time of uncompiled `turns` for 10 min at 10 kHz; the import of the compiler would take 0.3 s. A piece
+    whose values differ by at most `drop` turns at most once, so its largest and its smallest value replace it.
     """
     pieces = values[: len(values) // _PIECE * _PIECE].reshape(-1, _PIECE)
     high, low = pieces.max(axis=1), pieces.min(axis=1)
@@ -75,7 +75,7 @@ class Cycles(NamedTuple):
     """The slips of a record, in time order; arrays of [slips].
 
     The re-sticks are one fewer when the record ends inside a slip. A breakaway is the local maximum of the
-    drive force before the fall, a re-stick the minimum that ends it.
+    drive force before the fall, a re-stick the minimum at the end of the fall.
     """
 
     breakaway_t_s: Floats
@@ -85,7 +85,7 @@ class Cycles(NamedTuple):
 
     @property
     def slips(self) -> int:
-        """How many slips began."""
+        """Number of slips that began."""
         return len(self.breakaway_t_s)
 
     @property
@@ -112,7 +112,7 @@ class Cycles(NamedTuple):
 
     @property
     def stick_s(self) -> float:
-        """Mean time from a re-stick to the next breakaway; nan without such a pair."""
+        """Mean time from a re-stick to the next breakaway; nan without a finished stick."""
         following = np.searchsorted(self.breakaway_t_s, self.restick_t_s)
         ended = following < self.slips
         if not ended.any():
@@ -120,7 +120,7 @@ class Cycles(NamedTuple):
         return float((self.breakaway_t_s[following[ended]] - self.restick_t_s[ended]).mean())
 
     def kept(self, slips: Bools, resticks: Bools | None = None) -> "Cycles":
-        """Some slips, each with its re-stick; or with the marked re-sticks."""
+        """The marked slips, with their re-sticks or with the re-sticks marked in `resticks`."""
         resticks = slips[: len(self.restick_t_s)] if resticks is None else resticks
         return Cycles(
             self.breakaway_t_s[slips],
@@ -130,12 +130,12 @@ class Cycles(NamedTuple):
         )
 
     def between(self, from_s: float, to_s: float) -> "Cycles":
-        """The breakaways and the re-sticks that lie in [from_s, to_s), each judged by its own time."""
+        """The breakaways in [from_s, to_s), and the re-sticks in [from_s, to_s)."""
         return self.kept(*((at_s >= from_s) & (at_s < to_s) for at_s in (self.breakaway_t_s, self.restick_t_s)))
 
 
 def joined(cycles: Iterable[Cycles]) -> Cycles:
-    """The slips of several stretches of a record in one."""
+    """The slips of several stretches of a record, concatenated."""
     columns = zip(Cycles(*[np.empty(0)] * 4), *cycles, strict=True)
     return Cycles(*(np.concatenate(parts) for parts in columns))
 
@@ -181,8 +181,8 @@ def _binned(t_s: Floats, force_N: Floats) -> tuple[Floats, Floats]:
     if len(t_s) < 2:
         return t_s, force_N
     width = max(1, round(_BIN_S * (len(t_s) - 1) / float(t_s[-1] - t_s[0])))
-    whole = len(t_s) // width * width
-    return t_s[:whole].reshape(-1, width).mean(axis=1), force_N[:whole].reshape(-1, width).mean(axis=1)
+    kept = len(t_s) // width * width
+    return t_s[:kept].reshape(-1, width).mean(axis=1), force_N[:kept].reshape(-1, width).mean(axis=1)
 
 
 def _smallest_drop_N(force_N: Floats) -> float:

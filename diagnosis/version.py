@@ -13,9 +13,9 @@ from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-# without bridge: its own tests check how files are read, and the golden logs check the bits of compiled kernels
+# without bridge: its unit tests check how files are read, and the golden logs check the bits of compiled kernels
 JUDGED = ("plant", "diagnosis")
-# scoring, the words and pictures of a finished answer, and the plant as a process
+# the version itself, texts and pictures of a finished answer, and the plant as a process
 NOT_JUDGED = ("diagnosis/version.py", "diagnosis/report", "diagnosis/pictures", "plant/app.py", "plant/node.py")
 # fields of a row of `diagnosis.hypotheses.catalogue` that only texts and pictures use
 _NOT_JUDGED_KEYWORDS = {"words", "shown_by", "shown_twice"}
@@ -23,9 +23,9 @@ _NOT_JUDGED_KEYWORDS = {"words", "shown_by", "shown_twice"}
 
 @functools.cache
 def tool_version(*further: str) -> str:
-    """Version of the package with a hash over all that makes a diagnosis, and over `further` folders below the root.
+    """Version of the package with a hash over all definitions that make a diagnosis, and over `further` folders below the root.
 
-    The sources are read at the first call: a process has loaded its code by then.
+    The sources are read at the first call, when the process has loaded its code.
     """
     try:
         number = version("stickslip")

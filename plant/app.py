@@ -29,9 +29,9 @@ from plant.faults.table import FaultTable
 from plant.node import PlantNode
 
 _ANSWER_TIMEOUT_S = 5.0  # lockstep: longest wait for the command that answers a block
-_GOODBYE_S = 3.0  # longest wait for the other processes to leave the bus
+_GOODBYE_S = 3.0  # longest wait of the ended plant for the other processes to leave the bus
 _ROUND_TRIPS_KEPT = 1024  # blocks whose time of sending is kept; answers to older blocks have no round trip
-_LONGEST_FADE_BLOCKS = 1000  # an exciter that is not at rest within them never will be
+_LONGEST_FADE_BLOCKS = 1000  # longest wait for the exciter to come to rest
 _LATE_NS = 1_000_000  # round trip beyond which a command counts as late
 _PAUSE_NS = 250_000_000  # delay of a due block from which this process counts as stalled
 
@@ -54,16 +54,16 @@ def run(
 
     Args:
         arm: start ARMED, if the scenario of a simulated rig demands it.
-        latch: keeps the operator's stop over restarts; None: not kept, as in a run of `stickslip run`.
+        latch: keeps the operator's stop over restarts; None: the stop ends with the process, as in `stickslip run`.
         faults: injected into the rig and its bus.
-        tell: reports the state of this process and important events to the operator.
+        report: reports the state of this process and important events to the operator.
 
     Raises Fault ENDPOINT_BUSY, NO_PEER, NOT_SECURE, PEER_DIED, LOCKSTEP_STALLED.
 
     """
-    why_not = latch.can_be_set() if latch is not None else ""
+    latch_problem = latch.can_be_set() if latch is not None else ""
     run_number = 1 if lockstep else secrets.randbits(63) | 1  # in lockstep the same run gives the same log
-    node = PlantNode(rig, seed, run_number, arm and not why_not, latch is not None and latch.is_set, faults)
+    node = PlantNode(rig, seed, run_number, arm and not latch_problem, latch is not None and latch.is_set, faults)
     kept = None if latch is None else KeptGain(rig.name, node.check_tones_Hz)
     if kept is not None:
         node.accept_gain(kept.load())
@@ -72,10 +72,10 @@ def run(
     with Bus(bus_config, "plant", lockstep) as bus:
         bus.serve_header(header)
         process = PlantProcess(node, bus, latch, report, kept)
-        # before the other processes see this one: claimed later, the link may lapse on busy cores (docs/method/rig.md)
+        # Claimed before the other processes see this one: later, their link may lapse on busy cores (docs/method/rig.md).
         if lockstep:
             realtime.claim(realtime.core(bus_config.port), realtime.LOCKSTEP_PRIORITY)
-            granted = "lockstep"  # the same text everywhere: the same run gives the same log
+            granted = "lockstep"  # a text without the computer's settings: the same run gives the same log
         else:
             granted = realtime.claim(realtime.core(0))
         bus.announce()
@@ -87,9 +87,9 @@ def run(
         process.event("START", granted)
         how_long = f"for {duration_s:g} s" if duration_s > 0 else "until Ctrl-C"
         report("running", f"rig {rig.name} at {bus_config.endpoint}, {how_long}; {granted}")
-        if why_not:
+        if latch_problem:
             process.event(
-                "STATE_FOLDER", f"{why_not}: a stop cannot be kept over a restart, so the rig starts disarmed"
+                "STATE_FOLDER", f"{latch_problem}: a stop cannot be kept over a restart, so the rig starts disarmed"
             )
         if wide := wider(rig.guard):
             process.event("WIDE_LIMITS", wide)
@@ -157,7 +157,7 @@ class PlantProcess:
         bus.listen(FAULT, self._fault_orders.push)
 
     def _receive(self, received: Received) -> None:
-        # the faults of the bus act on them first, in the loop
+        # while a bus fault acts, the loop passes the commands through it first
         (self._on_the_way.append if self._node.faults.on_the_bus else self._commands.push)(received)
         self._answers.push(received)
 
@@ -171,7 +171,7 @@ class PlantProcess:
             self._report_step(code, text)
 
     def end(self) -> None:
-        """Publish END, and leave the bus as a rig: only both together end the other processes."""
+        """Publish END and withdraw the rig's liveliness token; the other processes end once they see both."""
         self._complaints.report_when_due(all_of_it=True)
         self._report_stall()
         self.event("END", f"blocks={self._node.block}")
@@ -253,8 +253,8 @@ class PlantProcess:
                 self._accepted_gain = self._node.accepted_gain
                 threading.Thread(target=self._keep_gain, args=(self._kept, self._accepted_gain), name="gain").start()
         if refused := int(applied.commands_refused):
-            text = "of another run, or not newer than the last: refused; does a controller of an earlier run still run?"
-            self._complaints.note(FOREIGN, f"{COMMAND.name} of another run", text, refused)
+            text = "refused; does a controller of an earlier run still run?"
+            self._complaints.note(FOREIGN, f"{COMMAND.name} of another run, or not newer than the last", text, refused)
 
     def realtime(self, blocks: int, stop: threading.Event) -> None:
         """Advance one block per period under the newest command; on every exit the vibration fades to zero first."""
@@ -303,7 +303,7 @@ class PlantProcess:
 
     def _report_stall(self) -> None:
         if self._paused_ns:
-            text = f"this rig stalled for {self._paused_ns * 1e-9:.2f} s; the blocks that were due followed at once"
+            text = f"this rig stalled for {self._paused_ns * 1e-9:.2f} s; its overdue blocks followed at once"
             self.event("PAUSED", text)
             self._paused_ns = 0
 

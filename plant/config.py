@@ -18,7 +18,7 @@ NotPositive = Annotated[float, Field(le=0)]
 # Fewest solver steps in a period of the vibration, and of the slide on its spring. Smaller: false slips and wrong peaks of the
 # force. Larger: sound rigs are refused. Counted: docs/method/rig.md.
 _FEWEST_STEPS_A_PERIOD = 20
-MOST_BLOCKS_AHEAD = 63  # of an announcement: one per block and the present one fill the controller's ring of 64
+MOST_BLOCKS_AHEAD = 63  # longest lead of an announcement: with the present block it fills the controller's ring of 64
 # Most solver steps in a block. A step takes 0.04 to 0.06 us (measured with steps of 0.1 us, two rigs): this many take 50 ms, 50
 # times a block of 1 ms. Larger: a run seems to hang, in a kernel that Ctrl-C does not interrupt.
 _MOST_STEPS_A_BLOCK = 1_000_000
@@ -40,14 +40,16 @@ class ContactConfig(Strict):
     )
     backbone: Literal["lugre", "elasto-plastic"] = "lugre"
     elastic_ratio: Annotated[float, Field(ge=0, lt=1)] = Field(
-        default=0.7, description="Of the elasto-plastic backbone: elastic up to this share of its reach."
+        default=0.7, description="Elasto-plastic backbone: purely elastic up to this share of its largest deflection."
     )
     roughness_ratio: Annotated[float, Field(ge=0, le=0.3)] = Field(
         default=0.0, description="Rough surface: rms scatter of friction along the track, over the mean."
     )
-    roughness_length_m: Positive = Field(default=2e-4, description="Rough surface: length of one value.")
+    roughness_length_m: Positive = Field(
+        default=2e-4, description="Rough surface: distance between two values of the friction."
+    )
     roughness_seed: Annotated[int, Field(ge=0, le=1_000_000)] = Field(
-        default=0, description="Rough surface: which track."
+        default=0, description="Rough surface: seed of the random track."
     )
 
     @model_validator(mode="before")
@@ -134,11 +136,11 @@ class LoopConfig(Strict):
 
     delay_s: Annotated[float, Field(ge=0, le=LONGEST_DELAY_S)] = Field(
         default=0.0,
-        description="Time that a command takes besides, in whole blocks, rounded up; 0: it acts in the next block.",
+        description="Additional delay of each command, rounded up to whole blocks; 0: it acts in the next block.",
     )
     jitter_s: Annotated[float, Field(ge=0, le=LONGEST_JITTER_S)] = Field(
         default=0.0,
-        description="Up to so much more, drawn evenly for each command; commands do not overtake each other.",
+        description="Largest random addition to delay_s, uniform; commands do not overtake each other.",
     )
 
     def longest_s(self, block_s: float) -> float:
@@ -160,7 +162,7 @@ class RigConfig(Strict):
     guard: GuardConfig = GuardConfig()
     effects: dict[str, dict[str, float | str]] = Field(default={}, description="[effects.NAME]; none: the ideal rig.")
 
-    # before pydantic, which gives two errors for a value that is neither a number nor a word
+    # checked before pydantic, which gives two errors for a value that is neither a number nor a string
     @model_validator(mode="before")
     @classmethod
     def _effects_are_known(cls, table: Any) -> Any:
@@ -231,7 +233,7 @@ class RigConfig(Strict):
     @model_validator(mode="after")
     def _drive_is_not_too_stiff(self) -> "RigConfig":
         # Nothing damps the slide on its spring, so too few steps a period change the peaks of the force (docs/method/rig.md).
-        k_d, ratio = self.drive.stiffness_N_per_m, self._of("drive-stiffness", "ratio")
+        k_d, ratio = self.drive.stiffness_N_per_m, self._value("drive-stiffness", "ratio")
         per_step = 2.0 * math.pi / _FEWEST_STEPS_A_PERIOD
         stiffest = self.slide.mass_kg * (per_step / self.solver.step_s) ** 2 / (1.0 + ratio)
         if k_d > stiffest:
@@ -244,7 +246,7 @@ class RigConfig(Strict):
             )
         return self
 
-    def _of(self, effect: str, key: str) -> float:
+    def _value(self, effect: str, key: str) -> float:
         """A parameter of an effect; 0 for a rig without the effect."""
         return float(self.effects.get(effect, {}).get(key, 0.0))
 
@@ -263,7 +265,7 @@ class RigConfig(Strict):
         if ratio * growth >= 1.0:
             raise ValueError(
                 f"effects.static-friction-ageing.rested_s = {rested_s:g}: with ratio = {ratio:g} the contact would have gained "
-                f"{ratio * growth:.3g} times its static force by then; must be below 1, or none is left of it at an age of 0; "
+                f"{ratio * growth:.3g} times its static force by then; must be below 1, or no static force is left at age 0; "
                 "lower one of the two"
             )
         return self
@@ -272,14 +274,15 @@ class RigConfig(Strict):
     def _effects_fit(self) -> "RigConfig":
         solver = self.solver
         longest_s = LONGEST_DELAY * solver.block_s / solver.samples_per_block
-        delay_s = self._of("force-sensor-delay", "delay_s")
+        delay_s = self._value("force-sensor-delay", "delay_s")
         if delay_s > longest_s * (1.0 + 1e-9):
             raise ValueError(
                 f"effects.force-sensor-delay.delay_s = {delay_s:g}: must not be above {LONGEST_DELAY} samples, here "
                 f"{longest_s:g}; shorten it or lower solver.samples_per_block"
             )
         base = "base-compliance"
-        compliance_m_per_N, frequency_Hz = self._of(base, "compliance_m_per_N"), self._of(base, "frequency_Hz")
+        compliance_m_per_N = self._value(base, "compliance_m_per_N")
+        frequency_Hz = self._value(base, "frequency_Hz")
         per_kg = compliance_m_per_N * (2.0 * math.pi * frequency_Hz) ** 2
         # the bristle between two masses is stable up to four times this
         lightest_kg = self.contact.stiffness_N_per_m * solver.step_s**2
@@ -289,12 +292,13 @@ class RigConfig(Strict):
                 f"{compliance_m_per_N:g} the base weighs {1.0 / per_kg:.2g} kg, 1 / (compliance (2 pi f)^2); must be at least "
                 f"{lightest_kg:.2g} kg with solver.step_s = {solver.step_s:g}; lower one of the three"
             )
-        ratio, frequency_Hz = self._of("frame-compliance", "ratio"), self._of("frame-compliance", "frequency_Hz")
+        ratio = self._value("frame-compliance", "ratio")
+        frequency_Hz = self._value("frame-compliance", "frequency_Hz")
         # sum of two stiffnesses over the frame's stiffness: the drive's spring, and the spring in series with a relaxing damper
         stiffer = ratio
-        if relaxation_s := self._of("drive-damping", "relaxation_s"):
-            k_d = self.drive.stiffness_N_per_m * (1.0 + self._of("drive-stiffness", "ratio"))
-            stiffer += ratio * self._of("drive-damping", "damping_Ns_per_m") / (relaxation_s * k_d)
+        if relaxation_s := self._value("drive-damping", "relaxation_s"):
+            k_d = self.drive.stiffness_N_per_m * (1.0 + self._value("drive-stiffness", "ratio"))
+            stiffer += ratio * self._value("drive-damping", "damping_Ns_per_m") / (relaxation_s * k_d)
         highest_Hz = 1.0 / (2.0 * math.pi * solver.step_s * math.sqrt(1.0 + stiffer))
         if frequency_Hz > highest_Hz:  # half of the frequency at which the frame's leapfrog becomes unstable
             raise ValueError(

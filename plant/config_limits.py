@@ -7,8 +7,8 @@ import numpy as np
 from plant.config import RigConfig
 from plant.records import build
 
-# Largest h_t dt / m. Too large: the step throws a vibrated slide (4.3: threefold velocity; 2.15: mean force off by 0.6 %).
-# Too small: sound rigs are refused. Counted: docs/method/rig.md.
+# Largest h_t dt / m. Larger: the solver step accelerates a vibrated slide falsely (4.3: threefold velocity; 2.15: mean force off
+# by 0.6 %). Smaller: sound rigs are refused. Counted: docs/method/rig.md.
 _MOST_DAMPING = 2.0
 # v / v_s at which the Stribeck curve is checked; beyond the last one the curve only approaches the Coulomb force
 _VELOCITY_RATIOS = np.linspace(0.0, 10.0, 2001)
@@ -28,7 +28,7 @@ def _contact_damping(rig: RigConfig) -> None:
     if damping > most:
         raise ValueError(
             f"contact.damping_Ns_per_m = {damping:g}: must be at most {_MOST_DAMPING:g} x slide.mass_kg / solver.step_s, here "
-            f"{most:.3g} N s/m, or the bristle's damper throws a vibrated slide; lower it (2 sqrt(stiffness x mass) is "
+            f"{most:.3g} N s/m, or a vibrated slide moves falsely; lower it (2 sqrt(stiffness x mass) is "
             f"{2.0 * math.sqrt(rig.contact.stiffness_N_per_m * mass_kg):.3g}), or shorten solver.step_s to "
             f"{_MOST_DAMPING * mass_kg / damping:.2g} or less"
         )

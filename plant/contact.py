@@ -2,7 +2,7 @@
 
 The method is a leapfrog: x and z are known half a step before v. The bristle's equation z' = v_r - k_t |v_r| z / g(v_r) is
 solved exactly over the step for a held v_r, so it stays stable however large k_t |v_r| dt / g is (1.2 at 10 us in the middle
-of a slip, where an explicit step gives a wrong answer without a sign of it). The slide's equation is then solved by the
+of a slip, where an explicit step is wrong without any sign of it). The slide's equation is then solved by the
 implicit midpoint rule with F_f = k_t z + h_t (1 - k_t z sgn(v_r) / g) v_r + h_v v_r; the bracket is extrapolated to the middle
 of the step from the last two steps. Measured on the paper's steel pair: after five slips the slip times differ from a
 converged solution by 0.002 ms at 10 us and by 0.05 ms at 50 us. The error falls with the square of the step.
@@ -44,7 +44,7 @@ def step(
         base_give: mean velocity that the base gains over the step for every newton of friction [m/(N s)]; 0 for a rigid base.
         guarded: whether friction may change by a large share within a step; without effects it never does.
         dt, z_dt: the step [s]; the time of the bristle's motion [s], from the middle of the last step to the middle of this one.
-        ahead: the middle of the step, in steps before, beyond the present: 0.5 where both are of one length.
+        ahead: time to the middle of the step, as a share of the step before: 0.5 for two steps of one length.
         pull_N: force of the drive's spring in the middle of the step.
         base_velocity_mid: velocity of the base in the middle of the step, without the part that friction causes.
         v_r, v_r_before, g_before: relative velocity now, in the step before, and g in the step before.
@@ -56,17 +56,17 @@ def step(
     g_end = g / sliding_share
     decay = k_t * math.fabs(v_r) / g_end * z_dt
     if decay < 0.03:
-        # exp(-decay) - 1 by its series, accurate to 1e-14 here; in pairs of terms, because the rest of the step depends on it
+        # exp(-decay) - 1 by its series, accurate to 1e-14; summed in pairs, which run in parallel: all that follows waits for it
         square = decay * decay
         pairs = (1.0 - decay / 2) + square * ((1 / 6 - decay / 24) + square * (1 / 120 - decay / 720))
-        gone = -decay * pairs
+        decayed = -decay * pairs
     else:
-        gone = math.exp(-decay) - 1.0
+        decayed = math.exp(-decay) - 1.0
     z_end = g_end / k_t if v_r > 0.0 else -g_end / k_t
     per_g_mid = sliding_share * k_t / ((1.0 + ahead) * g - ahead * g_before)
     if (1.0 + ahead) * v_r - ahead * v_r_before < 0.0:
         per_g_mid = -per_g_mid
-    moved = (z - z_end) * gone
+    moved = (z - z_end) * decayed
     z += moved
     share = 1.0 - per_g_mid * z
     if guarded and decay > 1.0:
@@ -89,7 +89,7 @@ def step(
 @kernel
 def elasto_plastic_share(z: float, v_r: float, g: float, k_t: float, breakaway_ratio: float) -> float:
     """Share alpha of sliding in the bristle's motion: elastic, then a sine, 1 as in LuGre (Dupont et al. 2002, eq. 14)."""
-    elastic = 1e-6  # of 0, which the contact divides by
+    elastic = 1e-6  # in place of 0, because the contact divides by it
     if z * v_r <= 0.0:
         return elastic
     reach = math.fabs(z) * k_t / g  # 1 in steady sliding

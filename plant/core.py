@@ -1,7 +1,7 @@
 """One block of the rig: physics and the analogue half of the sensors. No clock, no bus, no randomness in here.
 
 Compiled twice from one source: `advance`, the nominal rig, in which the compiler drops every branch of the effects, and
-`advance_disturbed`, which has them all and is as fast as those that are switched on allow.
+`advance_disturbed`, which has all branches; its speed depends on the effects that are switched on.
 """
 
 import math
@@ -99,7 +99,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
         frame_loss, base_loss = p.frame_damping_ratio * frame_omega * dt, p.base_damping_ratio * base_omega * dt
         if disturbed and p.base_m_per_N != 0.0:
             gives = base_give(dt, base_omega, base_loss, p.base_m_per_N)
-        # the bristle's damper pushes where friction falls abruptly: beyond this the step would be unstable
+        # lowest g over |z|: below it, where friction falls abruptly, the bristle's damper makes the step unstable
         least_N_per_m = k_t / (1.0 + 1.0 / (dt * h_t * (1.0 / m + 2.0 * gives / dt))) if h_t > 0.0 else 0.0
         block_s = samples * steps_per_sample * dt
         vibrating_s = s.vibrating_s if vibrating else 0.0
@@ -112,10 +112,8 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
             drive_velocity_mps = 0.0
         # rotated from step to step: a sine in each step slowed a rig with a varying load by a third
         load_omega = TWO_PI * p.load_frequency_Hz
-        load_sin, load_cos = (
-            math.sin(load_omega * t_s + p.load_phase_rad),
-            math.cos(load_omega * t_s + p.load_phase_rad),
-        )
+        load_rad = load_omega * t_s + p.load_phase_rad
+        load_sin, load_cos = math.sin(load_rad), math.cos(load_rad)
         load_sin_step, load_cos_step = math.sin(load_omega * dt), math.cos(load_omega * dt)
         x, v, z, v_r, g, s_d, even_m = s.x, s.v, s.z, s.v_r, s.g, s.s_d, s.even_m
         force_f, position_f, drive_f = s.force_f, s.mass_position_f, s.drive_position_f
@@ -167,8 +165,8 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                     slack = math.fabs(extension_m) < 0.5 * p.gap_m
                     h_d_now = 0.0 if p.force_driven or slack else h_d
                     h_d_step = h_d_now
-                    if p.relaxing_Ns_per_m > 0.0:  # force kept to mid-step, plus a damper for the force gained
-                        arm_N = 0.0 if slack else arm_N  # it also acts across the gap
+                    if p.relaxing_Ns_per_m > 0.0:  # its remaining force at mid-step, and a damper for the force gained
+                        arm_N = 0.0 if slack else arm_N  # the gap is in series with the relaxing damper too
                         pull_N += arm_keep_half * arm_N
                         h_d_step += 0.0 if slack else p.relaxing_Ns_per_m * (1.0 - arm_keep_half)
                 else:
@@ -289,7 +287,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
             s.t_s, s.age_s, s.v_lag, s.drive_N, s.arm_N = t_s, age_s, v_lag, force_N, arm_N
             s.vibrating_s = vibrating_s + block_s if vibrating else 0.0
 
-    # the name under which a caller's code finds it
+    # `shared_kernel` looks the function up in the module by this name
     advance.__name__ = advance.__qualname__ = "advance_disturbed" if disturbed else "advance"
     return shared_kernel(advance)
 

@@ -15,8 +15,8 @@ NotNegative = Annotated[float, Field(ge=0)]
 class MoveConfig(Strict):
     """A jerk-limited move from standstill to standstill, then a stop."""
 
-    distance_m: float | None = Field(default=None, description="Below 0: backwards. This or to_m.")
-    to_m: float | None = Field(default=None, description="Where the drive goes to; it begins the run at 0.")
+    distance_m: float | None = Field(default=None, description="Distance; below 0: backwards. Give this or to_m.")
+    to_m: float | None = Field(default=None, description="Target position; the drive begins the run at 0.")
     velocity_mps: Positive = Field(description="Highest speed; a short move stays below it.")
     acceleration_mps2: Positive = Field(description="Highest acceleration, and deceleration.")
     jerk_mps3: Positive = Field(description="Highest rate of the acceleration.")
@@ -47,7 +47,7 @@ class DriveConfig(Strict):
     )
     announce_ahead_s: NotNegative = Field(
         default=0.0,
-        description="The rig announces the drive velocity to the controller this long ahead, in whole blocks; 0: not.",
+        description="The rig announces the drive velocity to the controller this long ahead, in whole blocks; 0: never.",
     )
 
     @model_validator(mode="after")
@@ -76,7 +76,7 @@ class DriveConfig(Strict):
         return again_and_again(once, self.repeat_every_s) if self.repeat_every_s > 0.0 else once
 
     def speeds_mps(self) -> list[float]:
-        """The speeds at which it moves for a while [m/s], lowest first."""
+        """Peak speeds of the moves, or the speeds at the points of the profile [m/s], lowest first."""
         of_moves = {peak_mps(move) for move in self._moves() if move.distance_m != 0.0}
         of_profile = {abs(velocity_mps) for _, velocity_mps in self.profile if velocity_mps != 0.0}
         return sorted(of_moves if self.moves else of_profile)

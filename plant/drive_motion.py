@@ -1,8 +1,8 @@
 """Position and velocity of a drive over the time of a run, in either direction: pieces of constant jerk.
 
 A jerk-limited move has seven of them, as in Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots,
-2008, section 3.4: the acceleration grows, holds and falls, the velocity holds, and the same to a stop. A move too short for its
-velocity has the highest one from which it still stops in time.
+2008, section 3.4: the acceleration grows, holds and falls, the velocity holds, and three mirrored pieces brake. A move too short
+for its velocity has the highest peak velocity from which it still stops in time.
 """
 
 import math
@@ -25,15 +25,15 @@ class DriveMotion(NamedTuple):
     velocity_mps: Floats
     acceleration_mps2: Floats
     jerk_mps3: Floats
-    period_s: float = math.inf  # of a repeated motion
-    drift_m: float = 0.0  # per period
+    period_s: float = math.inf  # length of a cycle; inf: the motion runs once
+    drift_m: float = 0.0  # displacement over a cycle
 
 
 class Move(NamedTuple):
-    """From standstill to standstill, then a stop."""
+    """A move from standstill to standstill, then a stop."""
 
     distance_m: float  # below 0: backwards
-    velocity_mps: float  # the limits, above 0
+    velocity_mps: float  # this and the next two are limits, above 0
     acceleration_mps2: float
     jerk_mps3: float
     dwell_s: float
@@ -82,7 +82,7 @@ def peak_mps(move: Move) -> float:
 
 
 def _ramp_s(v: float, a: float, j: float) -> float:
-    """Time from standstill to a velocity; the distance is half of v times it."""
+    """Time from standstill to the velocity v [s]; the distance is half of v times this."""
     return v / a + a / j if v * j >= a * a else 2.0 * math.sqrt(v / j)
 
 
@@ -94,24 +94,24 @@ def _pieces(move: Move) -> list[tuple[float, float]]:
     ramp_s = _ramp_s(v, a, j)
     grows_s = min(a / j, 0.5 * ramp_s)
     holds_s = ramp_s - 2.0 * grows_s
-    way_s = max(abs(move.distance_m) / v - ramp_s, 0.0)
+    cruise_s = max(abs(move.distance_m) / v - ramp_s, 0.0)
     jerk = math.copysign(j, move.distance_m)
     pieces = [
         *((grows_s, jerk), (holds_s, 0.0), (grows_s, -jerk)),
-        (way_s, 0.0),
+        (cruise_s, 0.0),
         *((grows_s, -jerk), (holds_s, 0.0), (grows_s, jerk)),
     ]
     return [piece for piece in pieces if piece[0] > 0.0]
 
 
 def again_and_again(motion: DriveMotion, period_s: float) -> DriveMotion:
-    """The motion, repeated after every period."""
+    """The motion, repeated with this period."""
     drift_m = float(position_m(motion, np.array([period_s]))[0])
     return motion._replace(period_s=period_s, drift_m=drift_m if abs(drift_m) > _CLOSED_M else 0.0)
 
 
 def _within(motion: DriveMotion, t_s: Floats) -> tuple[Floats, npt.NDArray[np.intp], Floats]:
-    """For the times `t_s`, 0 or later: whole periods before, the piece, and the time since the piece began [s]."""
+    """Whole periods before the times `t_s`, 0 or later; their pieces; the times since the pieces began [s]."""
     periods = np.floor(t_s / motion.period_s)
     phase_s = np.maximum(t_s - periods * motion.period_s if math.isfinite(motion.period_s) else t_s, 0.0)
     piece = np.searchsorted(motion.start_s, phase_s, side="right") - 1
@@ -151,7 +151,7 @@ def reach_m(motion: DriveMotion, until_s: float) -> tuple[float, float]:
 
 
 def _reach_within(motion: DriveMotion, until_s: float) -> tuple[float, float]:
-    """As `reach_m`, within the first period."""
+    """The lowest and the highest position [m] from 0 s to `until_s`, within the first period."""
     # begins of the pieces, and their turning points; pieces with a jerk belong to moves, which reverse only at rest
     with np.errstate(divide="ignore", invalid="ignore"):
         turn_s = motion.start_s - motion.velocity_mps / motion.acceleration_mps2

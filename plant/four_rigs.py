@@ -1,4 +1,4 @@
-"""Four or eight rigs through one run side by side (`make bench`): a refit asks for one run of many slightly different rigs.
+"""Four or eight rigs through one run side by side (`make bench`): a refit simulates one run of many slightly different rigs.
 
 They get the same commands in the same steps, so that `four_rigs_step` does each step for all of them at once. Terms that
 do not fit into its loops (a sine of the position, a power of an age) have separate loops here, for rigs with such an effect only.
@@ -43,14 +43,14 @@ def advance_lanes(
     """Simulate one run of as many rigs as `width` is long.
 
     Args:
-        width: of `NARROW` or of `LANES` numbers, whose values do not matter.
-        params, state: records of `plant.records`, one a rig; the state is where the run begins.
+        width: `NARROW` or `LANES` numbers, whose values do not matter.
+        params, state: records of `plant.records`, one a rig; `state` holds the begin of the run.
         block_s: length of a block, over which the commands hold.
-        drive, frequency_Hz, amplitude_m, steps: of the run, [blocks].
-        entry_blocks: where each slide is put where its spring has a given force, [entries];
-        entry_force_N, entry_age_s: that force, and the age of the contact or NaN where it slides on, [entries, rigs].
-        out: filled with the means over every block of the five signals CHANNELS, then with how much the accelerations of mass
-            and base shake within a block, rms, [rigs, 7, blocks].
+        drive, frequency_Hz, amplitude_m, steps: the drive's velocity, the vibration and the number of steps, [blocks].
+        entry_blocks: blocks at whose begin each slide is placed so that its spring has a given force, [entries];
+        entry_force_N, entry_age_s: this force; the age of the contact, or NaN if the slide slides, [entries, rigs].
+        out: filled with the means over every block of the five signals CHANNELS, then the standard deviations of the
+            accelerations of mass and base within the block, [rigs, 7, blocks].
 
     """
     w = np.zeros(at.ROWS * LANES)
@@ -71,11 +71,8 @@ def advance_lanes(
         w[at.FALLING + i] = (1.0 - p.stribeck_tail) * (1.0 - p.late_share)
         w[at.DRIFT + i] = p.drift_per_s
         if p.drift_settling_s > 0.0:
-            w[at.SETTLING + i], w[at.PER_SETTLING_S + i], w[at.BEFORE_S + i] = (
-                p.drift_ratio,
-                1.0 / p.drift_settling_s,
-                p.drift_before_s,
-            )
+            w[at.SETTLING + i], w[at.BEFORE_S + i] = p.drift_ratio, p.drift_before_s
+            w[at.PER_SETTLING_S + i] = 1.0 / p.drift_settling_s
         w[at.LOAD + i], w[at.LOAD_SIN_2 + i], w[at.LOAD_COS_2 + i] = p.load_ratio, p.load_sin_2, p.load_cos_2
         load_rad = TWO_PI * p.load_frequency_Hz * s.t_s + p.load_phase_rad
         w[at.LOAD_SIN + i], w[at.LOAD_COS + i] = math.sin(load_rad), math.cos(load_rad)
@@ -84,19 +81,13 @@ def advance_lanes(
         if p.base_m_per_N != 0.0:
             w[at.BASE_2 + i] = (TWO_PI * p.base_Hz) ** 2
         w[at.SAG_PER_N + i] = p.sag_ratio / p.F_s if p.sag_settling_s == 0.0 else 0.0
-        w[at.X + i], w[at.V + i], w[at.Z + i], w[at.V_R + i], w[at.G + i], w[at.S_D + i] = (
-            s.x,
-            s.v,
-            s.z,
-            s.v_r,
-            s.g,
-            s.s_d,
-        )
+        w[at.X + i], w[at.V + i], w[at.Z + i] = s.x, s.v, s.z
+        w[at.V_R + i], w[at.G + i], w[at.S_D + i] = s.v_r, s.g, s.s_d
         w[at.FORCE + i], w[at.FRAME + i], w[at.FRAME_V + i] = s.drive_N, s.frame_m, s.frame_mps
         w[at.BASE + i], w[at.BASE_V + i], w[at.ARM + i] = s.base_m, s.base_mps, s.arm_N
         w[at.AGE + i], w[at.V_LAG + i] = s.age_s, s.v_lag
         w[at.CELL_M + i], w[at.CELL + i] = 1.0, math.inf
-        if p.roughness_ratio != 0.0 and not _varies(p):  # otherwise included in `level`
+        if p.roughness_ratio != 0.0 and not _varies(p):  # else `level` includes the roughness
             w[at.ROUGH + i], w[at.CELL_M + i] = p.roughness_ratio, p.roughness_length_m
         ripples = ripples or p.ripple_ratio != 0.0 or p.ripple_per_N != 0.0
         sags = sags or w[at.SAG_PER_N + i] != 0.0
@@ -160,7 +151,7 @@ def advance_lanes(
                     w[at.DRIVE + i] = drive[block] * unevenness(params[i], t_s + 0.5 * dt, even_m, w[at.FORCE + i])
             if settles:
                 for i in range(len(width)):
-                    w[at.SETTLED + i] = -w[at.SETTLING + i] * at.gone(
+                    w[at.SETTLED + i] = -w[at.SETTLING + i] * at.decayed(
                         (w[at.BEFORE_S + i] + t_s) * w[at.PER_SETTLING_S + i]
                     )
             if sags:

@@ -21,13 +21,13 @@ from plant.effects.drive import spring_law_N
 from plant.effects.friction_memory import late_mps
 from plant.effects.waves import TWO_PI, lattice_value, noise_in_cell, with_second
 
-# As many numbers as there are rigs: a kernel is compiled for the length of it, as for a type.
+# A tuple with a number per rig: its length is a part of its type, so a kernel is compiled for each length.
 Width = tuple[int, ...]
 # Rigs at once: a register of AVX2 holds four, one of AVX-512 eight. With AVX2 eight rigs take 1.9 times as long as four, so there
-# is one width; with AVX-512 questions of up to four rigs stay narrow.
+# is one width; with AVX-512 calls for up to four rigs stay narrow.
 NARROW: Final = 4
 LANES: Final = 8 if has_wide_vectors() else NARROW
-# The rows, by the place of their first number. Of the rig:
+# The rows, by the place of their first number: parameters of the rig,
 ROWS: Final = 87
 _AT = range(0, ROWS * LANES, LANES)
 M, K_D, H_D, K_T, PER_K_T, H_T, H_V, F_C, F_S, PER_V_S, TAIL, AT_ONCE = _AT[:12]
@@ -35,23 +35,23 @@ SLACK, YIELD, HARDENING, KNEE, KNEE_RATIO, RELAXING = _AT[12:18]
 FORWARD, BACKWARD, KINETIC_BACKWARD, QUADRATIC, LATE_SHARE, FALLING = _AT[18:24]
 DRIFT, SETTLING, PER_SETTLING_S, BEFORE_S, LOAD, LOAD_SIN_2, LOAD_COS_2 = _AT[24:31]
 FRAME_GIVE, FRAME_2, BASE_2, SAG_PER_N = _AT[31:35]
-# of its steps in a block:
+# numbers that depend on the length of a step,
 HALF_PER_M, FRAME_LOSS, FRAME_KEEP, FRAME_KEEP_HELD, BASE_KEEP, BASE_GIVE, LEAST = _AT[35:42]
 ARM_KEEP, LOAD_SIN_STEP, LOAD_COS_STEP, SHARE = _AT[42:46]
-# its state:
+# the state of the rig,
 X, V, Z, V_R, G, S_D, FORCE, FRAME, FRAME_V, BASE, BASE_V, ARM = _AT[46:58]
 AGE, V_LAG, LOAD_SIN, LOAD_COS = _AT[58:62]
-# intermediate values from one loop of a step to the next:
+# intermediate values from one loop of a step to the next,
 DRIVE, PULL, HELD, HELD_STEP, FREE, DELIVERED, V_R_NOW, LEVEL, SETTLED, V_G, LATE_FALL, AGED = _AT[62:74]
-# a rough surface: its ratio, the length of a cell of its lattice, where the slide is in cells, its cell, the noise at both ends
+# a rough surface: its ratio, length of a cell of its lattice, position in cells, present cell, noise at both ends of the cell,
 ROUGH, CELL_M, AT_CELL, CELL, CELL_BEGIN, CELL_END = _AT[74:80]
-# sums over a block: the five signals, then the squares of the accelerations of mass and base
+# sums over a block: the five signals, then the squares of the accelerations of mass and base.
 SUM_FORCE, SUM_MASS, SUM_BASE, SUM_X, SUM_S_D, SUM_MASS_2, SUM_BASE_2 = _AT[80:87]
 _ROUNDS: Final = 6755399441055744.0  # 1.5 * 2^52: a number added to it is rounded to a whole number, in its last bits
 
 
 @kernel
-def gone(a: float) -> float:
+def decayed(a: float) -> float:
     """exp(-a) - 1 for a >= 0, to 3e-16: -a = n ln 2 + r, the series of exp(r) - 1, and 2^n from its bits."""
     a = min(a, 700.0)
     turned = _ROUNDS - a * 1.4426950408889634
@@ -76,7 +76,7 @@ def _spring_N(w: Floats, i: int, extension_m: float) -> float:
 
 @kernel
 def approach(w: Floats, width: Width, dt: float, t_s: float, base_mps: float) -> None:
-    """The drive's force in the middle of the step, the velocity over the base, the friction's level."""
+    """Compute the drive's force in the middle of the step, the velocity over the base, and the friction's level."""
     for i in range(len(width)):
         # the drive's force in the middle of the step
         anchor_mps = w[DRIVE + i] - w[FRAME_V + i]
@@ -86,7 +86,7 @@ def approach(w: Floats, width: Width, dt: float, t_s: float, base_mps: float) ->
         w[HELD + i] = holds
         w[HELD_STEP + i] = holds * (w[H_D + i] + w[RELAXING + i] * (1.0 - w[ARM_KEEP + i]))
         w[PULL + i] = _spring_N(w, i, ahead_m) + holds * w[ARM_KEEP + i] * w[ARM + i]
-        # the base, and how fast the slide goes over it
+        # the base, and the velocity of the slide over it
         spring_mps2 = w[BASE_2 + i] * (w[BASE + i] + 0.5 * dt * w[BASE_V + i])
         w[FREE + i] = (w[BASE_V + i] - 0.5 * dt * spring_mps2) * w[BASE_KEEP + i]
         v_r = w[V + i] - (w[DELIVERED + i] * base_mps + w[BASE_V + i])
@@ -115,7 +115,7 @@ def slide(w: Floats, width: Width, dt: float, z_dt: float, base_mid_mps: float, 
         # the excess over Coulomb friction: a part that falls with the present velocity, and the parts of tail and late velocity
         late, falling = w[LATE_SHARE + i], w[FALLING + i]
         standing = falling + (1.0 - late) * (w[TAIL + i] / (1.0 + q * q)) + late * w[LATE_FALL + i]
-        g = (coulomb_N + excess_N * standing) + (excess_N * falling) * gone(q * q)
+        g = (coulomb_N + excess_N * standing) + (excess_N * falling) * decayed(q * q)
         guarded = w[AT_ONCE + i] < math.inf
         least_N = w[LEAST + i] * math.fabs(z)
         g, g_before = max(g, least_N), w[G + i]
@@ -130,7 +130,7 @@ def slide(w: Floats, width: Width, dt: float, z_dt: float, base_mid_mps: float, 
         per_g_mid = -per_g_mid if 1.5 * v_r - 0.5 * w[V_R + i] < 0.0 else per_g_mid
         z_end = g * w[PER_K_T + i]
         z_end = z_end if v_r > 0.0 else -z_end
-        moved = (z - z_end) * gone(decay)
+        moved = (z - z_end) * decayed(decay)
         z += moved
         share = 1.0 - per_g_mid * z
         share = moved * per_slid if decay > w[AT_ONCE + i] else share
@@ -141,7 +141,7 @@ def slide(w: Floats, width: Width, dt: float, z_dt: float, base_mid_mps: float, 
         push_N = w[PULL + i] + held * anchor_mps
         pushed_mps = v + half * push_N
         base_now_mps = w[DELIVERED + i] * base_mid_mps + w[FREE + i]
-        carried_mps = give * pushed_mps + half * base_now_mps  # as friction moves the base while it acts
+        carried_mps = give * pushed_mps + half * base_now_mps  # friction moves the base within the step
         slowed = 1.0 + half * held
         v_mid = ((pushed_mps - half * (k_t * z)) + damping * carried_mps) / (slowed + damping * (give * slowed + half))
         v_end = 2.0 * v_mid - v
@@ -179,7 +179,7 @@ def slide(w: Floats, width: Width, dt: float, z_dt: float, base_mid_mps: float, 
 
 @kernel
 def set_steps(w: Floats, p: PlantParams, i: int, dt: float) -> None:
-    """The numbers of a rig that depend on the length of a step."""
+    """Set the numbers of a rig that depend on the length of a step."""
     w[FRAME_LOSS + i] = p.frame_damping_ratio * TWO_PI * p.frame_Hz * dt
     w[FRAME_KEEP + i] = 1.0 / (1.0 + w[FRAME_LOSS + i])
     held = 1.0 / (1.0 + w[FRAME_LOSS + i] + dt * w[FRAME_2 + i] * w[FRAME_GIVE + i] * p.h_d)
@@ -197,7 +197,7 @@ def set_steps(w: Floats, p: PlantParams, i: int, dt: float) -> None:
 
 @kernel
 def roughen(w: Floats, width: Width, params: npt.NDArray[Any]) -> None:
-    """The friction's level on a rough surface, by noise as `plant.effects.waves` has it, with its sines once a cell."""
+    """Multiply the friction's level by a rough surface, the noise of `plant.effects.waves`; its sines are kept for a cell."""
     entered = 0
     for i in range(len(width)):
         at = (w[X + i] - w[BASE + i]) / w[CELL_M + i]
@@ -219,18 +219,18 @@ def roughen(w: Floats, width: Width, params: npt.NDArray[Any]) -> None:
 
 @kernel
 def lag(w: Floats, width: Width, params: npt.NDArray[Any], state: npt.NDArray[Any], dt: float, t_s: float) -> None:
-    """The velocity that the friction still goes by, where it lags."""
+    """Update the lagging velocity, and the Stribeck curve at it."""
     for i in range(len(width)):
         p: PlantParams = params[i]
         v_r = w[V_R_NOW + i]
         if p.lag_distance_m > 0.0:
             slid_m = math.fabs(v_r) * dt
-            w[V_LAG + i] -= gone(slid_m / p.lag_distance_m) * (math.fabs(v_r) - w[V_LAG + i])
+            w[V_LAG + i] -= decayed(slid_m / p.lag_distance_m) * (math.fabs(v_r) - w[V_LAG + i])
         elif p.lag_s > 0.0:
-            w[V_LAG + i] -= gone(dt / p.lag_s) * (v_r - w[V_LAG + i])
+            w[V_LAG + i] -= decayed(dt / p.lag_s) * (v_r - w[V_LAG + i])
             w[V_G + i] = w[V_LAG + i]
         elif p.lag_dead_s > 0.0:
             w[V_LAG + i] = late_mps(p, state[i], t_s, math.fabs(v_r))
         q = w[V_LAG + i] * w[PER_V_S + i]
-        fall = gone(q * q) + 1.0
+        fall = decayed(q * q) + 1.0
         w[LATE_FALL + i] = fall + w[TAIL + i] * (1.0 / (1.0 + q * q) - fall)

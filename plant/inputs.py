@@ -20,7 +20,7 @@ _JITTER = 1  # the second stream of the seed: jitter does not change the noise
 class Inputs(NamedTuple):
     """The inputs of some blocks."""
 
-    velocity_mps: npt.NDArray[Any]  # of the drive, [blocks]
+    velocity_mps: npt.NDArray[Any]  # velocity of the drive, [blocks]
     noise: npt.NDArray[np.float64]  # standard normal numbers, [blocks, 5, samples]
     delay_blocks: npt.NDArray[np.int64]  # delay of a command received before the block, [blocks]
     announcements: npt.NDArray[np.int64]  # number sent before the block's samples, [blocks]
@@ -58,7 +58,7 @@ class RigInputs:
 
     Args:
         config: the rig file.
-        seed: of noise and jitter; the same seed gives the same numbers, however many blocks are drawn at once.
+        seed: seed of noise and jitter; the numbers do not depend on how many blocks are drawn at once.
 
     """
 
@@ -83,7 +83,7 @@ class RigInputs:
         """Number of announcements per drawn block, and the announcements.
 
         The samples of block n leave when block n + 1 begins: before them the rig announces the velocity of block n + 1 + ahead
-        if it differs from the last announcement; before the samples of block 0, the velocity of each block up to there.
+        if it differs from the last announcement; before the samples of block 0, also the velocities of all blocks before it.
         """
         counts = np.zeros(blocks, np.int64)
         if not (self._ahead_blocks and blocks):
@@ -113,14 +113,14 @@ class RigInputs:
         if loop.jitter_s == 0.0:
             return np.full(blocks, whole_blocks(loop.delay_s, block_s))
         late_s = loop.delay_s + loop.jitter_s * self._jitter.random(blocks)
-        return np.array([whole_blocks(one_s, block_s) for one_s in late_s], np.int64)
+        return np.array([whole_blocks(delay_s, block_s) for delay_s in late_s], np.int64)
 
 
 class InputsAhead:
     """The numbers of `RigInputs`, drawn ahead by a second thread: drawing takes a sixth of a run's time.
 
     Args:
-        inputs: drawn from here alone.
+        inputs: the source; nothing else may draw from it.
 
     """
 

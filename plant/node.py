@@ -59,13 +59,13 @@ class PlantNode:
         samples = config.solver.samples_per_block
         self.faults = Faults(faults, seed, config.solver.block_s, samples, self._params)
         self._analogue = np.empty((len(CHANNELS), samples))
-        self.truth = np.empty((len(TRUTH), samples))  # of the last block, rows as plant.records.TRUTH
+        self.truth = np.empty((len(TRUTH), samples))  # true quantities in the last block, rows as plant.records.TRUTH
         nothing = np.zeros(1, np.int64)
         self._drawn = Inputs(
             np.zeros(1), np.zeros((1, len(CHANNELS), samples)), nothing, nothing, ANNOUNCE_LAYOUT.blank(0)
         )
         self._announced = 0  # number of the drawn announcements already sent
-        self.announcements: list[Outgoing] = []  # of the last block; sent before its samples
+        self.announcements: list[Outgoing] = []  # to be sent before the samples of the last block
         self._sensors = sensor_block(samples).blank()
         self._applied = APPLIED_LAYOUT.blank()
 
@@ -124,9 +124,9 @@ class PlantNode:
         self.block += 1
         return Outgoing(SENSORS, sealed(self._sensors.tobytes())), Outgoing(APPLIED, self._applied.tobytes())
 
-    def apply_order(self, word: int) -> bool:
+    def apply_order(self, order: int) -> bool:
         """Apply an operator's order (`wire.Operator.Action`) or the code LEAVE. Returns whether it changed the state."""
-        return bool(apply_order(self._guard_state[0], word))
+        return bool(apply_order(self._guard_state[0], order))
 
     @property
     def check_tones_Hz(self) -> list[float]:
@@ -146,7 +146,7 @@ class PlantNode:
 
     @property
     def gain_change(self) -> float:
-        """Largest factor, either way, between the gains of the last check and those accepted."""
+        """Largest factor, either way, between the gains of the last check and the accepted gains."""
         return gain_change(self._guard_params[0], self._guard_state[0])
 
     @property
@@ -155,7 +155,7 @@ class PlantNode:
         return self._applied[0]
 
     def let_go(self) -> None:
-        """Drop all commands in force or delayed, and leave: the vibration fades to zero at the exciter's rate."""
+        """Drop all commands in force or delayed and enter DISARMED: the vibration fades to zero at the exciter's rate."""
         self._state["command_block"] = NO_COMMAND
         self._state["line_count"] = 0
         self.apply_order(LEAVE)

@@ -31,18 +31,13 @@ PARAMS = np.dtype(
             *("amplitude_max_m", "frequency_min_Hz", "frequency_max_Hz", "amplitude_slew_m_per_s"),
             *("delivered_ratio", "mount_resonance_Hz", "mount_damping_ratio"),
             *("force_keep", "accel_keep", "accel_highpass_keep", "position_keep"),
-            # the same over the longer steps of a slide that sticks
+            # length of the longer steps while the slide sticks, and the filters' shares over such a step
             *("stick_dt_s", "force_keep_stick", "accel_keep_stick", "accel_highpass_keep_stick", "position_keep_stick"),
             *("force_gain", "force_range_N", "force_lowest_N", "force_noise_N", "force_resolution_N"),
             *("accel_range_mps2", "accel_noise_mps2", "accel_resolution_mps2"),
-            *(
-                "position_range_m",
-                "position_lowest_m",
-                "position_noise_m",
-                "position_linearity",
-                "position_resolution_m",
-            ),
-            # the effects of `plant.effects`, then of the contact; all without effect in the nominal rig
+            *("position_range_m", "position_lowest_m", "position_noise_m"),
+            *("position_linearity", "position_resolution_m"),
+            # numbers of `plant.effects`, then of the contact's extensions; none acts in the nominal rig
             *(name for effect in EFFECTS.values() for name in effect.numbers),
             *("age_length_m", "roughness_ratio", "roughness_length_m", "roughness_seed"),
             *("elastic_ratio", "stribeck_tail"),
@@ -71,7 +66,7 @@ STATE = np.dtype(
         )
     ]
     + [field for effect in EFFECTS.values() for field in effect.memory]
-    # the commands on their way: `plant.loop_delay`
+    # the queue of delayed commands: `plant.loop_delay`
     + [("line_first", "i8"), ("line_count", "i8"), ("line_due", "i8", (LINE,)), ("line_block", "i8", (LINE,))]
     + [("line_Hz", "f8", (LINE,)), ("line_m", "f8", (LINE,))],
     align=True,
@@ -81,7 +76,7 @@ STATE = np.dtype(
 # the swing is 4.7 % too fast, 2 asin(1/2) / 1. Smaller: stiff rigs take more steps.
 _STICK_STEP_RAD = 1.0
 
-NO_COMMAND = -1  # as the unsigned number of the wire: bridge.messages.NO_BLOCK
+NO_COMMAND = -1  # NO_BLOCK of bridge.wire.messages as a signed number
 
 
 def _keep(bandwidth_Hz: float, period_s: float) -> float:
@@ -93,20 +88,12 @@ def build(config: RigConfig) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     """Derive the parameters and the state at rest, spring unloaded, from a rig configuration."""
     params = record(PARAMS)
     p: Any = params[0]
-    contact, drive, piezo, sensors, solver = (
-        config.contact,
-        config.drive,
-        config.piezo,
-        config.sensors,
-        config.solver,
-    )
+    contact, drive, piezo = config.contact, config.drive, config.piezo
+    sensors, solver = config.sensors, config.solver
     p.m = config.slide.mass_kg
     p.k_d, p.h_d = drive.stiffness_N_per_m, drive.damping_Ns_per_m
-    p.k_t, p.h_t, p.h_v = (
-        contact.stiffness_N_per_m,
-        contact.damping_Ns_per_m,
-        contact.viscous_damping_Ns_per_m,
-    )
+    p.k_t, p.h_t = contact.stiffness_N_per_m, contact.damping_Ns_per_m
+    p.h_v = contact.viscous_damping_Ns_per_m
     p.F_c, p.F_s, p.v_s = contact.coulomb_force_N, contact.static_force_N, contact.stribeck_velocity_mps
     p.dt_s = solver.step_s
     p.samples_per_block = solver.samples_per_block
@@ -161,7 +148,7 @@ def _add_effects(p: Any, config: RigConfig) -> None:
     p.elasto_plastic = contact.backbone == "elasto-plastic"
     for name in ("stribeck_tail", "elastic_ratio", "roughness_ratio", "roughness_length_m", "roughness_seed"):
         p[name] = getattr(contact, name)
-    # ten reaches of the bristle: creep before breakaway keeps the age of the contact, any slip resets it
+    # ten times the bristle's largest deflection: creep before breakaway keeps the age of the contact, any slip resets it
     p.age_length_m = 10.0 * contact.static_force_N / contact.stiffness_N_per_m
     for effect in EFFECTS.values():
         for name, number in effect.off.items():

@@ -45,20 +45,20 @@ def run_blocks(
 
     """
     samples = params[0].samples_per_block
-    # of one block: a part of the run's arrays is not contiguous, and `advance` would be compiled for that as well
-    own_analogue, own_truth = np.empty((analogue.shape[0], samples)), np.empty((truth.shape[0], samples))
+    # arrays of one block: slices of the run's arrays are not contiguous, and `advance` would be compiled for them too
+    block_analogue, block_truth = np.empty((analogue.shape[0], samples)), np.empty((truth.shape[0], samples))
     for block in range(drive.shape[0]):
         if params[0].disturbed:
             advance_disturbed(
-                params, state, drive[block], frequency_Hz[block], amplitude_m[block], own_analogue, own_truth
+                params, state, drive[block], frequency_Hz[block], amplitude_m[block], block_analogue, block_truth
             )
         else:
-            advance(params, state, drive[block], frequency_Hz[block], amplitude_m[block], own_analogue, own_truth)
+            advance(params, state, drive[block], frequency_Hz[block], amplitude_m[block], block_analogue, block_truth)
         for i in range(samples):
             for row in range(analogue.shape[0]):
-                analogue[row, block * samples + i] = own_analogue[row, i]
+                analogue[row, block * samples + i] = block_analogue[row, i]
             for row in range(truth.shape[0]):
-                truth[row, block * samples + i] = own_truth[row, i]
+                truth[row, block * samples + i] = block_truth[row, i]
 
 
 def simulate(
@@ -98,7 +98,7 @@ def drive_velocity_mps(config: RigConfig, t_s: Floats) -> Floats:
 
 
 def held_velocity(config: RigConfig) -> Callable[[Floats], Floats]:
-    """`drive_velocity_mps` of a rig, for many calls."""
+    """The function `drive_velocity_mps` of one rig; cheaper for many calls."""
     drive, block_s = config.drive, config.solver.block_s
     if drive.moves or drive.repeat_every_s > 0.0:
         motion = drive.motion()

@@ -2,14 +2,14 @@
 
 States: extension of the drive's spring e [m], velocity of the slide v [m/s], bristle deflection z [m].
 The vibration enters by its mean over a cycle. Well above the contact resonance, with u0 below the bristle's
-own reach F_s / k_t, the bristle does not move within a cycle (the paper: 0.02 um against 0.22 um) and only
-means remain:
+largest deflection F_s / k_t, the bristle does not move within a cycle (the paper: 0.02 um against 0.22 um) and
+only means remain:
 
     z' = v - k_t B(v) z        B(v) = < |v_r| / g(v_r) >        v_r = v - v_a cos(theta)
     F  = k_t z + h_t z' + h_v v                                 steady: F(v) = v / B(v) + h_v v
 
-Linear stability holds for small disturbances. Stick-slip that has started can go on where steady sliding is stable, and
-every start from rest starts it: see `self_sustained_velocity_mps`.
+Linear stability holds for small disturbances. Stick-slip can persist where steady sliding is stable, and every start from rest
+causes a first slip: see `self_sustained_velocity_mps`.
 """
 
 import math
@@ -63,7 +63,7 @@ def contact(config: ContactConfig, velocity_mps: Numbers, vibration_velocity_mps
         mean += np.sum(share * v_r / g, axis=-1)
         # B - v dB/dv in one sum: as a difference it would lose slopes below 1e-16
         excess += np.sum(share * (v * v_r * g_slope / g**2 - back / g), axis=-1)
-    # with vibration the sum rounds to 1e-16 where the slope is 0 (F_s = F_c below the edge): count it as 0
+    # with vibration, where the slope is 0 (F_s = F_c below the edge), the sum is rounding of 1e-16: count it as 0
     rounded = (v_a[..., 0] > 0.0) & (np.abs(excess) < 1e-14 * mean)
     return Contact(np.where(rounded, 0.0, excess / mean), config.stiffness_N_per_m * mean)
 
@@ -161,7 +161,7 @@ def hurwitz_margin(
 
 
 def _last_crossing(margin: Callable[[Numbers], Floats], grid: Floats) -> float | None:
-    """The last point of the grid at which `margin` turns positive.
+    """The highest argument at which `margin` turns positive, between two points of the grid.
 
     None if `margin` is below 0 at the end of the grid; grid[0] if it is nowhere below 0.
     """

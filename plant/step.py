@@ -34,8 +34,8 @@ def act(
     Args:
         params, state: one record each of `plant.records.PARAMS` and `STATE`.
         guard_params, guard_state: one record each of `bridge.guard.records`.
-        drive_velocity_mps: held over the block.
-        commands: received since the last block; the newest that the guard accepts goes to the exciter.
+        drive_velocity_mps: velocity of the drive, held over the block.
+        commands: commands received since the last block; the newest that the guard accepts goes to the exciter.
         delay_blocks: additional delay of this command on its way to the exciter.
         announce: the rig's announcements before these samples.
         noise: standard normal numbers, float64 [5, samples].

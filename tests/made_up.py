@@ -1,4 +1,4 @@
-"""A made-up diagnosis, and functions that stand in for the real diagnosing one. They travel to worker processes."""
+"""A made-up diagnosis and fakes of the diagnosing function, which are sent to worker processes."""
 
 import os
 import signal
@@ -142,7 +142,7 @@ def diagnosis() -> Diagnosis:
             RigNumber("stribeck_tail", 0.0, -0.12, 0.4),
         ),
         findings=(
-            Finding("missing", "run-01.parquet: base_accel_mps2", "not there: what the piezo delivers cannot be seen"),
+            Finding("missing", "run-01.parquet: base_accel_mps2", "missing: what the piezo delivers cannot be seen"),
             Finding("clipped", "run-02.parquet: drive_force_N", "12 samples at 20 N were left out", 12),
         ),
         pictures=(picture(), picture("residual")),

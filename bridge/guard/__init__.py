@@ -7,7 +7,7 @@ It is a process stop and no safety function: an emergency stop belongs in the su
     states   DISARMED, CHECKING, READY, ARMED, ACTIVE, FAULT
     limits   stroke, velocity, bands, heat, duty: each with alarm, abort and hold
     estimates  drive velocity and vibration velocity, from the rig's own samples
-    check    the loop check: sensors alive, exciter answers, its gain
+    check    the loop check: sensors live, exciter answers, its gain
     core     `accept` a command, `look` at a block, `allow` a vibration
     latch    the operator's stop, kept over restarts
     events   events of a rig's guard

@@ -1,4 +1,4 @@
-"""The loop check before a rig is armed: every sensor is alive, the exciter is heard at each tone, and its gain is measured."""
+"""The loop check before a rig is armed: every sensor is live, the exciter answers at each tone, and its gain is measured."""
 
 import math
 
@@ -18,11 +18,11 @@ from bridge.wire.stickslip_pb2 import (
 )
 
 _TWO_PI = 2.0 * math.pi
-_QUIET_S = 0.5  # of listening to the sensors at rest; long enough for a 16-bit converter to show some noise
-_TONE_S = 0.2  # per tone; its first half is the exciter's start
-_NOISY = 3  # the first channels, which have noise; an encoder at rest repeats its number
-_HEARD = 4.0  # ratio of the power of the tone to the power of the noise from which the tone counts as heard
-_WILD = 20.0  # largest factor either way from a rigid mount's gain; a mount may resonate tenfold
+_QUIET_S = 0.5  # time before the first tone, at rest; long enough for a 16-bit converter to show some noise
+_TONE_S = 0.2  # time per tone; its first half, the start of the exciter, is not measured
+_NOISY = 3  # number of channels, the first ones, that must show noise; an encoder at rest repeats its number
+_ANSWERS = 4.0  # power of the tone over power of the noise from which the exciter counts as answering
+_WILD = 20.0  # largest factor, either way, from the gain of a rigid mount; a mount may resonate tenfold
 
 
 @kernel
@@ -117,7 +117,7 @@ def gain_change(p: GuardParams, s: GuardMemory) -> float:
 def _judge(p: GuardParams, s: GuardMemory, at: int) -> None:
     omega = _TWO_PI * p.tone_Hz[at]
     s.gain[at] = math.sqrt(max(s.tone_mps2 - s.quiet_mps2, 0.0)) / (omega * omega * p.check_m)
-    if s.tone_mps2 < _HEARD * s.quiet_mps2:
+    if s.tone_mps2 < _ANSWERS * s.quiet_mps2:
         trip(s, EXCITER_SILENT)
     elif not 1.0 / _WILD < s.gain[at] < _WILD:
         trip(s, EXCITER_WILD)

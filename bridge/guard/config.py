@@ -10,7 +10,7 @@ Positive = Annotated[float, Field(gt=0)]
 _LONGEST_S = 1e9  # 30 years; a far longer time overflows the count of blocks
 HoldTime = Annotated[float, Field(ge=0, le=_LONGEST_S)]
 Share = Annotated[float, Field(gt=0, le=1)]
-MOST_BANDS = 8
+MOST_BANDS = 8  # most forbidden bands
 
 
 class Level(Strict):
@@ -28,7 +28,7 @@ class Level(Strict):
 
 
 class HeatConfig(Strict):
-    """The exciter's warmth: losses pi tan(d) C f (u0 / s)^2 into one thermal resistance with one time constant."""
+    """The exciter's warming: losses pi tan(d) C f (u0 / s)^2, one thermal resistance, one time constant."""
 
     capacitance_F: Positive = Field(default=8e-7, description="C of the stack.")
     stroke_m_per_V: Positive = Field(default=7.8e-8, description="s of the stack.")
@@ -43,10 +43,10 @@ class GuardConfig(Strict):
     """The guard of one rig. Stroke, frequencies and slew default to `[piezo]`; a value here may be narrower."""
 
     stroke_m: Level | None = Field(
-        default=None, description="Not given: piezo.amplitude_max_m, abort at 1.5 times that."
+        default=None, description="Commanded stroke. Not given: piezo.amplitude_max_m, abort at 1.5 times that."
     )
     velocity_mps: Level | None = Field(
-        default=None, description="Of the commanded v_a. Not given: the v_a of the stroke at the highest frequency."
+        default=None, description="Commanded v_a. Not given: the v_a of the stroke at the highest frequency."
     )
     velocity_ratio: Level = Field(
         default=Level(alarm=3.0, abort=4.0, hold_s=0.1),
@@ -58,11 +58,13 @@ class GuardConfig(Strict):
     forbidden_Hz: Annotated[list[Two], Field(max_length=MOST_BANDS)] = Field(
         default=[], description="Bands [low, high] without vibration."
     )
-    band_hold_s: HoldTime = Field(default=0.2, description="Time of commands in a forbidden band until it trips.")
+    band_hold_s: HoldTime = Field(
+        default=0.2, description="Time of commands in a forbidden band until the guard trips."
+    )
     duty: Level = Field(
         default=Level(alarm=1.0, abort=1.0), description="Share of the time with vibration; 1: no limit."
     )
-    duty_window_s: Positive = Field(default=60.0, description="Time constant of that share.")
+    duty_window_s: Positive = Field(default=60.0, description="Time constant of the duty.")
     heat: HeatConfig = HeatConfig()
     drive_memory_s: Positive = Field(
         default=0.5,
@@ -79,7 +81,7 @@ class GuardConfig(Strict):
     )
     gain_change: Annotated[float, Field(ge=1.05, le=2.0)] = Field(
         default=1.25,
-        description="Largest factor either way from the last accepted gain; beyond it a loop check asks the operator.",
+        description="Largest factor either way from the last accepted gain; beyond it the operator must accept the gain.",
     )
     check_share: Share = Field(default=0.1, description="Amplitude of the loop check, as a share of the stroke.")
 
@@ -97,14 +99,14 @@ _WEAKER_IF_LARGER = ("velocity_ratio", "loud_ratio", "band_hold_s", "drive_memor
 
 
 def wider(config: GuardConfig) -> str:
-    """The limits that protect less than the defaults, as text; empty without any."""
+    """The limits that protect less than the defaults, as text; empty without such a limit."""
     default = GuardConfig()
     weaker: list[str] = []
     for name in _WEAKER_IF_LARGER:
-        ours, theirs = getattr(config, name), getattr(default, name)
-        if isinstance(ours, Level):
-            parts = [(f"{name}.{part}", getattr(ours, part), getattr(theirs, part)) for part in Level.model_fields]
+        chosen, usual = getattr(config, name), getattr(default, name)
+        if isinstance(chosen, Level):
+            parts = [(f"{name}.{part}", getattr(chosen, part), getattr(usual, part)) for part in Level.model_fields]
         else:
-            parts = [(name, ours, theirs)]
+            parts = [(name, chosen, usual)]
         weaker += [f"{key} = {value:g} (default {usual:g})" for key, value, usual in parts if value > usual]
     return ", ".join(weaker)

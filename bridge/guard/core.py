@@ -19,7 +19,7 @@ from bridge.wire.stickslip_pb2 import (
     SLEW_RATE,
 )
 
-NO_COMMAND = -1  # as the unsigned number of the wire: bridge.wire.messages.NO_BLOCK
+NO_COMMAND = -1  # NO_BLOCK of bridge.wire.messages as a signed number
 
 
 @kernel
@@ -45,7 +45,7 @@ def allow(p: GuardParams, s: GuardMemory, command_block: int, frequency_Hz: floa
     Args:
         p, s: records of `bridge.guard.records`.
         command_block: block answered by the command, NO_COMMAND before the first.
-        frequency_Hz, amplitude_m: of the command.
+        frequency_Hz, amplitude_m: the commanded vibration.
 
     """
     s.limit = NO_CAUSE

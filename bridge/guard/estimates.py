@@ -7,12 +7,12 @@ from bridge.kernel import Record, kernel
 from bridge.layouts import GuardMemory, GuardParams, SensorRow
 
 _TWO_PI = 2.0 * math.pi
-_PARTS = 5  # of the window for the drive's velocity
+_PARTS = 5  # parts of the window for the drive's velocity
 
 
 @kernel
 def see_drive(p: GuardParams, s: GuardMemory, block: SensorRow) -> None:
-    """Largest recent velocity of the drive [m/s]: over 50 ms of its positions, decaying slowly.
+    """Update the largest recent velocity of the drive [m/s], over 50 ms of its positions; it decays slowly.
 
     A position jump affects at most two of five parts of the 50 ms, so the velocity is at most the median of the parts.
     """
@@ -26,8 +26,8 @@ def see_drive(p: GuardParams, s: GuardMemory, block: SensorRow) -> None:
     s.drive_mps *= p.memory_keep
     back = min(p.window_blocks, s.seen_blocks)
     if back > 0:
-        was_m = s.drive_m[(s.seen_blocks - back) % RING]
-        velocity_mps = math.fabs(mean_m - was_m) / (back * p.block_s)
+        before_m = s.drive_m[(s.seen_blocks - back) % RING]
+        velocity_mps = math.fabs(mean_m - before_m) / (back * p.block_s)
         s.drive_mps = max(s.drive_mps, min(velocity_mps, _median(p, s, back)))
     s.seen_blocks += 1
 
@@ -61,7 +61,7 @@ def expect_drive(s: GuardMemory, velocity_mps: float) -> None:
 
 @kernel
 def see_vibration(p: GuardParams, s: GuardMemory, block: SensorRow) -> None:
-    """Velocity amplitude of the base [m/s], from its acceleration at the vibration frequency, block by block."""
+    """Update the velocity amplitude of the base [m/s] from its acceleration at the vibration frequency."""
     square = _square_at(block.base_accel_mps2, _TWO_PI * s.frequency_Hz * p.sample_s)
     if math.isfinite(square):
         s.square_mps2 += p.loud_share * (square - s.square_mps2)
@@ -72,7 +72,7 @@ def see_vibration(p: GuardParams, s: GuardMemory, block: SensorRow) -> None:
 def _square_at(samples: Record, step_rad: float) -> float:
     """Square of the amplitude of the sine with `step_rad` per sample that fits the samples best.
 
-    Not shared with the controller's equal fit: one error must not blind both.
+    Not shared with the controller's equal fit: one error must not affect both.
     """
     c, sn, turn_c, turn_sn = 1.0, 0.0, math.cos(step_rad), math.sin(step_rad)
     cos_cos, cos_sin, sin_sin, with_cos, with_sin = 0.0, 0.0, 0.0, 0.0, 0.0

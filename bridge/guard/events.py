@@ -30,7 +30,7 @@ class GuardEvents:
         self._help = {(word.column, word.number): f"{word.word}: {word.help}" for word in words()}
         self._state = -1
         self._limit = 0
-        self._missing = 1  # before the first command none is missing
+        self._missing = 1  # no event before the first command
         self._fallback = False
         self._reported_s: dict[int, float] = {}
 

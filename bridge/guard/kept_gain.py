@@ -8,15 +8,15 @@ from typing import Any
 from bridge.files import write_whole
 from bridge.guard.latch import state_file
 
-_MOST_BYTES = 1 << 16
+_MOST_BYTES = 1 << 16  # largest state file that is read
 
 
 class KeptGain:
     """The accepted gain of one rig at each tone of its loop check.
 
     Args:
-        rig: its name in the rig file.
-        tones_Hz: of its check; gains at other tones are not comparable.
+        rig: name of the rig in its file.
+        tones_Hz: tones of its loop check; gains at other tones are not comparable.
 
     """
 
@@ -25,15 +25,15 @@ class KeptGain:
         self._rig, self._tones_Hz = rig, [float(tone_Hz) for tone_Hz in tones_Hz]
 
     def load(self) -> list[float]:
-        """The gains; empty if no gains were kept, or the file is unreadable or of other tones."""
+        """The gains; empty without a file, and if the file is unreadable or has other tones."""
         try:
             with open(self.path, "rb") as file:
                 table: Any = json.loads(file.read(_MOST_BYTES))
             gains = [float(gain) for gain in table["gain"]]
-            right = table["tones_Hz"] == self._tones_Hz and len(gains) == len(self._tones_Hz)
+            fits = table["tones_Hz"] == self._tones_Hz and len(gains) == len(self._tones_Hz)
         except (OSError, ValueError, TypeError, KeyError, RecursionError):
             return []
-        return gains if right and all(0.0 < gain < float("inf") for gain in gains) else []
+        return gains if fits and all(0.0 < gain < float("inf") for gain in gains) else []
 
     def save(self, gains: Sequence[float]) -> None:
         """Keep gains. Raises OSError if they cannot be written."""

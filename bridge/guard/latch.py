@@ -25,7 +25,7 @@ class StopLatch:
     """The stop of one rig.
 
     Args:
-        rig: its name in the rig file.
+        rig: name of the rig in its file.
 
     """
 
@@ -42,7 +42,7 @@ class StopLatch:
             return True
 
     def can_be_set(self) -> str:
-        """Why a stop could not be kept, as text; empty if it can be kept."""
+        """The reason why a stop cannot be kept, as text; empty if it can be kept."""
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         except OSError as error:

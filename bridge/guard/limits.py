@@ -70,13 +70,13 @@ def held(p: GuardParams, s: GuardMemory, frequency_Hz: float, amplitude_m: float
             result_m = min(result_m, p.alarm[DRIVE_RATIO - FIRST] * s.drive_mps / per_m)
             s.ratio_blocks += 1
             if s.ratio_blocks <= p.window_blocks:
-                s.limit = before  # not reported: the drive starts, and its velocity is seen with this delay
+                s.limit = before  # not reported: the drive starts, and its velocity is known after this delay
     return result_m
 
 
 @kernel
 def watch(p: GuardParams, s: GuardMemory) -> None:
-    """Update warmth, duty and loudness of the present vibration."""
+    """Update warmth and duty of the exciter, and check them and the measured vibration against their limits."""
     warmth = p.heat_per_Hz_m2 * s.frequency_Hz * s.amplitude_m * s.amplitude_m
     s.heat += p.heat_share * (warmth - s.heat)
     s.duty += p.duty_share * ((1.0 if s.amplitude_m > 0.0 else 0.0) - s.duty)
@@ -88,6 +88,6 @@ def watch(p: GuardParams, s: GuardMemory) -> None:
         s.loud_blocks = 0
         return
     s.loud_blocks += 1
-    starts = s.vibration_mps <= p.alarm[LOUD - FIRST] * s.fastest_mps  # the drive, whose velocity is seen with a delay
-    if starts or _REPORT_PARTS * s.loud_blocks <= p.hold_blocks[LOUD - FIRST]:
-        s.limit = before  # not reported: the drive starts, or a stopping machine shakes its base for a moment
+    drive_starts = s.vibration_mps <= p.alarm[LOUD - FIRST] * s.fastest_mps
+    if drive_starts or _REPORT_PARTS * s.loud_blocks <= p.hold_blocks[LOUD - FIRST]:
+        s.limit = before  # not reported: the velocity of a starting drive is known late, and a stopping machine shakes its base

@@ -10,7 +10,7 @@ from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
 from bridge.wire.topics import COMMAND
 from bridge.wire.zenoh_link import Received
 
-# beyond any exciter that vibrates a machine; smaller values are limited by the rig to its stroke and band
+# Commands above these values are dropped: no exciter of a machine reaches them. The guard limits smaller values.
 _LARGEST_M = 1e-3
 _HIGHEST_HZ = 1e6
 
@@ -26,7 +26,7 @@ class CommandQueue:
     def __init__(self, complaints: Complaints) -> None:
         self._complaints = complaints
         self._waiting: collections.deque[Received] = collections.deque(maxlen=WAITING)
-        self._came = 0  # written by the receiving thread alone
+        self._pushed = 0  # written by the receiving thread alone
         self._read = 0
         self._lost = 0
         self._newest = 0  # block answered by the newest command
@@ -34,7 +34,7 @@ class CommandQueue:
     def push(self, received: Received) -> None:
         """Add a command."""
         self._waiting.append(received)
-        self._came += 1
+        self._pushed += 1
 
     def take(self, block: int) -> list[tuple[Received, int]]:
         """The commands since the last call, each with the block that it answers.
@@ -49,7 +49,7 @@ class CommandQueue:
             if answered is not None:
                 commands.append((received, answered))
         # received commands that were neither read nor wait; a command being added now counts at the next call
-        lost = self._came - self._read - len(self._waiting) - self._lost
+        lost = self._pushed - self._read - len(self._waiting) - self._lost
         if lost > 0:
             self._lost += lost
             self._complaints.note(FLOOD, COMMAND.name, "too many for one block: the oldest were dropped", lost)
@@ -62,11 +62,8 @@ class CommandQueue:
         except Fault as fault:
             self._complaints.note(BAD_MESSAGE, COMMAND.name, f"{fault.line.partition(': ')[2]}: dropped")
             return None
-        amplitude_m, frequency_Hz, answered = (
-            float(command.amplitude_m),
-            float(command.frequency_Hz),
-            int(command.block),
-        )
+        amplitude_m, frequency_Hz = float(command.amplitude_m), float(command.frequency_Hz)
+        answered = int(command.block)
         if not (0.0 <= amplitude_m <= _LARGEST_M and 0.0 <= frequency_Hz <= _HIGHEST_HZ):
             text = f"{amplitude_m:g} m at {frequency_Hz:g} Hz is not a vibration: dropped"
             self._complaints.note(BAD_MESSAGE, f"{COMMAND.name} amplitude", text)
@@ -76,7 +73,7 @@ class CommandQueue:
             self._complaints.note(FOREIGN, f"{COMMAND.name} ahead", text)
             return None
         if answered < self._newest:
-            text = f"answers block {answered}, while block {self._newest} was answered: dropped"
+            text = f"answers block {answered}, after block {self._newest} was answered: dropped"
             self._complaints.note(FOREIGN, f"{COMMAND.name} behind", text)
             return None
         self._newest = answered

@@ -26,12 +26,13 @@ from bridge.wire.stickslip_pb2 import (
 )
 
 LIMITS = OVERTRAVEL, DRIVE_MAX, DRIVE_RATIO, LOUD, BAND, HEAT, DUTY  # limits with a level and a hold time
-FIRST = min(LIMITS)  # the tables below count the causes of limits from here
-MOST_TONES = 8
-_RING = 256  # block means of the drive's position: 50 ms of blocks of 0.25 ms
-_DRIVE_WINDOW_S = 0.05  # of the drive's velocity. Shorter: noise; longer: a delay, which loosens a limit while braking
-_LOUD_FILTER_S = 0.01  # of the measured v_a. Shorter: a slip that shakes the base counts as vibration
-_TONES = 5
+FIRST = min(LIMITS)  # arrays with an entry per limit begin with this limit
+MOST_TONES = 8  # most tones of a loop check
+RING = 256  # kept block means of the drive's position: more than 50 ms of blocks of 0.25 ms
+# Window of the drive's velocity. Shorter: noise; longer: a delay, which loosens a limit while braking.
+_DRIVE_WINDOW_S = 0.05
+_LOUD_FILTER_S = 0.01  # time constant of the measured v_a. Shorter: a slip that shakes the base counts as vibration
+_TONES = 5  # tones of a loop check without `check_Hz`
 
 PARAMS = np.dtype(
     [("run", "u8")]
@@ -66,12 +67,11 @@ STATE = np.dtype(
             *("heat", "duty", "quiet_mps2", "tone_mps2"),
         )
     ]
-    + [("over_blocks", "i8", (len(LIMITS),)), ("drive_m", "f8", (_RING,)), ("gain", "f8", (MOST_TONES,))]
+    + [("over_blocks", "i8", (len(LIMITS),)), ("drive_m", "f8", (RING,)), ("gain", "f8", (MOST_TONES,))]
     + [("accepted", "f8", (MOST_TONES,))]  # gains of the tones that later checks are compared with; 0: none yet
     + [(name, "f8", (len(CHANNELS),)) for name in ("lowest", "highest")],
     align=True,
 )
-RING = _RING
 
 
 class ExciterLimits(NamedTuple):
@@ -92,7 +92,7 @@ def build(
     """Parameters and state of a guard at power-up.
 
     Args:
-        config, exciter: of the rig file.
+        config, exciter: limits and exciter of the rig file.
         run: the number that each command must carry.
         arm: the rig is simulated, and its scenario arms it.
         stop_kept: the operator's stop of an earlier run holds.
@@ -131,7 +131,7 @@ def build(
     p.gain_change = config.gain_change
     p.check_m = config.check_share * stroke.alarm
     p.timeout_blocks = round(exciter.command_timeout_s / exciter.block_s)
-    p.window_blocks = min(max(round(_DRIVE_WINDOW_S / exciter.block_s), 2), _RING - 1)
+    p.window_blocks = min(max(round(_DRIVE_WINDOW_S / exciter.block_s), 2), RING - 1)
     p.bands = len(config.forbidden_Hz)
     for i, (low, high) in enumerate(config.forbidden_Hz):
         p.band_Hz[i] = low, high

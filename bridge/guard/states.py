@@ -44,7 +44,7 @@ def trip(s: GuardMemory, cause: int) -> None:
 
 
 @kernel
-def apply_order(s: GuardMemory, word: int) -> bool:
+def apply_order(s: GuardMemory, order: int) -> bool:
     """Apply an order of the operator or of the ending process. Returns whether it changed the state.
 
     A stop is valid in every state. ARM begins a check in DISARMED, in ARMED without a check, and in READY after a change of the
@@ -52,22 +52,22 @@ def apply_order(s: GuardMemory, word: int) -> bool:
     reset first.
     """
     before = s.state
-    if word == STOP:
+    if order == STOP:
         enter(s, FAULT, STOP_BY_PERSON)
         return True
-    if word == RESET and before == FAULT:
+    if order == RESET and before == FAULT:
         enter(s, DISARMED, RESET_BY_PERSON)
-    elif word in (ARM, ACCEPT_GAIN):
+    elif order in (ARM, ACCEPT_GAIN):
         changed = before == READY and s.cause == GAIN_CHANGED
-        if changed and word == ACCEPT_GAIN:
+        if changed and order == ACCEPT_GAIN:
             s.accepted[:] = s.gain
             enter(s, ARMED, GAIN_ACCEPTED)
         elif changed or before == DISARMED or (before == ARMED and s.verified == 0):
             enter(s, CHECKING, ARMED_BY_PERSON)
         elif before == READY:
             enter(s, ARMED, ARMED_BY_PERSON)
-    elif word in (DISARM, LEAVE) and before not in (DISARMED, FAULT):
-        enter(s, DISARMED, DISARMED_BY_PERSON if word == DISARM else RUN_ENDED)
+    elif order in (DISARM, LEAVE) and before not in (DISARMED, FAULT):
+        enter(s, DISARMED, DISARMED_BY_PERSON if order == DISARM else RUN_ENDED)
     return before != s.state
 
 

@@ -5,12 +5,12 @@ mcap_chunks, runlog      writing in small chunks, so that a kill costs at most o
 viewers/                 topics for the viewers of other programs
 storage/                 the files of a log: their order, the reaction to a failing disk, checksums, the verdict file
 block_rows               the messages of many blocks as the bytes of a chunk
-screen                   which messages go into a log
+screen                   filter of the messages that go into a log
 recorder                 the process that writes every message on the bus
-log_reader, logfile      reading without seeking, whole or cut; its topics as arrays
-chunk_messages           where the messages are in the bytes of chunks
+log_reader, logfile      reading a log, whole or cut, without seeking; its topics as arrays
+chunk_messages           places of the messages in the bytes of chunks
 reading/                 chunks of any compression, and the definitions of channels
-damage, recover          losses found by the reader; a cut log made whole
+damage, recover          losses found by the reader; repair of a cut or damaged log
 check/                   faults of a log: of its schemas, of each channel (for evidence too), and all of them together
 topic_watch              missing messages, duplicates and clock jumps of one topic
 watches/                 events and percentiles of a log, in a memory that does not grow

@@ -14,8 +14,8 @@ from bridge.wire.messages import Records
 class MessageRows(NamedTuple):
     """The message records of a part of a chunk, and their places."""
 
-    data: memoryview  # of bytes
-    entries: dict[int, npt.NDArray[Any]]  # by channel: log time [ns] and offset in `data` of each message
+    data: memoryview  # the bytes of the records
+    entries: dict[int, npt.NDArray[Any]]  # log time [ns] and offset in `data` of each message, by channel
     first_ns: int
     last_ns: int
 
@@ -53,11 +53,11 @@ def rows(
     group = np.dtype([("blocks", block, (blocks // groups,)), *last])
     laid_out = np.empty(groups, group)  # without gaps; every byte is filled
     starts = np.arange(groups, dtype=np.uint64) * np.uint64(group.itemsize)
-    of_block = np.arange(blocks // groups, dtype=np.uint64) * np.uint64(block.itemsize)
+    block_starts = np.arange(blocks // groups, dtype=np.uint64) * np.uint64(block.itemsize)
     entries: dict[int, npt.NDArray[Any]] = {}
     places = [
         *(
-            (channel, each[channel], laid_out["blocks"][str(channel)], block, starts[:, None] + of_block)
+            (channel, each[channel], laid_out["blocks"][str(channel)], block, starts[:, None] + block_starts)
             for channel in each
         ),
         *((channel, after[channel], laid_out[str(channel)], group, starts) for channel in after),

@@ -12,7 +12,7 @@ from mcap.opcode import Opcode
 
 from bridge.log.library import HEAD as _RECORD
 
-HEAD = np.dtype(  # of a message record, before its payload
+HEAD = np.dtype(  # the fields of a message record before its payload
     [
         ("opcode", "u1"),
         ("length", "<u8"),
@@ -22,7 +22,7 @@ HEAD = np.dtype(  # of a message record, before its payload
         ("publish_ns", "<u8"),
     ]
 )
-FIELDS_BYTES = HEAD.itemsize - _RECORD.size  # in a message record, between its length and its payload
+FIELDS_BYTES = HEAD.itemsize - _RECORD.size  # bytes of a message record between its length and its payload
 _INDEX_HEAD_BYTES = 6  # channel, length of the entries
 INDEX_ENTRY = np.dtype([("log_ns", "<u8"), ("offset", "<u8")])
 
@@ -40,7 +40,7 @@ class Chunked(NamedTuple):
 class ChunkWalk(NamedTuple):
     """The result of a walk through the records of a chunk."""
 
-    offsets: Column  # of the messages
+    offsets: Column  # begins of the message records
     others: list[tuple[int, bytes]]  # opcode and content of all other records
     broken: int  # number of byte stretches without a whole record
 
@@ -49,34 +49,34 @@ class ChunkWalk(NamedTuple):
 class Messages:
     """Messages of some chunks in file order."""
 
-    data: Bytes  # of the chunks
+    data: Bytes  # the bytes of the chunks
     heads: npt.NDArray[Any]  # [messages], with the fields length, channel, sequence, log_ns and publish_ns
     channel: npt.NDArray[np.uint16]  # [messages]; numpy sorts 16-bit numbers five times as fast as 64-bit numbers
-    start: Column  # of the payload in `data`, [messages]
+    start: Column  # begin of the payload in `data`, [messages]
     others: Sequence[tuple[int, bytes]] = ()  # records between them, mostly definitions: opcode and content
     broken: int = 0  # number of byte stretches between them without a whole record
 
     @cached_property
     def by_channel(self) -> "dict[int, Messages]":
         """The messages of each channel, in file order."""
-        whole = self._some(np.argsort(self.channel, kind="stable"))
+        ordered = self._rows(np.argsort(self.channel, kind="stable"))
         ends = np.cumsum(np.bincount(self.channel))
         parts = [slice(begin, end) for begin, end in pairwise([0, *ends.tolist()])]
         return {
-            channel: Messages(self.data, whole.heads[part], whole.channel[part], whole.start[part])
+            channel: Messages(self.data, ordered.heads[part], ordered.channel[part], ordered.start[part])
             for channel, part in enumerate(parts)
             if part.start < part.stop
         }
 
     def of(self, channels: Sequence[int]) -> "Messages":
         """The messages of the given channels, in file order."""
-        return self._some(np.flatnonzero(np.isin(self.channel, channels)))
+        return self._rows(np.flatnonzero(np.isin(self.channel, channels)))
 
-    def _some(self, rows: Column) -> "Messages":
+    def _rows(self, rows: Column) -> "Messages":
         return Messages(self.data, _as_bytes(self.heads)[rows].view(HEAD), self.channel[rows], self.start[rows])
 
     def payloads(self, most: int | None = None) -> list[bytes]:
-        """The payload of each, or of the first `most`."""
+        """The payload of each message, or of the first `most` messages."""
         starts = self.start[:most]
         ends = starts + self.heads["length"][:most].astype(np.int64) - FIELDS_BYTES
         return [self.data[start:end].tobytes() for start, end in zip(starts, ends, strict=True)]
@@ -116,7 +116,7 @@ def _indexed(chunks: Sequence[Chunked], begins: Column) -> Column:
         for content in chunk.indexes
         if len(content) > _INDEX_HEAD_BYTES and len(content) % INDEX_ENTRY.itemsize == _INDEX_HEAD_BYTES
     ]
-    # a few ascending parts, which a stable sort merges: 15 times as fast as the usual one
+    # the parts ascend, and a stable sort merges them: 15 times as fast as the default sort
     return np.sort(np.concatenate(parts), kind="stable") if parts else np.empty(0, np.int64)
 
 
@@ -131,10 +131,10 @@ def _tile(begins: Column, offsets: Column, heads: npt.NDArray[Any]) -> bool:
     """Whether the chunks consist of messages at these offsets and of nothing else, so that a walk gives the same result."""
     ends = offsets + _RECORD.size + heads["length"].astype(np.int64)
     messages = (heads["opcode"] == Opcode.MESSAGE) & (heads["length"] >= FIELDS_BYTES)
-    whole = offsets[0] == 0 and (ends[:-1] == offsets[1:]).all() and ends[-1] == begins[-1] and messages.all()
+    gapless = offsets[0] == 0 and (ends[:-1] == offsets[1:]).all() and ends[-1] == begins[-1] and messages.all()
     # no message crosses the border of two chunks
     return bool(
-        whole and (offsets[np.minimum(np.searchsorted(offsets, begins[:-1]), len(offsets) - 1)] == begins[:-1]).all()
+        gapless and (offsets[np.minimum(np.searchsorted(offsets, begins[:-1]), len(offsets) - 1)] == begins[:-1]).all()
     )
 
 
@@ -161,7 +161,7 @@ def _walked(data: bytes) -> ChunkWalk:
 
 
 def _as_bytes(heads: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """The heads without fields: numpy copies these in one go, and records with fields field by field."""
+    """The heads without fields: numpy copies such elements whole, and records with fields field by field."""
     return heads.view(f"V{HEAD.itemsize}")
 
 

@@ -7,20 +7,20 @@ from bridge.log.finding import Finding, findings_at
 from bridge.units import counted
 
 _COUNTS = ("cut_bytes", "bad_chunks", "bad_records", "nameless", "missing")
-_MOST_TOPICS = 4  # of other programs that are named
+_MOST_TOPICS = 4  # topics of other programs that the message names
 
 
 class Damage(NamedTuple):
     """The parts of a log that could not be read."""
 
-    cut_bytes: int  # from the first record that is not whole to the end of the file
+    cut_bytes: int  # length of the file's end from the first incomplete record on
     bad_chunks: int  # number of whole chunks with a wrong checksum
     closed: bool  # the file has its footer
     bad_records: int = 0  # number of definitions, tables, messages or stretches of bytes that cannot be read
     nameless: int = 0  # messages of a channel whose definition is lost: their topic cannot be known
-    missing: int = 0  # messages that the file's own count has and that were not found
+    missing: int = 0  # messages by the statistics in the file, less the messages read
     before: str = ""  # earlier losses of the log that this log was recovered from, as text
-    first_bad: str = ""  # why the first message that is whole cannot be read
+    first_bad: str = ""  # fault of the first complete message that cannot be read
 
     @property
     def whole(self) -> bool:
@@ -41,14 +41,14 @@ def of_all_files(damages: list[Damage]) -> Damage:
 
 
 def also_before(damage: Damage, lost: str) -> Damage:
-    """Add an earlier loss, in the words of the file."""
+    """Add an earlier loss, as text from the file."""
     known = damage.before.split("; ") if damage.before else []
     return damage if not lost or lost in known else damage._replace(before="; ".join([*known, lost]))
 
 
 def lost_in_words(damage: Damage) -> str:
     """The losses as text; empty for a log without losses."""
-    parts = [f"{counted(damage.cut_bytes, 'byte')} of an open chunk at the end"] if damage.cut_bytes else []
+    parts = [f"{counted(damage.cut_bytes, 'byte')} at the end"] if damage.cut_bytes else []
     parts += [counted(damage.bad_chunks, "damaged chunk")] if damage.bad_chunks else []
     if damage.bad_records:
         names = "damaged definition, message or stretch", "damaged definitions, messages or stretches"
@@ -56,7 +56,7 @@ def lost_in_words(damage: Damage) -> str:
     if damage.nameless:
         parts.append(f"{counted(damage.nameless, 'message')} whose topic is lost with its definition")
     if damage.missing:
-        parts.append(f"{counted(damage.missing, 'message')} by the log's own count")
+        parts.append(f"{counted(damage.missing, 'message')} that the log's statistics count")
     parts += ["its end"] if not (parts or damage.whole) else []
     return ", ".join(parts)
 
@@ -64,30 +64,30 @@ def lost_in_words(damage: Damage) -> str:
 def damage_findings(damage: Damage, path: Path) -> list[Finding]:
     """A finding for each kind of loss in a log."""
     remedy = f"`stickslip log recover {path}` saves the rest"
-    cut = 0 if damage.closed else max(damage.cut_bytes, 1)
+    cut, cut_bytes = 0 if damage.closed else max(damage.cut_bytes, 1), counted(damage.cut_bytes, "byte")
     chunks = counted(damage.bad_chunks, "chunk is", "chunks are")
     first = f", first: {damage.first_bad}" if damage.first_bad else ""
-    nonsense = f"{damage.bad_records} definitions, messages or stretches of bytes make no sense{first}"
+    nonsense = f"{damage.bad_records} definitions, messages or stretches of bytes cannot be read{first}"
     whose = counted(damage.nameless, "message belongs", "messages belong")
     more = counted(damage.missing, "message")
-    before = f"was saved from a log that was not whole; how many messages are missing is not known: {damage.before}"
+    before = f"was recovered from a damaged log; the number of missing messages is not known: {damage.before}"
     rows = (
-        ("cut", cut, f"has no end, {damage.cut_bytes} bytes of an open chunk were lost; {remedy}"),
+        ("cut", cut, f"has no valid end; {cut_bytes} after its last whole record cannot be read; {remedy}"),
         ("damaged", damage.bad_chunks, f"{chunks} damaged; {remedy}"),
         ("damaged", damage.bad_records, f"{nonsense}; {remedy}"),
         ("damaged", damage.nameless, f"{whose} to a channel whose definition is lost: the topic cannot be known"),
-        ("damaged", damage.missing, f"the file's own count has {more} more than are in it"),
+        ("damaged", damage.missing, f"the file's statistics count {more} more than the file holds"),
         ("recovered", int(bool(damage.before)), before),
     )
     return findings_at(path.name, rows)
 
 
 def foreign_in_words(foreign: dict[str, int]) -> list[str]:
-    """One line on the skipped messages of other programs; empty if there are none."""
+    """One line on the skipped messages of other programs; empty without such a message."""
     if not foreign:
         return []
     names = [topic or "a topic without a name" for topic in foreign]
     named = ", ".join(names[:_MOST_TOPICS]) + (
         f" and {len(names) - _MOST_TOPICS} more" if len(names) > _MOST_TOPICS else ""
     )
-    return [f"{counted(sum(foreign.values()), 'message')} of other programs passed over: {named}"]
+    return [f"{counted(sum(foreign.values()), 'message')} of other programs skipped: {named}"]

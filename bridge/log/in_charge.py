@@ -12,34 +12,34 @@ from bridge.wire.event_codes import WEAK_REASONS
 from bridge.wire.messages import Records
 from bridge.wire.words import help_of
 
-NO_COMMAND = (1 << 64) - 1  # in `Applied.command_block`: the rig has none, before the first or on its way out
+NO_COMMAND = (1 << 64) - 1  # in `Applied.command_block`: no command, before the first one or while the rig ends its run
 # A longer fallback means that the controller is absent, not stalled. Smaller: a controller that stalls for 0.5 s counts as
 # absent. Larger: slips without a controller count as slips in a stall. The bus drops a frozen process after its lease, 1.5 s.
 GONE_S = 1.0
-UNANSWERED_SHARE = 0.01  # of the blocks: more without an answer is a fault; every busy desktop has fewer now and then
-WEAK_S = 1.0  # longest time of a reason for ineffective vibration; above it the log has a fault
-_MOST_STRETCHES = 1000  # that a result lists; of more, only their time
+UNANSWERED_SHARE = 0.01  # share of blocks without an answer that is still no fault; every busy desktop has some
+WEAK_S = 1.0  # longest total time of a reason for ineffective vibration that is still no fault
+_MOST_STRETCHES = 1000  # most stretches that a result lists; the total time includes all
 
 
 class InCharge(NamedTuple):
-    """Who was in charge, over a whole log."""
+    """Time with and without a controller in charge, over a whole log."""
 
-    fallback_s: float  # time in which the rig heard no fresh command and was on its own
-    fallbacks: int  # stretches of it
+    fallback_s: float  # time in which the rig had no fresh command
+    fallbacks: int  # number of stretches without a fresh command
     longest_fallback_s: float
     stretches: list[tuple[float, float]]  # from and until [s of the run], at most 1000
     unanswered: int  # blocks that no command answers, fallback included
     answerable: int  # blocks from the first command on
-    controller_until_s: float | None  # of a controller that was not there until the end: its last step; None: it was
+    controller_until_s: float | None  # last step of a controller that left before the end; None: it stayed
     reasons_s: dict[str, float]  # time of each reason for ineffective vibration
 
     @property
     def alone(self) -> bool:
-        """Whether the rig was on its own for longer than late commands explain."""
+        """Whether the rig was without a controller for longer than late commands explain."""
         return self.longest_fallback_s > GONE_S or self.controller_until_s is not None
 
     def sentences(self) -> list[tuple[str, str, bool]]:
-        """Code, words, and whether it is a fault, of each event that an operator should know."""
+        """Code, text and whether it is a fault, for each event that an operator should know."""
         rows: list[tuple[str, str, bool]] = []
         if self.fallbacks:
             where = f", first from {self.stretches[0][0]:.2f} s on" if self.stretches else ""
@@ -69,14 +69,14 @@ class InCharge(NamedTuple):
 
 
 class ChargeWatch:
-    """Looks at one log, piece by piece, in file order; the memory does not grow with the log."""
+    """Collects the times of one log, piece by piece, in file order; the memory does not grow with the log."""
 
     def __init__(self) -> None:
-        self.stretches: list[tuple[float, float]] = []  # all that ended
+        self.stretches: list[tuple[float, float]] = []  # ended fallbacks: from and until [s of the run]
         self._fallbacks = 0
         self._fallback_ns = self._longest_ns = 0
-        self._since_ns: int | None = None  # of the fallback that goes on
-        self._leaving = False  # it is the rig's own way out
+        self._since_ns: int | None = None  # begin of the present fallback
+        self._leaving = False  # the present fallback ends the rig's run
         self._commanded = False  # the rig has had a command
         self._block_ns = 0
         self._end_ns = self._last_block = 0
@@ -120,7 +120,7 @@ class ChargeWatch:
 
     @property
     def open_from_s(self) -> float | None:
-        """Begin of the fallback that goes on [s]; None without a fallback, or while the rig ends its run."""
+        """Begin of the present fallback [s]; None without a fallback, or while the rig ends its run."""
         return self._since_ns * 1e-9 if self._since_ns is not None and not self._leaving else None
 
     def command(self, records: Records) -> None:
@@ -148,7 +148,7 @@ class ChargeWatch:
             self._reasons[reason] += int(np.count_nonzero(records["reason"] == reason))
 
     def result(self) -> InCharge:
-        """All of it, at the end of the log."""
+        """The times of the whole log, at its end."""
         if self._since_ns is not None and not self._leaving:
             self._end(self._end_ns)
         first = self._first_answered

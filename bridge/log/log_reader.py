@@ -34,7 +34,7 @@ from bridge.log.storage.parts import LOST, OF_FILES, parts_of
 # Largest ratio of uncompressed bytes to the size of the log, and an allowance for short logs. A message of zeros compresses to
 # nothing but still costs 16 bytes of index, so even a block of 200 zeros per channel stays below 200.
 _LARGEST_RATIO = 200
-_ANYWAY_BYTES = 1 << 24
+_ALLOWANCE_BYTES = 1 << 24
 _FOOTER_BYTES = 20
 # bytes of chunks parsed at once. Smaller: call overhead dominates, as a chunk of 0.1 s holds 0.1 MB
 AT_ONCE_BYTES = 1 << 19
@@ -46,11 +46,11 @@ _Part = tuple[Chunk | bytes | None, list[bytes]]  # a chunk, or a message outsid
 
 
 class _Group(NamedTuple):
-    """Messages of chunks, or outside of chunks, that a second thread has parsed."""
+    """Messages that a second thread has parsed, from chunks or from outside of chunks."""
 
     messages: Messages | None  # None if none of its chunks can be read
     bad_chunks: int
-    end_bytes: int  # place of their end in the file
+    end_bytes: int  # end of the group in the file
 
 
 def _parsed(parts: list[_Part], end_bytes: int) -> _Group:
@@ -61,8 +61,8 @@ def _parsed(parts: list[_Part], end_bytes: int) -> _Group:
         if data is not None:
             chunks.append(Chunked(data, indexes))
     messages = messages_of(chunks) if chunks else None
-    for mine in messages.by_channel.values() if messages is not None else ():
-        _ = mine.stacked  # computed here, because the caller's thread has more work
+    for channel in messages.by_channel.values() if messages is not None else ():
+        _ = channel.stacked  # computed here, because the caller's thread has more work
     return _Group(messages, len(parts) - len(chunks), end_bytes)
 
 
@@ -87,8 +87,8 @@ class LogReader:
         self.attachments = 0
         self.size_bytes = 0
         self.position_bytes = 0  # end of the part that was read
-        self.definitions = Definitions(path)  # of the file being read
-        self._any_own = False
+        self.definitions = Definitions(path)  # definitions of the file that is being read
+        self._any_topic = False
         self._claimed_bytes = 0  # uncompressed size of the chunks so far
         self._stated: int | None = None  # number of messages according to the file's statistics
 
@@ -129,7 +129,7 @@ class LogReader:
                 closed &= self.damage.closed
                 if self._stated is not None:
                     self.damage = self.damage.and_also(missing=max(self._stated - read, 0))
-                self._any_own |= self.definitions.any_own()
+                self._any_topic |= self.definitions.any_own()
                 before_bytes += size_bytes
                 self.position_bytes = before_bytes
             self.damage = self.damage._replace(closed=closed)
@@ -141,7 +141,7 @@ class LogReader:
 
     def _begin(self, path: Path) -> None:
         """Reset the state of the previous file: channel numbers are valid within one file only."""
-        self._any_own |= self.definitions.any_own()
+        self._any_topic |= self.definitions.any_own()
         self.damage = self.damage._replace(closed=False)
         self.definitions = Definitions(path)
         self._stated = None
@@ -175,8 +175,8 @@ class LogReader:
             raise Fault("BAD_LOG", line)
         at = len(MAGIC)  # end of the whole records
         parts: list[_Part] = []
-        waiting_bytes = 0  # of the parts, uncompressed, as the chunks claim
-        indexes: list[bytes] | None = None  # of the chunk just before
+        waiting_bytes = 0  # uncompressed size of the parts, as the chunks claim
+        indexes: list[bytes] | None = None  # index records of the previous chunk; None if another record followed it
         while not self.damage.closed:
             record = next_record(file, at, size_bytes)
             is_index = record is not None and record.opcode == Opcode.MESSAGE_INDEX and not record.is_chunk
@@ -197,7 +197,7 @@ class LogReader:
             indexes = None
             if record.is_chunk:
                 chunk = opened(record.content)
-                self._refuse_a_bomb(chunk)
+                self._refuse_inflated(chunk)
                 indexes = []
                 parts.append((chunk, indexes))
                 waiting_bytes += chunk.uncompressed_size if chunk is not None else 0
@@ -205,7 +205,9 @@ class LogReader:
                 parts.append((HEAD.pack(Opcode.MESSAGE, len(record.content)) + record.content, []))
                 waiting_bytes += len(record.content)
             elif record.opcode == Opcode.FOOTER and len(record.content) == _FOOTER_BYTES:
-                self.damage = self.damage._replace(closed=True)
+                # bytes after the end, or an incomplete one, would hide a wrong checksum of the file
+                self.damage = self.damage._replace(closed=file.read(len(MAGIC) + 1) == MAGIC)
+                file.seek(at)
             elif record.opcode == Opcode.ATTACHMENT:
                 self.attachments += 1
             elif is_definition:
@@ -217,12 +219,12 @@ class LogReader:
         if not self.damage.closed:
             self.damage = self.damage.and_also(cut_bytes=size_bytes - at)
 
-    def _refuse_a_bomb(self, chunk: Chunk | None) -> None:
+    def _refuse_inflated(self, chunk: Chunk | None) -> None:
         """Raise Fault BAD_LOG for chunks that claim more data than a log of this size can hold, before any is uncompressed."""
         if chunk is None or not chunk.compression:
             return
         self._claimed_bytes += chunk.uncompressed_size
-        most_bytes = _ANYWAY_BYTES + _LARGEST_RATIO * self.size_bytes
+        most_bytes = _ALLOWANCE_BYTES + _LARGEST_RATIO * self.size_bytes
         line = f"{self.path}: {self.size_bytes / 1e3:.0f} kB"
         if chunk.uncompressed_size > LARGEST_CHUNK_BYTES:
             rule = f"must be at most {LARGEST_CHUNK_BYTES / 1e6:.0f} MB"
@@ -237,14 +239,14 @@ class LogReader:
     def _must_be_ours(self) -> None:
         """Raise Fault BAD_LOG for a file without a topic of this project."""
         foreign = self.definitions.foreign_schemas()
-        # a run that was cut before its first definition
+        # True for a run that was cut before its first definition
         began = self.header is not None and self.header.library in READABLE
-        if self._any_own or (began and not foreign):
+        if self._any_topic or (began and not foreign):
             return
         if foreign:
             named = ", ".join(foreign[:_MOST_NAMES]) + (", ..." if len(foreign) > _MOST_NAMES else "")
             line = f"{self.path}: holds no topic of a run: its messages are {named}; give a run log"
-            raise Fault("BAD_LOG", f"{line}. `stickslip log import` takes in measured data of another program")
+            raise Fault("BAD_LOG", f"{line}. `stickslip log import` reads measured data of another program")
         lost = "holds no header" if self.header is None else "defines no topic"
         why = "it was cut before anything was written, or its first bytes are damaged"
         raise Fault("BAD_LOG", f"{self.path}: {lost}; {why}")

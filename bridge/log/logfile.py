@@ -33,7 +33,7 @@ STREAMING = ("sensors", "applied", "command", "trace", "state", "announce")
 _LAYOUTS = {"applied": APPLIED, "command": COMMAND, "trace": TRACE, "state": STATE, "announce": ANNOUNCE}
 _DEFAULT_SAMPLES = 20
 _FIRST_BYTES = 1 << 26  # initial memory for a topic; a short run never outgrows it
-_COUNTED_BLOCKS = 100  # for their number of samples; a chunk of a run in real time holds as many
+_COUNTED_BLOCKS = 100  # blocks whose samples are counted; a chunk of a run in real time holds as many
 
 
 class Piece(NamedTuple):
@@ -42,7 +42,7 @@ class Piece(NamedTuple):
     topic: str
     log_time_ns: npt.NDArray[np.int64]  # [messages], time of arrival
     records: Records  # [messages] for a streaming topic; empty for another topic
-    messages: list[Any]  # of a topic that does not stream; payloads of a topic unknown to this version
+    messages: list[Any]  # parsed messages of a topic that does not stream; payloads of a topic unknown to this version
 
 
 def feed(reader: LogReader, watch: Any, progress: Callable[[float], None] | None = None) -> Checksums:
@@ -71,24 +71,24 @@ def iter_pieces(reader: LogReader, only: Container[str] | None = None) -> Iterat
     layouts: dict[str, Layout] = dict(_LAYOUTS)
     for messages in reader.messages():
         channels: dict[str, list[int]] = {}
-        for channel_id, mine in messages.by_channel.items():
+        for channel_id, selected in messages.by_channel.items():
             topic = reader.topic(channel_id)
             if topic is None:
-                reader.pass_over(channel_id, len(mine.start))
+                reader.pass_over(channel_id, len(selected.start))
             # channels of one topic may alternate: two publishers, or a log that was merged
             elif topic not in DERIVED and (only is None or topic in only):
                 channels.setdefault(topic, []).append(channel_id)
-        for topic, same in channels.items():
-            mine = messages.by_channel[same[0]] if len(same) == 1 else messages.of(same)
-            log_ns = mine.heads["log_ns"].astype(np.int64)
+        for topic, ids in channels.items():
+            selected = messages.by_channel[ids[0]] if len(ids) == 1 else messages.of(ids)
+            log_ns = selected.heads["log_ns"].astype(np.int64)
             if topic in STREAMING:
                 if topic not in layouts:
-                    layouts[topic] = sensor_block(_samples(mine))
+                    layouts[topic] = sensor_block(_samples(selected))
                 layout = layouts[topic]
-                stacked, kept, why = _stacked(mine, layout, "/" + topic)
+                stacked, kept, why = _stacked(selected, layout, "/" + topic)
                 yield Piece(topic, log_ns[kept], np.frombuffer(stacked, layout.dtype), [])
             else:
-                read, kept, why = _readable(mine.payloads(), partial(_message, topic))
+                read, kept, why = _readable(selected.payloads(), partial(_message, topic))
                 yield Piece(topic, log_ns[kept], np.empty(0), read)
             reader.count_bad_messages(len(log_ns) - len(kept), why)
 
@@ -101,13 +101,13 @@ def _samples(messages: Messages) -> int:
 
 
 def _stacked(messages: Messages, layout: Layout, topic: str) -> tuple[Bytes, Indices, str]:
-    """The readable payloads with all fields in order, [messages, size]; their rows; why the first other cannot be read."""
+    """The readable payloads with all fields in order, [messages, size]; their rows; the fault of the first unreadable one."""
     stacked = messages.stacked
     if stacked is not None and (length := stacked.shape[1]) in layout.whole_sizes:
-        if length < layout.size:  # of an older schema, without the last fields
-            whole = np.frombuffer(layout.blank(len(stacked)).tobytes(), np.uint8).reshape(-1, layout.size).copy()
-            whole[:, :length] = stacked
-            stacked = whole
+        if length < layout.size:  # messages of an older schema, without the last fields
+            padded = np.frombuffer(layout.blank(len(stacked)).tobytes(), np.uint8).reshape(-1, layout.size).copy()
+            padded[:, :length] = stacked
+            stacked = padded
         if layout.all_canonical(stacked):
             return stacked, np.arange(len(stacked)), ""
     good, kept, why = _readable(messages.payloads(), lambda payload: layout.canonical(payload, topic))
@@ -120,7 +120,7 @@ def _message(topic: str, payload: bytes) -> Any:
 
 
 def _readable(payloads: list[bytes], read: Callable[[bytes], Any]) -> tuple[list[Any], Indices, str]:
-    """The payloads that can be read, as `read` returns them; their indices; why the first other cannot be read."""
+    """The readable payloads, as `read` returns them; their indices; the fault of the first unreadable one."""
     good: list[Any] = []
     kept: list[int] = []
     why = ""
@@ -163,10 +163,10 @@ class RunData(NamedTuple):
     announce: Records  # empty for a rig that announces nothing, and in a log of schema 1
     snapshots: list[wire.Snapshot]
     events: list[wire.Event]
-    headers: dict[str, dict[str, str]]  # by role: schema_version, configuration, versions
+    headers: dict[str, dict[str, str]]  # schema_version, configuration and versions, by role
     damage: Damage
     checksums: Checksums
-    foreign: dict[str, int]  # messages of topics of other programs, which were passed over
+    foreign: dict[str, int]  # number of skipped messages by topic of another program
 
     def configuration(self, role: str) -> dict[str, Any]:
         """The configuration of `role`, every default included. Raises Fault BAD_LOG when the log has none."""
@@ -176,8 +176,8 @@ class RunData(NamedTuple):
 class _Stack:
     """Bytes of one topic, joined piece by piece.
 
-    The memory grows in its place: the system moves its pages to where there is room, and copies nothing, so that a log is never
-    in memory twice. In large pages to fill 40 MB takes 10 ms of processor time, and 30 to 80 ms in small ones.
+    The memory grows without a copy, because the system moves its pages, so that a log is never in memory twice. Filling 40 MB
+    takes 10 ms of processor time in large pages and 30 to 80 ms in small ones.
     """
 
     def __init__(self) -> None:
@@ -186,7 +186,7 @@ class _Stack:
         self._used = 0
 
     def add(self, data: Bytes) -> None:
-        """Put bytes after those that are there."""
+        """Append bytes."""
         end = self._used + len(data)
         if end > len(self._memory):
             self._memory.resize(2 * end)  # memory that is not filled costs nothing
@@ -195,11 +195,11 @@ class _Stack:
         self._used = end
 
     def _in_large_pages(self) -> None:
-        with contextlib.suppress(OSError):  # of a system that has none
+        with contextlib.suppress(OSError):  # the system has no large pages
             self._memory.madvise(mmap.MADV_HUGEPAGE)
 
     def records(self, dtype: np.dtype[Any]) -> Records:
-        """All of it as messages, [messages]."""
+        """All bytes as messages, [messages]."""
         return np.frombuffer(self._memory, np.uint8)[: self._used].view(dtype)
 
 
@@ -242,5 +242,5 @@ def read_run(path: Path) -> RunData:
 def check_log_file(path: Path) -> None:
     """Raise Fault BAD_LOG if `path` is not a file; if the first file of a log is lost, the message names the next file."""
     later = [] if os.path.lexists(path) else later_names(path)
-    other = f"{later[0].name} in the same folder seems to be a later part of that log; " if later else ""
-    check_file(path, "BAD_LOG", f"{other}give the path of a run log, .mcap")
+    hint = f"{later[0].name} in the same folder seems to be a later part of that log; " if later else ""
+    check_file(path, "BAD_LOG", f"{hint}give the path of a run log, .mcap")

@@ -42,7 +42,7 @@ _MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log ti
 _INDEX_HEAD = struct.Struct("<BQHI")
 _INDEX_ENTRY = struct.Struct("<QQ")
 _INDEX_IN_MEMORY_BYTES = 1 << 16  # some 400 chunks. Larger: more memory; smaller: short runs need a temporary file
-_COPIED_BYTES = 1 << 18  # of the temporary file, copied at once
+_COPIED_BYTES = 1 << 18  # bytes of the temporary file that are copied at once
 
 
 class OpenChunk:
@@ -80,7 +80,7 @@ class ChunkWriter:
     Args:
         stream: the file.
         library: the program name in the header of the file.
-        folder: for the temporary file of the index, on the disk of the log; default: the system's folder.
+        folder: place of the index's temporary file, on the disk of the log; default: the system's folder.
 
     `more` is called with the bytes of each chunk that ends and its index entries by channel; it may return messages to add.
 
@@ -88,7 +88,7 @@ class ChunkWriter:
 
     def __init__(self, stream: IO[bytes], library: str, folder: Path | None = None) -> None:
         self._stream = stream
-        self.crc = self._whole_crc = 0  # of all bytes before the end of the data
+        self.crc = self._whole_crc = 0  # checksum of all bytes before the end of the data; up to the last `note_whole`
         self._folder = folder
         self._index: IO[bytes] = BytesIO()
         self.chunks = 0
@@ -222,7 +222,7 @@ class ChunkWriter:
         self.open_chunk = OpenChunk()
 
     def finish(self, index: bool = True) -> None:
-        """Write the open chunk, the index and the footer. Without `index` 50 bytes: readers scan the file instead of seeking."""
+        """Write the open chunk, the index and the footer; without `index` the footer, 50 bytes: readers then scan the file."""
         self.flush()
         self._stream.write(_encoded(DataEnd(data_section_crc=self.crc)))
         footer = Footer(summary_start=0, summary_offset_start=0, summary_crc=0)

@@ -8,7 +8,7 @@ from typing import Any
 
 from bridge.faults import Fault
 
-Metadata = Mapping[str, Mapping[str, str]]  # of a log: its tables by name, each with texts by key
+Metadata = Mapping[str, Mapping[str, str]]  # the tables of a log by name, each with texts by key
 
 
 def table_of(metadata: Metadata, name: str, key: str, path: Path) -> dict[str, Any]:

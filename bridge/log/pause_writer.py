@@ -10,9 +10,9 @@ from bridge.wire.pauses import Pause, PauseWatch
 from bridge.wire.topics import APPLIED
 from bridge.wire.zenoh_link import Received
 
-_LOOK_S = 0.1  # between two polls of the timers: the delay of a PAUSE on the bus
+_LOOK_S = 0.1  # time between two polls of the timers; a PAUSE is published with this delay
 _EVERY = 10  # the clock is set by every tenth message of the plant: 100 a second are enough
-_WINDOW_NS = 1_000_000_000  # in which the clock of another computer drifts by some 0.05 ms
+_WINDOW_NS = 1_000_000_000  # window for the earliest message; another computer's clock drifts by 0.05 ms within it
 
 
 class RunClock:
@@ -45,14 +45,14 @@ class PauseWriter:
 
     Args:
         log: the log, which sends its events on the bus.
-        watch: the timers.
+        watch: its timers find the stalls.
 
     """
 
     def __init__(self, log: RunLog, watch: PauseWatch) -> None:
         self._log, self._watch = log, watch
         self._clock = RunClock()
-        self._heard = 0
+        self._applied = 0
         self._refused = ""
         self._due_s = 0.0
         if not watch.refused:
@@ -63,10 +63,10 @@ class PauseWriter:
     def note(self, received: Received) -> None:
         """Set the clock by a message of the plant, and write new stalls if a poll is due."""
         if received.topic is APPLIED:
-            if self._heard % _EVERY == 0:
+            if self._applied % _EVERY == 0:
                 applied = APPLIED_LAYOUT.read(received.payload, APPLIED.name)[0]
                 self._clock.note(received.arrival_ns, int(applied.t_ns) + int(applied.late_ns))
-            self._heard += 1
+            self._applied += 1
         self.report_when_due()
 
     def report_when_due(self) -> None:

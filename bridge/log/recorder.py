@@ -24,16 +24,15 @@ from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
 _INBOX_LIMIT = 1 << 16  # messages, 16 s of a run at 4100 messages/s; smaller: messages are lost while the disk is busy
 _QUIET_S = 0.3  # silence after the last END from which no message can still arrive
 _PLANT_LOST_S = 1.0  # silence from which a plant that left the bus counts as lost
-_GIVEN_UP_S = 30.0  # wait for a lost rig; the recording then ends
-_LOOK_S = 0.05  # longest wait for a message: the delay of a stop and of the end of a chunk
+_GIVEN_UP_S = 30.0  # longest wait for a lost rig; the recording then ends
+_LOOK_S = 0.05  # longest wait for a message; a stop and the end of a chunk are delayed by at most this
 _STOP_S = 3.0  # longest recording after a stop; the plant fades out within 1 s, but a foreign rig may never end
 # Switch interval of Python's threads while both have work; the default is 5 ms. After a slow disk the loop works off its backlog:
 # with 5 ms the receiving thread takes only 200 of the 4100 messages per second, and the rig's link drops the others.
 _SWITCH_S = 5e-5
-_REPORT_S = 1.0  # between two reports of messages that did not fit into the inbox
-_ALOUD = frozenset(
-    {"LOG_LOST", "LOG_REPLACED", "LOG_WRITE", "DISK_SLOW", "DROPPED"}
-)  # events that are also printed for the operator
+_REPORT_S = 1.0  # shortest time between two reports of messages that did not fit into the inbox
+# events that are also printed for the operator
+_ALOUD = frozenset({"LOG_LOST", "LOG_REPLACED", "LOG_WRITE", "DISK_SLOW", "DROPPED"})
 
 
 def run(
@@ -51,13 +50,13 @@ def run(
 
     Args:
         path: the log.
-        bus_config: of the bus.
+        bus_config: the bus.
         roles: the processes whose configurations are awaited and written.
         about: further entries on the run, written as a table `run`.
         lockstep: log times are simulated times, and no message is dropped.
         stop: ends the recording.
         ready: called when the roles have answered, before the log is begun.
-        rotation: when the log goes on in a new file.
+        rotation: when the log continues in a new file.
         report: reports the state of this process to the operator.
 
     Raises Fault NO_PEER, NOT_SECURE, PEER_DIED, BAD_MESSAGE for a header of an unknown schema version, LOG_WRITE, LOG_LOST. In
@@ -111,7 +110,9 @@ def run(
             "ended", "stopped" if stop.is_set() else "with the rig" if not lost_plant else "the rig left without an END"
         )
     if lost_plant:
-        raise Fault("PEER_DIED", f"the plant went away before its end; {path} was closed with every message received")
+        raise Fault(
+            "PEER_DIED", f"the plant left the bus before its end; {path} was closed with every message received"
+        )
 
 
 def _record(

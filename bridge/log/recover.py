@@ -11,6 +11,7 @@ from bridge.log.library import LIBRARY
 from bridge.log.live import refuse_a_live_log
 from bridge.log.log_reader import LogReader
 from bridge.log.mcap_chunks import ChunkWriter
+from bridge.log.storage.checksums import checksums_of
 from bridge.log.storage.parts import LOST, PART, RECOVERED, part_of, parts_of
 from bridge.log.storage.verdict_file import remove_verdict
 
@@ -21,7 +22,7 @@ class Recovered(NamedTuple):
     out: Path
     messages: int
     damage: Damage
-    attachments: int  # that were left out
+    attachments: int  # number of attachments that were left out
     JSON_MERGED = "damage"
 
 
@@ -33,6 +34,9 @@ class _Copy:
         self.reader = reader
         self.messages = 0
         self.nameless = 0
+        self._changed = [
+            f"{name}: its bytes were changed after writing" for name in checksums_of(reader.path, not merged).damaged
+        ]
         writer.add_metadata(RECOVERED, {"from": reader.path.name})
         if not merged and (place := part_of(reader.path)) is not None:
             writer.add_metadata(PART, place.as_texts())
@@ -83,7 +87,7 @@ class _Copy:
         self.writer.flush()
 
     def record_losses(self) -> None:
-        """Record the losses in the new log, which looks whole: they could not be known later."""
+        """Record losses and changes in the new log, which looks undamaged, so that no reader could find them later."""
         damage = self.damage()
         if words := lost_in_words(damage):
             damage = also_before(damage, f"{self.reader.path.name}: {words}")
@@ -91,8 +95,11 @@ class _Copy:
             self.writer.add_metadata(LOST, {"what": damage.before})
 
     def damage(self) -> Damage:
-        """The losses of the new log."""
-        return self.reader.damage.and_also(nameless=self.nameless)
+        """The losses of the new log, and the changes of the old one."""
+        damage = self.reader.damage.and_also(nameless=self.nameless)
+        for change in self._changed:
+            damage = also_before(damage, change)
+        return damage
 
 
 def recover(path: Path, out: Path) -> Recovered:
@@ -119,7 +126,7 @@ def recover(path: Path, out: Path) -> Recovered:
 
 
 def _saved(reader: LogReader, out: Path, merged: bool, only_damaged: bool) -> Recovered:
-    """Write every readable message to `out`; with `only_damaged` only if something cannot be read."""
+    """Write every readable message to `out`; with `only_damaged` only if a part of the log cannot be read."""
     refuse_a_live_log(out, "--out")
     try:
         new = Replacement(out)

@@ -35,7 +35,7 @@ class RunLog:
     Args:
         path: the first file; its folder is made.
         lockstep: log times are simulated times, so that the same run gives the same bytes.
-        rotation: when to go on in a new file.
+        rotation: when the log continues in a new file.
         patient: a full disk does not end the log: it waits for space, and counts the messages lost until then.
         on_event: called with every event of the recorder.
 
@@ -50,7 +50,7 @@ class RunLog:
         on_event: Callable[[wire.Event], None] | None = None,
     ) -> None:
         self.path = path
-        self.t_ns = 0  # of the latest message
+        self.t_ns = 0  # time of the latest message
         self._lockstep = lockstep
         self._on_event = on_event
         self._next: dict[str, int] = {}
@@ -62,7 +62,7 @@ class RunLog:
         self._channels: dict[str, int] = {}
         old = parts_of(path)[1:] if path.is_file() else []
         self._files = LogFiles(path, self, rotation, patient)
-        for part in old:  # of the replaced log
+        for part in old:  # later files of the replaced log
             with contextlib.suppress(OSError):
                 part.unlink()
         remove_verdict(path)
@@ -135,10 +135,10 @@ class RunLog:
 
         """
         by_channel = [{self._channels[topic.name]: table for topic, table in part.items()} for part in (each, after)]
-        made = rows(by_channel[0], by_channel[1])
-        self.t_ns = max(self.t_ns, made.last_ns)
+        laid_out = rows(by_channel[0], by_channel[1])
+        self.t_ns = max(self.t_ns, laid_out.last_ns)
         if (writer := self._files.writer) is not None:
-            writer.add_rows(made)
+            writer.add_rows(laid_out)
 
     def flush(self) -> None:
         """End the open chunk, check the file, and start a new file if due. Raises Fault LOG_WRITE."""

@@ -7,7 +7,7 @@ from bridge.wire.complaints import BAD_MESSAGE, FOREIGN, Complaints
 from bridge.wire.inbox import Received
 from bridge.wire.payloads import parsed, sequence_and_time
 
-_HELD = 7  # messages of another count that are kept; the eighth confirms the count, and all are written
+_HELD = 7  # messages held back whose numbers do not continue; the eighth confirms the new count, and all are written
 
 
 class Screen:
@@ -22,7 +22,7 @@ class Screen:
         self._complaints = complaints
         self._numbers: dict[str, BlockNumbers] = {}
         self._held: dict[str, list[Received]] = {}
-        self._lengths: dict[str, int] = {}  # of the last message that was read, by topic
+        self._lengths: dict[str, int] = {}  # length of the last message that was parsed, by topic
 
     def passed(self, received: Received) -> list[Received]:
         """The messages to write now: this message, none, or this message after those held until its count was confirmed."""
@@ -46,10 +46,10 @@ class Screen:
             held.append(received)
             del held[:-_HELD]
             return []
-        believed = [*held, received] if verdict is not NumberCheck.AGAIN and numbers.jumped else [received]
+        accepted = [*held, received] if verdict is not NumberCheck.AGAIN and numbers.jumped else [received]
         if verdict is not NumberCheck.AGAIN:
             held.clear()
-        return believed
+        return accepted
 
     def _check(self, received: Received) -> None:
         """Raise Fault BAD_MESSAGE unless it is a message of its topic; a message as long as the previous one is not parsed.

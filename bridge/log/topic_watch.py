@@ -10,16 +10,14 @@ from bridge.wire.messages import Records
 
 # Tolerance between t_ns and the message numbers; rounding to whole nanoseconds stays far below it.
 _CLOCK_TOLERANCE_NS = 1000
-_REMEMBERED_NUMBERS = (
-    1 << 20
-)  # missing numbers that are stored, to distinguish a late message from a duplicate; costs memory
+_REMEMBERED_NUMBERS = 1 << 20  # most missing numbers that are stored, to distinguish a late message from a duplicate
 
-# Largest delay of a message, in numbers. A number 0 after a higher number starts a new run; the recorder has the same rule.
+# Largest delay of a message, in numbers. A number 0 after a number above this starts a new run.
 _LATEST = 256
 
 
 class TopicWatch:
-    """Checks one topic, message by message, in file order."""
+    """Checks the messages of one topic, in file order."""
 
     def __init__(self, topic: str) -> None:
         self.topic = topic
@@ -33,7 +31,7 @@ class TopicWatch:
         self._duplicates = self._late = 0
         self._first_duplicate = self._first_late = 0
         self._restarted_at: list[int] = []
-        self.jumps = self.standing = 0  # clock steps that do not follow the numbers; zero steps among them
+        self.jumps = self.standing = 0  # clock steps that do not follow the numbers; those among them that are 0
         self.first_jump = (0, 0)  # number, step less the expected one [ns]
         self._first_step_ns = 0
         self._arrived_before = 0
@@ -48,14 +46,14 @@ class TopicWatch:
 
     @property
     def end(self) -> int:
-        """The number after the highest."""
+        """The number that follows the highest number so far."""
         return self._highest + 1
 
     def add(self, records: Records, log_time_ns: Indices, period_ns: float) -> None:
         """Check the next messages.
 
         Args:
-            records: of the topic, [messages].
+            records: messages of the topic, [messages].
             log_time_ns: time of arrival, [messages].
             period_ns: time between two numbers if the sender counts it; 0 if times only must not go back.
 
@@ -77,18 +75,18 @@ class TopicWatch:
             if step[at] != 1:
                 self._odd_number(int(number[at]), int(number[at]) - int(step[at]))
                 at += 1
-            # late messages that follow one another
+            # consecutive late messages
             while at < len(number) and step[at] == 1 and number[at] <= self._highest:
                 self._odd_number(int(number[at]), int(number[at]) - 1)
                 at += 1
         # the running maximum; `_odd_number` resets it at a restart
         self._highest = max(self._highest, int(number[-1]))
         forward = step > 0
-        off_ns = step_ns - period_ns * step
-        jumped = np.flatnonzero(forward & (np.abs(off_ns) > _CLOCK_TOLERANCE_NS if period_ns else step_ns < 0))
+        excess_ns = step_ns - period_ns * step
+        jumped = np.flatnonzero(forward & (np.abs(excess_ns) > _CLOCK_TOLERANCE_NS if period_ns else step_ns < 0))
         if len(jumped):
             if not self.jumps:
-                self.first_jump = int(number[jumped[0]]), int(off_ns[jumped[0]])
+                self.first_jump = int(number[jumped[0]]), int(excess_ns[jumped[0]])
                 self._first_step_ns = int(step_ns[jumped[0]])
             self.jumps += len(jumped)
             self.standing += int(np.count_nonzero(step_ns[jumped] == 0))
@@ -132,18 +130,18 @@ class TopicWatch:
         """A finding for each kind of fault of the topic."""
         ends = ", ".join(str(number) for number in self._restarted_at[:3])
         gaps = [*self._gaps_for_good, *_ranges(self._missing_numbers)]
-        where_to = ""
+        places = ""
         if len(gaps) == 1:
-            where_to = f": {gaps[0][0]}" + (f" to {gaps[0][-1]}" if len(gaps[0]) > 1 else "")
+            places = f": {gaps[0][0]}" + (f" to {gaps[0][-1]}" if len(gaps[0]) > 1 else "")
         elif gaps:
-            where_to = f" in {len(gaps)} gaps, first {gaps[0][0]} to {gaps[0][-1]}"
+            places = f" in {len(gaps)} gaps, first {gaps[0][0]} to {gaps[0][-1]}"
         begins = max(self.first_number, 0) if self.topic == "sensors" else 0
         late, doubles = counted(self._late, "message"), counted(self._duplicates, "place")
         jumps, step = counted(self.jumps, "place"), f"a step of {self._first_step_ns / 1e6:g} ms"
         back, (back_at, back_ns) = counted(self._arrived_before, "place"), self._first_before
         rows = (
             ("two-runs", self.restarts, f"numbers start again at 0 after {ends}: {self.restarts + 1} runs in one file"),
-            ("gap", self.missing, f"{counted(self.missing, 'message')} lost{where_to}"),
+            ("gap", self.missing, f"{counted(self.missing, 'message')} lost{places}"),
             ("gap", begins, f"begins with block {begins}: earlier blocks were not recorded"),
             ("duplicate", self._duplicates, f"repeated numbers at {doubles}, first {self._first_duplicate}"),
             ("order", self._late, f"{late} arrived after a later message, first {self._first_late}"),

@@ -1,6 +1,6 @@
 """Tables of other programs.
 
-readers            reading of any table; kinds detects the format, table holds the result
+readers            reading a table of any format; kinds detects the format, table holds the result
 text/              text tables: dialect, encoding, head, rows
 sheet, mat, hdf5, tdms, ros_log   workbooks, MATLAB, HDF5, TDMS, messages of ROS 2
 cells, unit_words  cells as numbers or times; spellings of units

@@ -14,30 +14,27 @@ from bridge.faults import Fault
 from bridge.log.finding import Finding
 from bridge.units import counted
 
-_SHOWN = 60  # characters of a cell in a finding
-_MOST_BAD = 0.5  # share of non-empty cells without a number, from which a column counts as text
+_SHOWN = 60  # longest part of a cell that a finding shows [characters]
+_MOST_BAD = 0.5  # share of non-empty cells without a number above which a column counts as text
 # blanks and apostrophes that separate thousands; a dialect names only the first of each
 BLANKS = (" ", "\xa0", "\u202f", "\u2009")
 APOSTROPHES = ("'", "\u2019")
-# hours, minutes and seconds, after a third colon milliseconds (`:1` is 1 ms); with a fraction after the second number, minutes
-# and seconds
+# hours, minutes and seconds, and milliseconds after a third colon (`:1` is 1 ms); or minutes and seconds, if a fraction follows
+# the second number
 _CLOCK = re.compile(r"(\d{1,3}):(\d{2})(?::(\d{2}(?:[.,]\d+|:\d{1,3}(?![\d:]))?)|([.,]\d+))?\s*([AaPp][Mm])?")
 _DATE = re.compile(r"(\d{1,4})([-./])(\d{1,2})\2(\d{1,4})")
 # a month by its English name or abbreviation, as MATLAB writes it: `05-Mar-2024`
 _BY_NAME = re.compile(r"(\d{1,2})[- ./]([A-Za-z]{3,9})[- ./](\d{4}|\d{2})(?!\d)")
 _MONTHS = {name.lower(): at for names in (calendar.month_abbr, calendar.month_name) for at, name in enumerate(names)}
 _MONTHS["sept"] = 9
-_ORDERS = (
-    "mdy",
-    "dmy",
-    "ymd",
-)  # of the numbers of a date: with slashes as in the United States, unless the dates exclude it
+# orders of day, month and year; a date with slashes is American, unless the dates of the column exclude it
+_ORDERS = ("mdy", "dmy", "ymd")
 _ZONE = re.compile(r"\s*(?:Z|UTC|[+-]\d{2}:?\d{2})$")
 _DAY_S, _HOUR_S = 86400.0, 3600.0
 
 
 def numbers(values: Any, where: str, decimal: str, thousands: str) -> tuple[Floats, list[Finding]]:
-    """A column as float64 [rows], NaN for a cell that is empty or not a number; and a finding for the latter.
+    """A column as float64 [rows], NaN for a cell that is empty or not a number, and a finding for the cells without a number.
 
     Raises Fault BAD_TABLE if most cells are not numbers.
     """
@@ -60,7 +57,7 @@ def numbers(values: Any, where: str, decimal: str, thousands: str) -> tuple[Floa
 
 
 def number_in(text: str, decimal: str, thousands: str) -> float | None:
-    """The number in a cell, or None."""
+    """The number in a cell; None for a cell without a number."""
     word = text.strip()
     if thousands:
         for mark in BLANKS if thousands == " " else APOSTROPHES if thousands == "'" else (thousands,):
@@ -144,8 +141,6 @@ def _time_finding(where: str) -> Finding:
 def _as_text(cell: Any) -> str:
     if isinstance(cell, dt.datetime | dt.date | dt.time):
         return cell.isoformat()
-    if isinstance(cell, dt.timedelta):
-        return str(cell)
     return "" if cell is None else str(cell)
 
 
@@ -245,8 +240,8 @@ def _time_in(text: str, order: str) -> tuple[int, float] | None:
 
 
 def _seconds_in(text: str) -> float:
-    whole, _, milliseconds = text.partition(":")
-    return float(whole.replace(",", ".")) + 1e-3 * float(milliseconds or 0.0)
+    whole_s, _, milliseconds = text.partition(":")
+    return float(whole_s.replace(",", ".")) + 1e-3 * float(milliseconds or 0.0)
 
 
 def is_time(text: str) -> bool:

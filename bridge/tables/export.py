@@ -24,8 +24,8 @@ class Exported(NamedTuple):
     """The result of `export`."""
 
     files: list[Path]
-    rows: dict[str, int]  # by topic
-    damage: Damage  # of the log; damaged parts are not in the tables
+    rows: dict[str, int]  # number by topic
+    damage: Damage  # parts of the log that could not be read, and are not in the tables
 
 
 def check_request(to: Path, topics: list[str], from_s: float, until_s: float) -> None:
@@ -109,7 +109,9 @@ def _stream(
     rows = dict.fromkeys(writers, 0)
     period_ns = 0.0
     for piece in iter_pieces(reader):
-        if piece.topic not in writers or not len(piece.records):  # empty where no message of a chunk is readable
+        if piece.topic not in writers or not len(
+            piece.records
+        ):  # a piece is empty if no message of its chunk is readable
             continue
         if piece.topic == "sensors":
             period_ns = period_ns or block_period_ns(piece.records)

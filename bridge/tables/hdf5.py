@@ -8,7 +8,7 @@ import numpy as np
 from bridge.tables.mat import table_of
 from bridge.tables.table import Table
 
-_DEEPEST = 8  # nested groups
+_DEEPEST = 8  # deepest level of nested groups that is read
 _UNIT_KEYS = ("unit", "units", "Unit", "Units", "unit_string")
 _OF_MATLAB = {"#refs#", "#subsystem#"}  # MATLAB's groups for the targets of references
 
@@ -43,7 +43,7 @@ def _value(file: Any, item: Any, of_matlab: bool, depth: int) -> Any:
     data: Any = item[()]
     if item.dtype == h5py.ref_dtype:
         return _listed([_value(file, file[target], of_matlab, depth + 1) for target in np.ravel(data) if target])
-    if _is_text(item):
+    if item.attrs.get("MATLAB_class", b"") == b"char":
         return "".join(chr(int(code)) for code in np.ravel(data))
     array = np.asarray(data)
     if array.dtype.names:
@@ -51,10 +51,6 @@ def _value(file: Any, item: Any, of_matlab: bool, depth: int) -> Any:
     if array.dtype.kind == "S":
         return np.char.decode(array, "utf-8", "replace")
     return array.T if of_matlab and array.ndim > 1 else array
-
-
-def _is_text(item: Any) -> bool:
-    return item.attrs.get("MATLAB_class", b"") == b"char"
 
 
 def _listed(values: list[Any]) -> Any:

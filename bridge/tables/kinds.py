@@ -8,7 +8,7 @@ from bridge.faults import Fault
 Kind = Literal["text", "parquet", "mat", "hdf5", "tdms", "sheet", "mcap"]
 KINDS: tuple[Kind, ...] = ("text", "parquet", "mat", "hdf5", "tdms", "sheet", "mcap")
 _NUMPY = b"\x93NUMPY"
-_ZIP, _ZIP_NAME_LENGTH, _ZIP_NAME = b"PK\x03\x04", slice(26, 28), 30  # of the first file in an archive
+_ZIP, _ZIP_NAME_LENGTH, _ZIP_NAME = b"PK\x03\x04", slice(26, 28), 30  # mark, and places of the first file's name
 _MARKS: tuple[tuple[bytes, Kind], ...] = (
     (b"PAR1", "parquet"),
     (b"MATLAB 5.0", "mat"),
@@ -53,9 +53,9 @@ def kind_of(path: Path) -> Kind:
     if start[_HDF5_AT:].startswith(b"\x89HDF"):
         return "hdf5"
     if start.startswith(_NUMPY) or _first_in_archive(start).endswith(b".npy"):
-        line = f"{path.name}: holds NumPy arrays, without names for time and force; write them as columns"
-        how = 'numpy.savetxt("NAME.csv", numpy.column_stack([t, F]), delimiter=",", header="t (s),F (N)", comments="")'
-        raise Fault("BAD_TABLE", f"{line} of a text: {how}")
+        line = f"{path.name}: holds NumPy arrays, without names for time and force; write them as columns of a text"
+        call = 'numpy.savetxt("NAME.csv", numpy.column_stack([t, F]), delimiter=",", header="t (s),F (N)", comments="")'
+        raise Fault("BAD_TABLE", f"{line}: {call}")
     for mark, kind in _MARKS:
         if start.startswith(mark):
             return kind

@@ -10,8 +10,8 @@ import numpy as np
 
 from bridge.tables.table import ChannelClock, Table
 
-_DEEPEST = 8  # nested structs
-_MOST_COLUMNS = 4096  # of a matrix; more columns are a picture
+_DEEPEST = 8  # deepest level of nested structs that is read
+_MOST_COLUMNS = 4096  # largest number of columns of a matrix that is read; more are a picture
 
 
 def read_mat(path: Path) -> Table:
@@ -25,16 +25,10 @@ def read_mat(path: Path) -> Table:
 
 def table_of(path: Path, variables: dict[str, Any]) -> Table:
     """A table of variables that may hold structs."""
-    columns = dict(_flat(variables))
-    table = Table(path, columns)
+    table = Table(path, dict(part for name, value in variables.items() for part in _parts(name, value, 0)))
     for name, value in variables.items():
         _add_dspace(table, name, value)
     return table
-
-
-def _flat(variables: dict[str, Any]) -> Iterator[tuple[str, Any]]:
-    for name, value in variables.items():
-        yield from _parts(name, value, 0)
 
 
 def _parts(key: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
@@ -116,13 +110,9 @@ def _structs(value: Any) -> list[dict[str, Any]]:
 
 
 def _text(value: Any) -> str:
-    return (
-        value
-        if isinstance(value, str)
-        else str(value.item())
-        if isinstance(value, np.ndarray) and value.size == 1
-        else ""
-    )
+    if isinstance(value, np.ndarray) and value.size == 1:
+        return str(value.item())
+    return value if isinstance(value, str) else ""
 
 
 def _loaded(path: Path) -> dict[str, Any]:
@@ -132,7 +122,7 @@ def _loaded(path: Path) -> dict[str, Any]:
     trial = "import sys, scipy.io; scipy.io.loadmat(sys.argv[1])"
     status = subprocess.run([sys.executable, "-P", "-c", trial, str(path)], capture_output=True, check=False).returncode
     if status < 0:
-        raise ValueError(f"it is damaged: its reader died of signal {-status}")
+        raise ValueError(f"it is damaged: its reader was ended by signal {-status}")
     try:
         return scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)
     except (UnboundLocalError, ArithmeticError, MemoryError) as error:  # an unknown type, or an impossible size

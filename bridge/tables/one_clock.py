@@ -13,9 +13,9 @@ from bridge.log.finding import Finding
 from bridge.units import counted
 
 # Share of empty cells from which a channel has separate rows. Smaller: a sensor that dropped out is interpolated.
-_OWN_ROWS = 0.1
-_GAP_STEPS = 10.0  # median steps of a channel; a longer gap is not interpolated
-_SAME_S = 1e-3  # of a step: two instants that differ by less are equal
+_SEPARATE_ROWS = 0.1
+_GAP_STEPS = 10.0  # longest gap that is interpolated, in median steps of the channel
+_SAME_S = 1e-3  # largest difference of two equal instants, as a share of a step
 
 
 class Sampled(NamedTuple):
@@ -34,7 +34,7 @@ def _has_own_rows(t_s: Floats, values: Floats) -> bool:
     empty = ~np.isfinite(values) & np.isfinite(t_s)
     rows = np.flatnonzero(~empty)
     # a column that begins later or ends sooner than the others is empty only at its ends
-    if len(rows) < 2 or empty[rows[0] : rows[-1]].mean() <= _OWN_ROWS:
+    if len(rows) < 2 or empty[rows[0] : rows[-1]].mean() <= _SEPARATE_ROWS:
         return False
     # a failed sensor leaves one long gap; separate rows are spread over the file
     return float(np.quantile(np.diff(rows), 0.9)) <= 20.0 * float(np.median(np.diff(rows))) and rows[-1] - rows[
@@ -98,9 +98,9 @@ def on_one_clock(channels: dict[str, Sampled], file: str) -> tuple[Floats, dict[
     return kept_s, columns, findings
 
 
-def _same(first_s: Floats, other_s: Floats) -> bool:
-    return len(first_s) == len(other_s) and bool(
-        np.allclose(first_s, other_s, rtol=0.0, atol=_SAME_S * _step_s(other_s))
+def _same(first_s: Floats, second_s: Floats) -> bool:
+    return len(first_s) == len(second_s) and bool(
+        np.allclose(first_s, second_s, rtol=0.0, atol=_SAME_S * _step_s(second_s))
     )
 
 

@@ -13,9 +13,9 @@ from bridge.tables.table import ChannelClock, Table
 from bridge.tables.unit_words import bare_name, known_unit
 
 _NAME = re.compile(r"(?:t|ts|time|zeit)(?:\d+|[ _.-].*)?", re.IGNORECASE)
-_FEWEST_ROWS = 8
-_SAME_STEPS = 1e-3  # of a step: two times that differ by less are equal
-_SHARED = 0.5  # of the longer record: with less overlap, two times are not from two loggers of one measurement
+_FEWEST_ROWS = 8  # fewest numbers in a column of times
+_SAME_STEPS = 1e-3  # largest difference of two equal times, as a share of a step
+_SHARED = 0.5  # smallest overlap of two loggers of one measurement, as a share of the longer record
 
 
 class _Time(NamedTuple):
@@ -61,11 +61,11 @@ def _time(table: Table, name: str) -> _Time | None:
     return _Time(name, times_s)
 
 
-def _differ(first: _Time, other: _Time) -> bool:
+def _differ(first: _Time, second: _Time) -> bool:
     """Whether two times come from two loggers, rather than one time written twice."""
-    first_s, other_s = (time.times_s[np.isfinite(time.times_s)] for time in (first, other))
-    shared_s = min(first_s[-1], other_s[-1]) - max(first_s[0], other_s[0])
-    if shared_s < _SHARED * max(np.ptp(first_s), np.ptp(other_s)):
+    first_s, second_s = (time.times_s[np.isfinite(time.times_s)] for time in (first, second))
+    shared_s = min(first_s[-1], second_s[-1]) - max(first_s[0], second_s[0])
+    if shared_s < _SHARED * max(np.ptp(first_s), np.ptp(second_s)):
         return False
     step_s = float(np.median(np.diff(first_s)))
-    return len(first_s) != len(other_s) or float(np.abs(first_s - other_s).max()) > _SAME_STEPS * step_s
+    return len(first_s) != len(second_s) or float(np.abs(first_s - second_s).max()) > _SAME_STEPS * step_s

@@ -17,7 +17,7 @@ from bridge.tables.text.dialect import Dialect
 from bridge.tables.text.text_table import read_text
 
 __all__ = ["Dialect", "Table", "read_table"]
-_LONGEST_REASON = 200  # characters of the message of a library
+_LONGEST_REASON = 200  # longest quotation of a library's message [characters]
 
 
 def read_table(path: Path, dialect: Dialect | None = None, kind: Kind | None = None) -> Table:

@@ -9,8 +9,8 @@ import numpy as np
 from bridge.faults import Fault
 from bridge.tables.table import ChannelClock, Table
 
-_DEEPEST = 6  # nested messages
-_MOST_ITEMS = 64  # of an array; joints are channels, the pixels of a picture are not
+_DEEPEST = 6  # deepest level of nested messages that is read
+_MOST_ITEMS = 64  # longest array whose elements are channels: joints are, the pixels of a picture are not
 
 
 def read_ros_log(path: Path) -> Table:

@@ -32,7 +32,8 @@ def read_sheet(path: Path, given: Dialect) -> Table:
         raise Fault("BAD_TABLE", f"{path.name}: is empty; give a file with rows")
     sample = rows[len(rows) // 3 :: max(len(rows) // 200, 1)]
     texts = [_BETWEEN.join(cell if isinstance(cell, str) else "" for cell in row) for row in sample]
-    form = form_of(texts, given._replace(delimiter=_BETWEEN), quoted=False)  # of numbers that are stored as text
+    # the form of numbers that are stored as text
+    form = form_of(texts, given._replace(delimiter=_BETWEEN), quoted=False)
     lines, body = ([_line(row, form) for row in part] for part in (rows[:_HEAD_ROWS], sample))
     head = read_head(lines, body, form, given, path.name)
     width = len(head.names)

@@ -21,7 +21,7 @@ _NANOSECONDS = ("nanosec", "nsec", "nsecs", "nanosecs", "nanoseconds")
 class ChannelClock(NamedTuple):
     """The instants of a channel with a separate clock: `start_s + i * step_s`, or `times_s` [samples]."""
 
-    start_s: float  # after the earliest start of the file
+    start_s: float  # counted from the earliest start in the file
     step_s: float
     times_s: Floats | None = None
 
@@ -39,17 +39,14 @@ class Table:
     path: Path
     columns: dict[str, Any]
     units: dict[str, str] = field(default_factory=dict[str, str])  # by column, as the file writes them
-    clocks: dict[str, ChannelClock] = field(
-        default_factory=dict[str, ChannelClock]
-    )  # of channels with a separate clock
+    # by channel; without an entry for a channel of the table's common clock
+    clocks: dict[str, ChannelClock] = field(default_factory=dict[str, ChannelClock])
     sample_rate_Hz: float | None = None  # if the file states one rate for all channels
-    decimal: str = "."  # of numbers that are stored as text
+    decimal: str = "."  # decimal mark, and the mark of thousands, of numbers that are stored as text
     thousands: str = ""
     findings: list[Finding] = field(default_factory=list[Finding])
     written: dict[str, Any] = field(default_factory=dict[str, Any])  # properties of the file: keys of [source] of a map
-    own_times: dict[str, str] = field(
-        default_factory=dict[str, str]
-    )  # the column of times of each such clock, by channel
+    own_times: dict[str, str] = field(default_factory=dict[str, str])  # column of a channel's times, by channel
 
     def find(self, name: str | int) -> str:
         """The key of a column given by its name, its number from 1, or its name without its unit.
@@ -61,8 +58,8 @@ class Table:
             return wanted
         if wanted.isdigit() and 1 <= int(wanted) <= len(self.columns):
             return list(self.columns)[int(wanted) - 1]
-        for same in (_squeezed, _bare):
-            near = [key for key in self.columns if same(key) == same(wanted)]
+        for simplified in (_squeezed, _bare):
+            near = [key for key in self.columns if simplified(key) == simplified(wanted)]
             if len(near) == 1:
                 return near[0]
             if near:
@@ -89,7 +86,7 @@ class Table:
         where = f"{self.path.name}: column {key}"
         if nanoseconds := self._nanoseconds_of(key):
             whole_s = self.column(key)
-            self._add([Finding("time", where, f"goes on in column {nanoseconds}: both are one time")])
+            self._add([Finding("time", where, f"continues in column {nanoseconds}: both are one time")])
             # seconds of the calendar would lose the digits of the nanoseconds
             times_s = whole_s - whole_s[:1] + 1e-9 * self.column(nanoseconds)
             return times_s - times_s[:1], True

@@ -2,9 +2,9 @@
 
 import re
 
-# quantity: its SI unit, and the factors of units without a prefix
 _DEGREE, _TURN = 0.017453292519943295, 6.283185307179586  # rad
 _POUND_kg, _POUND_N = 0.45359237, 4.4482216152605
+# by quantity: its SI unit, and the factors of units without a prefix
 _UNITS: dict[str, tuple[str, dict[str, float]]] = {
     "time": (
         "s",
@@ -50,7 +50,7 @@ _WORDS = {
     "ms-1": "m/s",
     "newtons": "newton",
     "Umin": "U/min",
-    "KN": "kN",  # of programs that write capitals only
+    "KN": "kN",  # from programs that write capitals only
     "MM": "mm",
 }
 # a unit after a name: `Force [N]`, `Force (N)`, `Force / N`, `Force/N`, `Force, N`, `Force in N`, `Force_N`
@@ -60,40 +60,14 @@ _BEHIND = re.compile(
 
 # units accepted after an underscore: `x_t` and `force_p` have no unit
 _AFTER_UNDERSCORE = {
-    "s",
-    "ms",
-    "us",
-    "ns",
-    "N",
-    "kN",
-    "mN",
-    "m",
-    "mm",
-    "um",
-    "µm",
-    "nm",
-    "cm",
-    "micron",
-    "daN",
-    "Nmm",
-    "Hz",
-    "kHz",
-    "Nm",
-    "rad",
-    "deg",
-    "g",
-    "rpm",
+    *("s", "ms", "us", "ns", "N", "kN", "mN", "m", "mm", "um", "µm", "nm", "cm", "micron", "daN", "Nmm"),
+    *("Hz", "kHz", "Nm", "rad", "deg", "g", "rpm"),
 }
-_ALSO_SYMBOLS = {
-    "s",
-    "t",
-    "h",
-    "m",
-    "U",
-}  # units that are symbols of quantities too: distance, time, height, mass, voltage
+# units that are symbols of quantities too: distance, time, height, mass, voltage
+_ALSO_SYMBOLS = {"s", "t", "h", "m", "U"}
 _OF_TIME = re.compile(r"t|.*(?:time|zeit).*", re.IGNORECASE)
 _INDEX = re.compile(r".*\S\[\d+\]")  # `data[1]` is an element of an array; a unit of 1 follows a blank, as in `mu [1]`
-_LONGEST_UNIT = 8  # characters of an unknown unit
+_LONGEST_UNIT = 8  # longest unknown unit [characters]
 
 
 def known_unit(text: str) -> tuple[str, float] | None:
@@ -101,9 +75,9 @@ def known_unit(text: str) -> tuple[str, float] | None:
     word = text.strip().strip("[](){}").translate(_SAME)
     word = _WORDS.get(word, word)
     for quantity, (_, units) in _UNITS.items():
-        for same in (word, word.lower()):
-            if same in units and (len(same) > 2 or same == word):
-                return quantity, units[same]
+        for spelling in (word, word.lower()):
+            if spelling in units and (len(spelling) > 2 or spelling == word):
+                return quantity, units[spelling]
     prefix, rest = word[:1], _WORDS.get(word[1:], word[1:])
     if prefix in _PREFIXES and rest in _PREFIXED:
         if rest == "g" and prefix == "k":
@@ -115,7 +89,7 @@ def known_unit(text: str) -> tuple[str, float] | None:
 
 
 def weight_unit(text: str) -> tuple[str, float] | None:
-    """As `known_unit`, for a column of forces: gram, kilogram and pound are weights, as load cells show them."""
+    """The quantity of a unit, and its factor to SI, in a column of forces: gram, kilogram and pound are weights there."""
     known = known_unit(text)
     word = text.strip().strip("[](){}").translate(_SAME)
     grams = {"g": 1e-3, "kg": 1.0, "mg": 1e-6, "t": 1e3, "lb": _POUND_kg, "lbs": _POUND_kg}.get(word)

@@ -14,8 +14,8 @@ import pyarrow.parquet as pq
 from bridge.files import Replacement, folder_beside, replacing
 from bridge.units import unit_of
 
-Columns = dict[str, npt.NDArray[Any]]  # by name, all of one length
-# Rows of a batch, 10 MB of sensors. Too small: compression and encoding are poor; too large: memory.
+Columns = dict[str, npt.NDArray[Any]]  # columns by name, all of one length
+# Rows of a batch; 10 MB of sensor data. Smaller: poor compression and encoding. Larger: more memory.
 BATCH_ROWS = 1 << 18
 # The 512 bytes with which MATLAB recognises its HDF5 files: text, place of subsystem data (none), version 2.0, byte order.
 _MATLAB_HEAD = b"MATLAB 7.3 MAT-file, stickslip, HDF5 schema 1.00 .".ljust(116) + bytes(8) + b"\x00\x02IM" + bytes(384)
@@ -132,8 +132,8 @@ class MatFile:
         for name, values in columns.items():
             if f"{table}/{name}" not in self._file:
                 # HDF5 lists the dimensions of a MATLAB array in reverse: a column of n rows is [1, n]
-                made = self._dataset(table, name, values[None, :], (1, None))
-                made.attrs["MATLAB_class"] = np.bytes_(_MATLAB_CLASSES[values.dtype.str[1:]])
+                column = self._dataset(table, name, values[None, :], (1, None))
+                column.attrs["MATLAB_class"] = np.bytes_(_MATLAB_CLASSES[values.dtype.str[1:]])
                 unit = np.frombuffer(unit_of(name).encode("utf-16-le"), np.uint16)
                 text = self._dataset(f"units/{table}", name, unit[:, None], None)
                 text.attrs["MATLAB_class"], text.attrs["MATLAB_int_decode"] = np.bytes_("char"), np.int32(2)

@@ -21,7 +21,7 @@ def access_control(prefix: str, subject: str) -> dict[str, Any]:
     """Zenoh's `access_control` for the session of a rig.
 
     Args:
-        prefix: of the keys.
+        prefix: prefix of the keys.
         subject: attribute that identifies the role: `usernames` or `cert_common_names`.
 
     """
@@ -41,10 +41,10 @@ def access_control(prefix: str, subject: str) -> dict[str, Any]:
         {"rules": ["hear", "listen", "ask", "who-is-there"], "subjects": list(ROLES)},
     ]
     for role in ROLES:
-        special = _role_rules(prefix, role)
-        rules += special
-        if special:
-            policies.append({"rules": [rule["id"] for rule in special], "subjects": [role]})
+        extra = _role_rules(prefix, role)
+        rules += extra
+        if extra:
+            policies.append({"rules": [rule["id"] for rule in extra], "subjects": [role]})
     return {
         "enabled": True,
         "default_permission": "deny",

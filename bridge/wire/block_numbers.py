@@ -9,7 +9,7 @@ WINDOW = 256
 # burst of another client takes over. Larger: a restarted rig waits longer.
 _BELIEVED = 8
 _SILENT_NS = 50_000_000
-_DOUBTED = 64  # messages of another count that count as strays although the present count is silent
+_DOUBTED = 64  # messages of another count from which they count as strays although the present count is silent
 
 
 class NumberCheck(Enum):
@@ -17,7 +17,7 @@ class NumberCheck(Enum):
 
     NEXT = "next"  # continues the count, perhaps after a gap
     AGAIN = "again"  # received already, or counted as lost
-    STRAY = "stray"  # of another count, which is not accepted
+    STRAY = "stray"  # belongs to another count, which is not accepted
     ANEW = "anew"  # the sender restarted with lower numbers
 
 
@@ -27,12 +27,11 @@ class BlockNumbers:
     def __init__(self) -> None:
         self.expected: int | None = None  # None before the first message, whose number is arbitrary
         self.strays = 0  # messages rejected so far
-        self.jumped = False  # the newest accepted message began another count
+        self.jumped = True  # the newest accepted message began another count
         self._doubted = 0  # messages of another count since the newest accepted one
         self._taken_ns = 0  # arrival of the newest message of the present count
-        self._other = -1  # the newest number outside of the present count
-        self._in_a_row = self._doubted = 0
-        self.jumped = True
+        self._stray = -1  # the newest number outside of the present count
+        self._in_a_row = 0  # consecutive numbers up to that one
         self._may_begin_anew = False
 
     def sender_was_away(self) -> None:
@@ -50,8 +49,8 @@ class BlockNumbers:
         if ahead < 0 and self._may_begin_anew:
             self._take(number, arrival_ns)
             return NumberCheck.ANEW
-        self._in_a_row = self._in_a_row + 1 if number == self._other + 1 else 1
-        self._other = number
+        self._in_a_row = self._in_a_row + 1 if number == self._stray + 1 else 1
+        self._stray = number
         if self._in_a_row >= _BELIEVED and arrival_ns - self._taken_ns >= _SILENT_NS:
             self._take(number, arrival_ns)
             return NumberCheck.NEXT if ahead > 0 else NumberCheck.ANEW

@@ -7,18 +7,18 @@ from typing import NamedTuple
 class Channel(NamedTuple):
     """A column of measured data."""
 
-    name: str  # on the wire, in logs and in evidence, with its SI unit at the end
-    quantity: str  # as in `bridge.tables.unit_words`
-    turning: str  # quantity on a rig that turns
-    radius_power: int  # power of the radius by which a value of a turning rig is multiplied
+    name: str  # name on the wire, in logs and in evidence, with the SI unit at its end
+    quantity: str  # a quantity of `bridge.tables.unit_words`
+    turning: str  # quantity on a rotary rig
+    radius_power: int  # power of the radius that converts a value of a rotary rig to a value of a linear rig
     largest: float = math.inf  # a larger value has a wrong unit: mm in place of m exceed it on a bench rig
-    has_spikes: bool = False  # a slip is a spike in it, so a single far value may be right
-    positive: str = ""  # direction
+    has_spikes: bool = False  # a slip causes a spike, so a single value far from its neighbours may be right
+    positive: str = ""  # direction of a positive value
     is_controlled: bool = False  # the controller needs it
-    sensor: str = ""  # start of its keys in [rig.sensors]: noise, resolution, range
+    sensor: str = ""  # start of the channel's keys in [rig.sensors]: noise, resolution, range
     has_lowest: bool = False  # its range need not be symmetric
-    without: str = ""  # consequence for a diagnosis of a rig with a drive spring
-    without_force_drive: str = ""  # the same for a rig that a given force drives
+    without: str = ""  # consequence of a missing channel for a diagnosis of a rig with a drive spring
+    without_force_drive: str = ""  # consequence for a diagnosis of a rig that a given force drives
 
 
 _FORWARD = "forward"

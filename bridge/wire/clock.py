@@ -6,12 +6,12 @@ from contextlib import contextmanager
 
 
 class Clock:
-    """The functions of `time` that processes use; all modules share the instance `time` below."""
+    """The functions of the module `time` that processes use; all modules share the instance `time` below."""
 
     def __init__(self) -> None:
-        self._use_the_machine()
+        self._use_the_computer()
 
-    def _use_the_machine(self) -> None:
+    def _use_the_computer(self) -> None:
         self.monotonic: Callable[[], float] = _machine.monotonic
         self.perf_counter_ns: Callable[[], int] = _machine.perf_counter_ns
         self.sleep: Callable[[float], None] = _machine.sleep
@@ -22,7 +22,7 @@ class Clock:
 
         Args:
             now_ns: the time [ns].
-            sleep: returns after this much simulated time [s].
+            sleep: waits for a simulated time [s].
 
         """
         self.monotonic = lambda: now_ns() * 1e-9
@@ -31,7 +31,7 @@ class Clock:
         try:
             yield
         finally:
-            self._use_the_machine()
+            self._use_the_computer()
 
 
 time = Clock()

@@ -23,7 +23,7 @@ class _Kind:
 
     text: str = ""
     times: int = 0
-    pending: int = 0  # since the last event
+    pending: int = 0  # number of problems since the last event
     reported_s: float = -_EVERY_S
 
 
@@ -46,7 +46,7 @@ class Complaints:
         """Count a problem: it is reported now, or together with others of its kind when 1 s has passed.
 
         Args:
-            code: of the event.
+            code: code of the event.
             where: forms the kind together with the code; one of a few places, never a received text.
             text: the problem and its consequence.
             times: number of occurrences.
@@ -60,7 +60,7 @@ class Complaints:
         self._report(code, where, kind)
 
     def report_when_due(self, all_of_it: bool = False) -> None:
-        """Report problems that have waited for 1 s; with `all_of_it`, at an end, all problems."""
+        """Report problems that have waited for 1 s; with `all_of_it`, at the end of a process, all problems."""
         if not self._pending:
             return
         self._pending = False

@@ -17,7 +17,7 @@ PERIOD_NS = 1_500_000
 # Longer: stalls are missed that make a command late, which needs 0.25 ms of its 1 ms. Each stall from PERIOD_NS + LEAST_NS on is
 # detected.
 LEAST_NS = 300_000
-# Wake-ups between two checks of the parent and of the waiting time, which take as long as a wake-up
+# Number of wake-ups between two checks of the parent and of the waiting time; a check takes as long as a wake-up.
 _LOOKS = 16
 
 

@@ -11,7 +11,7 @@ SEVERITIES = {
     MAINTENANCE: "maintenance",
     NEWS: "news",
 }
-# of letter C, and yet shown in a verdict: a run with an injected fault is not one of a healthy rig
+# codes of letter C that a verdict lists nevertheless: a run with an injected fault does not show a healthy rig
 TESTS = ("INJECTED",)
 # reasons, in a controller's commands, for a vibration without the wanted effect
 WEAK_REASONS = ("PIEZO_WEAK", "CANNOT_HELP", "HARMFUL")
@@ -28,7 +28,7 @@ class EventCode(NamedTuple):
 
     code: str
     sources: str  # senders: plant, controller, recorder
-    letter: str  # of SEVERITIES
+    letter: str  # severity, a key of SEVERITIES
     help: str
 
 
@@ -60,7 +60,7 @@ EVENTS = {
             "limits of the guard protect less than the defaults. Narrow them in [guard] of the rig file, or document why they "
             "are needed"),
         EventCode("RIG_LOST", "controller", FAILURE,
-            "no block for 1 s: the rig has left, or the link to it is cut; the text tells which"),
+            "no block for 1 s: the rig has left, or the link to it is cut; the text names the cause"),
         EventCode("RIG_BACK", "controller", NEWS, "blocks arrive again"),
         EventCode("RIG_RESTARTED", "controller", OUTSIDE,
             "the rig restarted its block numbers: it was started again, or another rig took its place. Control continues"),
@@ -190,5 +190,5 @@ def harms(code: str) -> bool:
 
 
 def is_listed(code: str) -> bool:
-    """Whether a verdict lists the event: all but news and checks, and also tests and codes unknown to this version."""
+    """Whether a verdict lists the event: every code but news and checks, and also TESTS and codes of other versions."""
     return code not in EVENTS or EVENTS[code].letter not in {NEWS, CHECK} or code in TESTS

@@ -23,13 +23,13 @@ class Received(NamedTuple):
     arrival_ns: int  # time.perf_counter_ns
 
 
-class _Room:
-    """Counts of messages of one kind, in and out: only one thread writes each count, so it needs no lock."""
+class _Counts:
+    """Numbers of messages of one kind, added and taken: only one thread writes each number, so it needs no lock."""
 
     def __init__(self, limit: int) -> None:
         self.limit = limit
-        self.came = 0
-        self.went = 0
+        self.added = 0
+        self.taken = 0
 
 
 class Inbox:
@@ -43,11 +43,11 @@ class Inbox:
 
     def __init__(self, limit: int, patient: bool = False) -> None:
         self.dropped = 0
-        self.dropped_of: dict[str, int] = {}  # by topic
+        self.dropped_of: dict[str, int] = {}  # number of dropped messages by topic
         self._patient = patient
-        self._pushed = _Room(limit)
-        self._kept: dict[str, _Room] = {}
-        self._queue: queue.SimpleQueue[tuple[_Room, Received]] = queue.SimpleQueue()
+        self._pushed = _Counts(limit)
+        self._kept: dict[str, _Counts] = {}
+        self._queue: queue.SimpleQueue[tuple[_Counts, Received]] = queue.SimpleQueue()
 
     def push(self, received: Received) -> None:
         """Add a message; called by receiving threads."""
@@ -57,33 +57,33 @@ class Inbox:
         """Add a rare message: 256 of each topic may wait in addition to the messages of `push`."""
         name = received.topic.name
         if name not in self._kept:
-            self._kept[name] = _Room(_KEPT)
+            self._kept[name] = _Counts(_KEPT)
         self._add(self._kept[name], received)
 
-    def _add(self, room: _Room, received: Received) -> None:
-        while self._patient and room.came - room.went >= room.limit:
+    def _add(self, counts: _Counts, received: Received) -> None:
+        while self._patient and counts.added - counts.taken >= counts.limit:
             time.sleep(0.001)
-        if room.came - room.went >= room.limit:
+        if counts.added - counts.taken >= counts.limit:
             self.dropped += 1
             self.dropped_of[received.topic.name] = self.dropped_of.get(received.topic.name, 0) + 1
         else:
-            room.came += 1
-            self._queue.put((room, received))
+            counts.added += 1
+            self._queue.put((counts, received))
 
     def get(self, timeout_s: float) -> Received | None:
-        """The oldest message, or None when none came within `timeout_s`."""
+        """The oldest message; None if none arrives within `timeout_s`."""
         try:
-            room, received = self._queue.get(timeout=timeout_s)
+            counts, received = self._queue.get(timeout=timeout_s)
         except queue.Empty:
             return None
-        room.went += 1
+        counts.taken += 1
         return received
 
     def get_nowait(self) -> Received | None:
-        """The oldest message, or None."""
+        """The oldest message; None without a message."""
         try:
-            room, received = self._queue.get_nowait()
+            counts, received = self._queue.get_nowait()
         except queue.Empty:
             return None
-        room.went += 1
+        counts.taken += 1
         return received

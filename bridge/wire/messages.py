@@ -33,7 +33,7 @@ _SCALARS = {
     FieldDescriptor.TYPE_ENUM: ("u1", 0),  # a varint: one byte up to 127; zeros are written too
 }
 _PACKED_WIRE_TYPE = 2
-_SUM_BYTES = 4  # of a checksum, at the end of a sensor block; its tag is one byte more
+_SUM_BYTES = 4  # length of the checksum at the end of a sensor block, without its tag of one byte
 _NO_SUM = bytes(_SUM_BYTES)
 
 
@@ -81,7 +81,7 @@ class Layout:
             fixed += bytes(width)
             ends.append(len(template))
         self.size = len(template)
-        self.whole_sizes = frozenset(ends)  # of the present message, and of earlier versions with fewer fields
+        self.whole_sizes = frozenset(ends)  # lengths of the message in this version and in versions with fewer fields
         fields = np.dtype(cast(Any, {"names": names, "formats": formats, "offsets": offsets, "itemsize": self.size}))
         self.dtype: np.dtype[Any] = np.dtype((np.record, fields))
         self._template = bytes(template)
@@ -102,11 +102,11 @@ class Layout:
         return len(payload) == self.size and int.from_bytes(payload, "little") & self._mask == self._tags
 
     def all_canonical(self, payloads: npt.NDArray[np.uint8]) -> bool:
-        """As `is_canonical`, for many payloads of the message's size, [payloads, size]."""
+        """Whether all payloads are canonical, [payloads, size] of the message's size."""
         return bool((payloads[:, self._tag_places] == self._tag_bytes).all())
 
     def canonical(self, payload: bytes, topic: str) -> bytes:
-        """The same message with every field written, in order. Raises Fault BAD_MESSAGE naming `topic`."""
+        """The bytes of a message with every field written, in order. Raises Fault BAD_MESSAGE naming `topic`."""
         if self.is_canonical(payload):
             return payload
         refuse_oversized(payload, self.message, topic)

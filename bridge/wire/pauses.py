@@ -11,9 +11,9 @@ from typing import NamedTuple
 from bridge.wire import core_timer, realtime
 
 _PRIORITY = realtime.LOOP_PRIORITY + 1  # a long step of a loop must not look like a stall
-# Watched cores. More: another process of 10 MB for each, while a stall of eight cores already counts as one of the computer.
+# Most watched cores. Each takes a process of 10 MB, and a stall of eight cores already counts as a stall of the computer.
 _MOST_CORES = 8
-# Age from which a pause is complete. Shorter: the line of a timer that wakes later would be missed.
+# Age from which a stall is complete. Shorter: the report of a timer that wakes later would be missed.
 _SETTLED_NS = 50_000_000
 NO_PRIORITY = "no real-time priority"
 
@@ -26,17 +26,17 @@ class Pause(NamedTuple):
     core: int | None = None  # the stalled core; None: all cores, a stall of the computer
 
 
-def shared(still: Sequence[Sequence[Pause]]) -> list[Pause]:
+def shared(stalls: Sequence[Sequence[Pause]]) -> list[Pause]:
     """Stalls of all cores at the same time, in order of time.
 
     Args:
-        still: the stalls of every core, in order of time and without overlap.
+        stalls: the stalls of every core, in order of time and without overlap.
 
     """
-    if not still:
+    if not stalls:
         return []
-    common = list(still[0])
-    for core in still[1:]:
+    common = list(stalls[0])
+    for core in stalls[1:]:
         both: list[Pause] = []
         first = second = 0
         while first < len(common) and second < len(core):
@@ -63,27 +63,27 @@ class PauseWatch:
         self.refused = _refusal()
         self._timers: list[subprocess.Popen[bytes]] = []
         self._lines = b""
-        self._still: dict[int, list[Pause]] = {core: [] for core in self.cores}
+        self._stalls: dict[int, list[Pause]] = {core: [] for core in self.cores}
         if not self.refused:
             self._start()
 
     def _start(self) -> None:
-        self._pipe, other = os.pipe()
+        self._pipe, write_end = os.pipe()
         os.set_blocking(self._pipe, False)
         for place, core in enumerate(self.cores):
             phase_ns = core_timer.PERIOD_NS * place // len(self.cores)  # staggered, so that a stall is detected sooner
-            words = (core, _PRIORITY, os.getpid(), phase_ns)
+            arguments = (core, _PRIORITY, os.getpid(), phase_ns)
             self._timers.append(
                 subprocess.Popen(
                     # -I -S: ignore the folders of the user and installed packages
-                    [sys.executable, "-I", "-S", core_timer.__file__, *map(str, words)],
+                    [sys.executable, "-I", "-S", core_timer.__file__, *map(str, arguments)],
                     stdin=subprocess.DEVNULL,
-                    stdout=other,
+                    stdout=write_end,
                     stderr=subprocess.DEVNULL,
                     start_new_session=True,  # keeps Ctrl-C from the timers: the recorder ends them
                 )
             )
-        os.close(other)
+        os.close(write_end)
 
     def poll(self, all_of_them: bool = False) -> list[Pause]:
         """Stalls of the computer and of single cores since the last call; with `all_of_them` also of the last 50 ms."""
@@ -92,16 +92,14 @@ class PauseWatch:
         with contextlib.suppress(BlockingIOError):
             while part := os.read(self._pipe, 1 << 16):
                 self._lines += part
-        *whole, self._lines = self._lines.split(b"\n")
-        for line in whole:
+        *complete, self._lines = self._lines.split(b"\n")
+        for line in complete:
             core, from_ns, until_ns = map(int, line.split())
-            self._still[core].append(Pause(from_ns, until_ns))
+            self._stalls[core].append(Pause(from_ns, until_ns))
         if not all_of_them and any(timer.poll() is not None for timer in self._timers):
             self.refused = "a timer ended"
-        return self._settled(time.perf_counter_ns() - (0 if all_of_them else _SETTLED_NS))
-
-    def _settled(self, until_ns: int) -> list[Pause]:
-        pauses, self._still = settled(self._still, until_ns)
+        until_ns = time.perf_counter_ns() - (0 if all_of_them else _SETTLED_NS)
+        pauses, self._stalls = settled(self._stalls, until_ns)
         return pauses
 
     def close(self) -> None:
@@ -115,29 +113,29 @@ class PauseWatch:
         self._timers.clear()
 
 
-def settled(still: Mapping[int, list[Pause]], until_ns: int) -> tuple[list[Pause], dict[int, list[Pause]]]:
+def settled(stalls: Mapping[int, list[Pause]], until_ns: int) -> tuple[list[Pause], dict[int, list[Pause]]]:
     """Stalls of the computer and of single cores that ended before `until_ns`; and the parts of later stalls."""
-    together = shared(list(still.values()))
+    together = shared(list(stalls.values()))
     complete = [pause for pause in together if pause.until_ns <= until_ns]
     reported_ns = max((pause.until_ns for pause in complete), default=0)
-    for core, pauses in still.items():
+    for core, pauses in stalls.items():
         ended = [pause for pause in pauses if pause.until_ns <= until_ns]
         complete += [piece._replace(core=core) for pause in ended for piece in _without(pause, together)]
     later = {
         core: [Pause(max(pause.from_ns, reported_ns), pause.until_ns) for pause in pauses if pause.until_ns > until_ns]
-        for core, pauses in still.items()
+        for core, pauses in stalls.items()
     }
     return sorted(complete, key=lambda pause: pause.from_ns), later
 
 
 def _without(pause: Pause, others: Sequence[Pause]) -> list[Pause]:
-    """The parts of a pause outside the others, which are in order of time."""
+    """The parts of a stall outside of other stalls, which are in order of time."""
     pieces: list[Pause] = []
     from_ns = pause.from_ns
-    for other in others:
-        if other.from_ns < pause.until_ns and other.until_ns > from_ns:
-            pieces.append(Pause(from_ns, other.from_ns))
-            from_ns = other.until_ns
+    for stall in others:
+        if stall.from_ns < pause.until_ns and stall.until_ns > from_ns:
+            pieces.append(Pause(from_ns, stall.from_ns))
+            from_ns = stall.until_ns
     pieces.append(Pause(from_ns, pause.until_ns))
     return [piece for piece in pieces if piece.until_ns - piece.from_ns > core_timer.LEAST_NS]
 

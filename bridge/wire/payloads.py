@@ -19,15 +19,15 @@ READABLE_VERSIONS = (1, 2)  # fields are only appended, so an older log lacks on
 _LARGEST_BYTES = 1 << 16
 _LONG: dict[type[Message], int] = {wire.Snapshot: 1 << 18, wire.Header: 1 << 18}
 
-_DESCRIBED = Path(__file__).with_name("stickslip.desc")  # with comments, which the generated module omits
-_SEQUENCE_AND_TIME = struct.Struct("<QBq")  # of a canonical message, with the tag between them
+_DESCRIBED = Path(__file__).with_name("stickslip.desc")  # definitions with comments, which the generated module omits
+_SEQUENCE_AND_TIME = struct.Struct("<QBq")  # first fields of a canonical message, with the tag between them
 _MESSAGES, _ENUMS = 4, 5  # numbers of these fields of a FileDescriptorProto
 
 M = TypeVar("M", bound=Message)
 
 
 def largest_bytes(message: type[Message]) -> int:
-    """The length of a message beyond which it is refused unread."""
+    """The length of the longest message that is parsed [bytes]."""
     return _LONG.get(message, _LARGEST_BYTES)
 
 
@@ -64,8 +64,8 @@ def sequence_and_time(payload: bytes, message: type[Message]) -> tuple[int, int]
     if len(payload) >= 18 and payload[0] == 0x09 and payload[9] == 0x11:
         sequence, _, t_ns = _SEQUENCE_AND_TIME.unpack_from(payload, 1)
         return sequence, t_ns
-    whole: Any = parsed(message, payload, message.DESCRIPTOR.name)
-    return whole.sequence, whole.t_ns
+    decoded: Any = parsed(message, payload, message.DESCRIPTOR.name)
+    return decoded.sequence, decoded.t_ns
 
 
 @functools.cache

@@ -13,20 +13,17 @@ from pathlib import Path
 from bridge.wire.clock import time
 
 _PR_SET_TIMERSLACK = 29
-_MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = (
-    1,
-    2,
-    4,
-)  # on fault: locks pages at their first use, so that thread stacks of 8 MB each are not filled
+# `on fault` locks pages at their first use, so that thread stacks of 8 MB each are not filled
+_MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
 LOOP_PRIORITY = 50
 # Lockstep has no deadlines, so it runs below real-time loops and their recorders. With normal scheduling it took 1.5 times as
 # long (docs/method/rig.md).
 LOCKSTEP_PRIORITY = 1
 RECORDER_PRIORITY = 10  # below the loop, above every process without SCHED_FIFO: a starved recorder loses blocks
-VIEWER_PRIORITY = 1  # of a viewer: below the loop and the recorder, above every process without SCHED_FIFO
+VIEWER_PRIORITY = 1  # viewers: below the loop and the recorder, above every process without SCHED_FIFO
 
 # A wait that ends this much later counts as a stall of this process. Shorter: a busy core looks like a stall. Longer: after a
-# stall, this process gives up a peer that is well.
+# stall, this process gives up a peer that works.
 _PAUSE_S = 0.25
 NORMAL = "normal scheduling"  # start of the text of a START event without SCHED_FIFO
 NOT_GUARANTEED = "real time is not guaranteed; grant CAP_SYS_NICE or an rtprio limit"

@@ -116,7 +116,7 @@ def loopback_rig_security(config: BusConfig, users: Path) -> dict[str, Any]:
 
 
 def role_security(config: BusConfig, role: str) -> dict[str, Any]:
-    """Credentials of a dialling session; empty if no rig of this user has left a password.
+    """Credentials of a dialling session; empty if no rig of this user has made a password.
 
     Raises Fault NOT_SECURE if a certificate for a tls/ endpoint is missing.
     """

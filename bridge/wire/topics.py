@@ -13,7 +13,7 @@ class Topic(NamedTuple):
     name: str
     message: type[Message]
     sender: str
-    rate_Hz: float  # expected; 0: irregular
+    rate_Hz: float  # expected rate; 0: irregular
     stale_after_s: float  # age from which the value of a message is dropped; 0: never
     logged: bool
 
@@ -31,22 +31,12 @@ OPERATOR = Topic("operator", wire.Operator, "cockpit", 0.0, 0.0, logged=False)
 ANNOUNCE = Topic("announce", wire.Announce, "plant", 0.0, 0.0, logged=True)
 FAULT = Topic("fault", wire.Inject, "cockpit", 0.0, 0.0, logged=False)
 
-TOPICS = (
-    SENSORS,
-    APPLIED,
-    COMMAND,
-    TRACE,
-    STATE,
-    SNAPSHOT,
-    PLANT_EVENT,
-    CONTROLLER_EVENT,
-    RECORDER_EVENT,
-    OPERATOR,
-    ANNOUNCE,  # a log's channels are numbered in this order
-    FAULT,
+TOPICS = (  # a log's channels are numbered in this order
+    *(SENSORS, APPLIED, COMMAND, TRACE, STATE, SNAPSHOT, PLANT_EVENT, CONTROLLER_EVENT, RECORDER_EVENT, OPERATOR),
+    *(ANNOUNCE, FAULT),
 )
 BY_NAME = {topic.name: topic for topic in TOPICS}
-SCOPE = Topic("scope", wire.Scope, "recorder", 200.0, 0.0, logged=True)  # for viewers: in the log only, not on the bus
+SCOPE = Topic("scope", wire.Scope, "recorder", 200.0, 0.0, logged=True)  # made for viewers: in the log, not on the bus
 
 
 class Outgoing(NamedTuple):

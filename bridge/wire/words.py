@@ -14,7 +14,7 @@ _COLUMNS = {
     "Limit": "limit",
     "GuardState": "guard_state",
     "Cause": "cause",
-}  # by enum
+}  # columns by enum
 
 
 class ColumnWord(NamedTuple):

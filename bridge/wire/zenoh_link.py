@@ -31,13 +31,13 @@ __all__ = ["Bus", "BusConfig", "Inbox", "Received"]
 
 # Duration of one attempt to dial without a password. A starting rig makes a password, which only the next attempt can use.
 _WITHOUT_PASSWORD_S = 0.2
-_READS_S = 0.5  # in this time a running rig reads the first bytes of a connection, even on a busy computer
+_READS_S = 0.5  # time in which a running rig reads the first bytes of a connection, even on a busy computer
 _NO_PROTOCOL = b"\x08\x00" + b"\xff" * 8  # a length and its bytes, as Zenoh frames them; not a TLS handshake
 _AT_ONCE = struct.pack("ii", 0, 0)  # SO_LINGER off
 _SOURCE_LINE = re.compile(r" at /\S+\.rs:\d+\.?")  # a line of Zenoh's source, at the end of each of its errors
 _LIBC = ctypes.CDLL(None)
 _ROLES = frozenset({"plant", "controller", "recorder"})  # the roles with a token
-_MOST_CLAIMS = 64  # of controllers that start at once; more are a flood, and one rival suffices to yield
+_MOST_CLAIMS = 64  # most claims that are stored; more are a flood, and a controller yields to a single rival already
 
 
 _of_thread = threading.local()
@@ -54,12 +54,12 @@ def _keep_thread_state() -> None:
 
 
 def _close_at_once(_event: zenoh.TransportEvent) -> None:
-    """After a link was made: let this process close links without a wait for unsent data.
+    """Make this process close a new link without a wait for unsent data; called when a link was made.
 
     Zenoh sets SO_LINGER: if the other process is frozen, closing a link takes 30 to 40 ms, on the only thread that sends and
     relays (zenoh issues 1101, 2350). Unsent data of a closed link are still sent.
     """
-    for name in os.listdir("/proc/self/fd"):  # on a file that is not a socket this does nothing
+    for name in os.listdir("/proc/self/fd"):  # has no effect on files that are not sockets
         _LIBC.setsockopt(int(name), socket.SOL_SOCKET, socket.SO_LINGER, _AT_ONCE, len(_AT_ONCE))
 
 
@@ -76,11 +76,11 @@ def _listening(config: BusConfig, lockstep: bool) -> zenoh.Session:
 def _dialled(
     config: BusConfig, role: str, lockstep: bool, stop: threading.Event, fixed_s: float | None
 ) -> zenoh.Session:
-    """Dial for `fixed_s`, the patience of a command without --wait, else for `config.wait_s`."""
+    """Dial the rig for `fixed_s`, which commands without --wait give, else for `config.wait_s`."""
     patience_s = config.wait_s if fixed_s is None else fixed_s
     until_s = time.monotonic() + patience_s
     while not stop.is_set():
-        security = role_security(config, role)  # read at each attempt: the rig may have made it since
+        security = role_security(config, role)  # read at each attempt: the rig may have made the password since
         dial_s = min(DIAL_S if security else _WITHOUT_PASSWORD_S, patience_s)
         try:
             return zenoh.open(session_config(config, False, lockstep, dial_s, security))
@@ -111,7 +111,7 @@ def is_frozen(config: BusConfig) -> bool:
     return False
 
 
-def _remedy(config: BusConfig, known: bool) -> str:
+def _remedy(config: BusConfig, has_password: bool) -> str:
     start = "start `stickslip plant` with this --endpoint"
     if config.encrypted:
         return (
@@ -119,7 +119,7 @@ def _remedy(config: BusConfig, known: bool) -> str:
         )
     return (
         start
-        if known
+        if has_password
         else f"{start}; a rig of another user of this computer refuses clients that cannot read its password"
     )
 
@@ -147,7 +147,7 @@ class Bus:
         self._keep: list[Any] = []
         self._token: Any = None
         self._alive: set[str] = set()
-        self._came: dict[str, int] = {}
+        self._announced: dict[str, int] = {}
         self._claims: set[str] = set()
         self._alive_changed = threading.Condition()
         zenoh.init_log_from_env_or("off")
@@ -162,7 +162,7 @@ class Bus:
                 patience_s,
             )
         )
-        # in a Python thread, as it visits every open file of this process
+        # called in a Python thread, because it visits every open file of this process
         self._keep.append(self._session.info.declare_transport_events_listener(_close_at_once, history=True))
         self._keep.append(
             self._session.liveliness().declare_subscriber(
@@ -185,19 +185,19 @@ class Bus:
     def _on_alive(self, sample: Any) -> None:
         role = str(sample.key_expr).rsplit("/", 1)[-1]
         if role in _ROLES:  # no process waits for other roles
-            self._keep_up(self._alive, role, sample)
+            self._update(self._alive, role, sample)
 
     def _on_claim(self, sample: Any) -> None:
         claim = str(sample.key_expr).rsplit("/", 1)[-1]
         if len(self._claims) < _MOST_CLAIMS or claim in self._claims:
-            self._keep_up(self._claims, claim, sample)
+            self._update(self._claims, claim, sample)
 
-    def _keep_up(self, names: set[str], name: str, sample: Any) -> None:
-        """Add the name of a token to `names`, or remove it when the token has gone."""
+    def _update(self, names: set[str], name: str, sample: Any) -> None:
+        """Add the name of a token to `names`, or remove it when the token was withdrawn."""
         with self._alive_changed:
             if sample.kind == zenoh.SampleKind.PUT:
                 names.add(name)
-                self._came[name] = self._came.get(name, 0) + 1
+                self._announced[name] = self._announced.get(name, 0) + 1
             else:
                 names.discard(name)
             self._alive_changed.notify_all()
@@ -219,7 +219,7 @@ class Bus:
         return declared.put
 
     def listen(self, topic: Topic, receive: Callable[[Received], None]) -> None:
-        """Call `receive` for every message of `topic`, on a receiving thread: `receive` must only store the message."""
+        """Call `receive` for every message of `topic` in a receiving thread; it must only store the message."""
         most = largest_bytes(topic.message)
 
         def on_sample(sample: Any) -> None:
@@ -273,17 +273,17 @@ class Bus:
 
     def claim(self) -> tuple[str, Callable[[], set[str]]]:
         """Claim the role for this process. Returns the claim, and a function that returns the claims of others."""
-        mine = uuid.uuid4().hex
+        own_claim = uuid.uuid4().hex
         liveliness = self._session.liveliness()
-        self._keep.append(liveliness.declare_token(self._key(f"claim/{self._role}/{mine}")))
+        self._keep.append(liveliness.declare_token(self._key(f"claim/{self._role}/{own_claim}")))
         listener = zenoh.handlers.Callback(self._on_claim, indirect=False)
         self._keep.append(liveliness.declare_subscriber(self._key(f"claim/{self._role}/*"), listener, history=True))
 
         def others() -> set[str]:
             with self._alive_changed:
-                return self._claims - {mine}
+                return self._claims - {own_claim}
 
-        return mine, others
+        return own_claim, others
 
     def alive(self, role: str) -> bool:
         """Whether `role` is on the bus now."""
@@ -293,7 +293,7 @@ class Bus:
     def came(self, role: str) -> int:
         """Number of announcements of `role`; above 1, the role or the link to it was lost in between."""
         with self._alive_changed:
-            return self._came.get(role, 0)
+            return self._announced.get(role, 0)
 
     def linked(self) -> bool:
         """Whether this session, which dialled, has a link to the rig."""

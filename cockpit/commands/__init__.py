@@ -1,8 +1,8 @@
 """Options and output of each `stickslip` command; `cockpit.cli` lists them.
 
 run                         plant, controller and recorder together
-processes                   each of them alone: plant, controller, record
-operator_commands                      arm, disarm, stop, reset, status
+processes                   plant, controller, record: one process of a run each
+operator_commands           arm, disarm, stop, reset, status
 live                        serve, watch
 stress/                     fault, soak
 replay                      a log through this version's controller, simulated again, or published on the bus

@@ -36,7 +36,7 @@ class _Options(NamedTuple):
     budget_s: float | None
 
     @property
-    def way(self) -> Callable[["Evidence", Callable[[str, float], None], int], "Diagnosis"]:
+    def diagnose(self) -> Callable[["Evidence", Callable[[str, float], None], int], "Diagnosis"]:
         """The function that diagnoses a folder; it can be pickled for a worker."""
         from diagnosis.diagnose_many import real_diagnose
 
@@ -44,12 +44,12 @@ class _Options(NamedTuple):
 
     @property
     def json_file(self) -> Path | None:
-        """File for the JSON; None if it goes to stdout or was not asked for."""
+        """File for the JSON; None if the JSON goes to stdout or was not requested."""
         return None if self.as_json == STDOUT else self.as_json
 
     @property
     def only_json(self) -> Path | None:
-        """`as_json` for `tell`, without a file: the file is written later, and text is printed even if it is refused."""
+        """`as_json` for `print_result`, without a file: it is written after the text, which is printed even if it fails."""
         return STDOUT if self.as_json == STDOUT else None
 
 
@@ -104,7 +104,7 @@ def diagnose(
     sources = find_sources(evidence)
     is_single = all(path.resolve() == sources[0].folder for path in evidence)
     _check_destinations(options, is_single, sources)
-    for path in evidence:  # before minutes of work on the others
+    for path in evidence:  # checked before minutes of work on the other folders
         check_folder(path)
     return _diagnose_one(sources[0], options) if is_single else _diagnose_many(sources, options)
 
@@ -119,8 +119,8 @@ def _check_destinations(options: _Options, is_single: bool, sources: list["Evide
     from diagnosis.report.rig_file import RIG_BEGINS
 
     seen: dict[Path, str] = {}
-    asked = (("--json", options.json_file, JSON), ("--report", options.report, PAGE), ("--apply", options.apply, RIG))
-    for option, path, kinds in asked:
+    outputs = ("--json", options.json_file, JSON), ("--report", options.report, PAGE), ("--apply", options.apply, RIG)
+    for option, path, kinds in outputs:
         if path is None:
             continue
         if path == STDOUT:
@@ -131,12 +131,12 @@ def _check_destinations(options: _Options, is_single: bool, sources: list["Evide
             check_output(option, path, kinds)
         if kinds == RIG:
             refuse_to_replace_text(path, RIG_BEGINS, f"{option} {path}")
-        whole = path.resolve()
-        if whole in seen:
-            raise Fault("CONFIG", f"{option} {path}: is also the file of {seen[whole]}; choose another")
-        seen[whole] = option
-        measured = whole.name == MANIFEST or whole.suffix in RUN_SUFFIXES
-        if measured and whole.exists() and whole.parent in {source.folder.resolve() for source in sources}:
+        file = path.resolve()
+        if file in seen:
+            raise Fault("CONFIG", f"{option} {path}: is also the file of {seen[file]}; choose another")
+        seen[file] = option
+        measured = file.name == MANIFEST or file.suffix in RUN_SUFFIXES
+        if measured and file.exists() and file.parent in {source.folder.resolve() for source in sources}:
             raise Fault(
                 "CONFIG", f"{option} {path}: belongs to the evidence, which is never overwritten; choose another"
             )
@@ -197,9 +197,9 @@ def _diagnose_one(source: "EvidenceFolder", options: _Options) -> int:
     else:
         wanted.append(("rig file   ", options.apply, lambda path: write_rig(diagnosis, evidence, path)))
     refused: list[Fault] = []
-    for word, path, write in wanted:
-        if path is not None and written(partial(write, path), refused) and word:
-            _print_line(options, f"{word}{path}")
+    for label, path, write in wanted:
+        if path is not None and written(partial(write, path), refused) and label:
+            _print_line(options, f"{label}{path}")
     return _report_refused(refused)
 
 
@@ -221,8 +221,8 @@ def _result(
     from diagnosis import diagnose_many as many
 
     if not options.cluster:
-        return options.way(evidence, progress, options.jobs)
-    with closing(many.diagnose_many([source], 1, options.cluster, options.way, options.certs)) as outcomes:
+        return options.diagnose(evidence, progress, options.jobs)
+    with closing(many.diagnose_many([source], 1, options.cluster, options.diagnose, options.certs)) as outcomes:
         outcome = next(outcomes)
     if outcome.diagnosis is None:
         raise Fault(*(outcome.fault or ("PEER_DIED", "")))
@@ -245,7 +245,9 @@ def _diagnose_many(sources: list["EvidenceFolder"], options: _Options) -> int:
     try:
         with (
             watched() as progress,
-            closing(many.diagnose_many(missing, options.jobs, options.cluster, options.way, options.certs)) as outcomes,
+            closing(
+                many.diagnose_many(missing, options.jobs, options.cluster, options.diagnose, options.certs)
+            ) as outcomes,
         ):
             for outcome, estimate in with_estimate(outcomes, len(missing)):
                 outcomes_by_name[outcome.source.name] = without_pictures(outcome)
@@ -269,5 +271,5 @@ def _diagnose_many(sources: list["EvidenceFolder"], options: _Options) -> int:
         words.append(f"reports    {options.report / INDEX}")
     print_result(options.only_json, table, words, indent=1)
     statuses = [FAULTS[outcome.fault.fault].exit_status for outcome in results if outcome.fault is not None]
-    # the lowest status first: bad evidence, which the caller can mend
+    # the lowest status: bad evidence, which the caller can mend
     return min((status for status in (*statuses, _report_refused(refused)) if status), default=0)

@@ -62,28 +62,29 @@ def serve(
     bus = _seen_bus("serve", shared, log, as_json)
     with contextlib.ExitStack() as ending:
         sock = ending.enter_context(listening(port))
-        at = int(sock.getsockname()[1])
-        other = None
+        page_port = int(sock.getsockname()[1])
+        viewer_server = None
         if foxglove:
             from cockpit.live.foxglove_server import Foxglove
 
-            other = ending.enter_context(Foxglove(foxglove_port))
-        word, path = ending.enter_context(kept_token(at))
-        viewers = f"ws://{HOST}:{other.port}" if other is not None else ""
+            viewer_server = ending.enter_context(Foxglove(foxglove_port))
+        token, path = ending.enter_context(kept_token(page_port))
+        viewers = f"ws://{HOST}:{viewer_server.port}" if viewer_server is not None else ""
 
         def ready() -> None:
             if as_json is not None:
-                table = {"page": f"http://{HOST}:{at}/", "endpoint": bus.endpoint, "token_file": str(path)}
+                table = {"page": f"http://{HOST}:{page_port}/", "endpoint": bus.endpoint, "token_file": str(path)}
                 print(json.dumps(table | ({"foxglove": viewers} if viewers else {})), flush=True)
                 return
-            print_line(f"page     http://{HOST}:{at}/ shows the rig at {bus.endpoint}; Ctrl-C ends it")
+            print_line(f"page     http://{HOST}:{page_port}/ shows the rig at {bus.endpoint}; Ctrl-C ends it")
             if viewers:
                 print_line(
                     f"foxglove {viewers} is the address for Foxglove and Lichtblick, which can read but not command"
                 )
-            print_line(f"token    {word} arms, disarms and resets from the page; it is in {path}")
+            print_line(f"token    {token} arms, disarms and resets from the page; it is in {path}")
 
-        Server(bus, word, at, other.send if other is not None else None).run(sock, stop_event(), ready)
+        also = viewer_server.send if viewer_server is not None else None
+        Server(bus, token, page_port, also).run(sock, stop_event(), ready)
 
 
 @command(*BUS)

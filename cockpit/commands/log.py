@@ -61,6 +61,8 @@ def log_recover(
             parts.append(counted(saved.attachments, "attachment left out", "attachments left out"))
         lost = lost_in_words(saved.damage)
         parts.append(f"lost: {lost}" if lost else "every message of the log is in it")
+        if saved.damage.before:
+            parts.append(f"do not trust it: {saved.damage.before}")
         print_result(as_json, saved, ["; ".join(parts)])
 
     carry_out(work, as_json)
@@ -144,8 +146,8 @@ def log_import(
         if channel_map is not None:
             done = import_file(path, channel_map, out)
         else:
-            beside = out.with_suffix("") if out.suffix == ".mcap" else out / path.stem
-            kept = beside.with_name(beside.name + ".map.toml")
+            stem = out.with_suffix("") if out.suffix == ".mcap" else out / path.stem
+            kept = stem.with_name(stem.name + ".map.toml")
             done = _import_as_seen(path, out, kept, speed, mass)
         place = done.out if done.out.suffix == ".mcap" else done.out / done.file
         words = [f"{place}: {counted(done.rows, 'sample')} of {', '.join(done.columns)}"]

@@ -1,4 +1,4 @@
-"""`stickslip log info`: the verdict on the run in a log and the findings of its check; a line a log for several."""
+"""`stickslip log info`: the verdict on the run in a log and the findings of its check; for several logs one line each."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -45,7 +45,7 @@ def _judged(path: Path, quiet: bool) -> "Judged":
 
 
 def _row(path: Path, quiet: bool, strict: bool) -> "tuple[int, str, Judged | ReportedFault]":
-    """Exit status, line and result of one log of several; a file that is no log does not end the others."""
+    """Exit status, line and result of one log of several; a file that is not a log does not end the work on the others."""
     try:
         judged = _judged(path, quiet)
     except Fault as fault:

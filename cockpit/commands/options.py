@@ -107,7 +107,7 @@ class SharedOptions(NamedTuple):
         return load_bus(self.scenario, self.as_settings())
 
 
-BUS = ("scenario", "endpoint", "prefix", "certs")  # choose the bus of a running rig
+BUS = ("scenario", "endpoint", "prefix", "certs")  # options that choose the bus of a running rig
 
 
 def command(*names: str, **defaults: Any) -> Callable[[Callable[..., int | None]], Callable[..., NoReturn]]:
@@ -131,9 +131,9 @@ def command(*names: str, **defaults: Any) -> Callable[[Callable[..., int | None]
             first = [SharedOptions(**shared)] if options else []
             carry_out(lambda: function(*first, **given), given["as_json"])
 
-        others = list(signature(function).parameters.values())[bool(options) :]
+        parameters = list(signature(function).parameters.values())[bool(options) :]
         made: Any = called
-        made.__signature__ = Signature([*options, *(other.replace(kind=Parameter.KEYWORD_ONLY) for other in others)])
+        made.__signature__ = Signature([*options, *(row.replace(kind=Parameter.KEYWORD_ONLY) for row in parameters)])
         return made
 
     return decorated
@@ -141,7 +141,7 @@ def command(*names: str, **defaults: Any) -> Callable[[Callable[..., int | None]
 
 @contextmanager
 def watched_share(text: str, quiet: bool) -> Generator[Callable[[float], None]]:
-    """A progress bar on stderr if it is a terminal; yields the function to call with the share done."""
+    """Show a progress bar on stderr if it is a terminal; yields the function to call with the share done."""
     if quiet or not sys.stderr.isatty():
         yield lambda _share: None
         return

@@ -73,7 +73,7 @@ def replay_command(
     out = log or Path("runs/closed-loop.mcap")
     if closed_loop:
         check_output("--log", out, LOG)
-    for path in logs:  # before the work on the others
+    for path in logs:  # checked before the work on the other logs
         check_log_file(path)
     if to_bus:
         from cockpit.run.log_to_bus import publish_log
@@ -102,6 +102,6 @@ def replay_command(
     for path in logs:
         replayed.append(replaying.replay_log(path, from_s, settings))
         if as_json != STDOUT:
-            print(plain("\n".join(replayed[-1].in_words())), flush=True)  # the next log may be a bad one
+            print(plain("\n".join(replayed[-1].in_words())), flush=True)  # printed now, as the next log may be damaged
     print_result(as_json, replayed, [])
     return 0 if all(result.identical and not result.damage for result in replayed) else 1

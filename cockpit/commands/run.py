@@ -37,8 +37,8 @@ def run(
     from cockpit.run.run import run_scenario
     from cockpit.run.scenario_file import rig_setting
 
-    other = [rig_setting(rig)] if rig is not None else []
-    changed = [*other, *shared._replace(wait=None).as_settings()]
+    of_rig = [rig_setting(rig)] if rig is not None else []
+    changed = [*of_rig, *shared._replace(wait=None).as_settings()]
     with stopped_once():
         outcome = run_scenario(shared.scenario, changed, shared.lockstep, in_process, shared.log, shared.wait, without)
         print_result(as_json, outcome, [*outcome.in_words(verbose), *strictly(outcome.verdict, strict)])

@@ -42,7 +42,7 @@ def scenarios(
             raise Fault("CONFIG", f"--copy {copy}: {target} exists and is not replaced; rename or delete it first")
         check_output("--copy", target, RIG)
         lines = source.read_text(encoding="utf-8").splitlines(keepends=True)
-        with writing(target):  # without the line `#:schema`, a path relative to the folder of the source
+        with writing(target):  # the line `#:schema` is left out: its path is relative to the folder of the source
             write_whole(target, "".join(line for line in lines if not line.startswith("#:schema")))
         print_result(as_json, {"file": str(target)}, [str(target), f"next     stickslip run --scenario {target}"])
         return

@@ -21,9 +21,9 @@ from plant.faults.kinds import PROCESS
 from plant.faults.schedule import BEGAN
 from plant.faults.table import FaultTable
 
-_DIAL_S = 2.0
-_HEADERS_S = 2.0
-_AGAIN_S = 0.5  # repetition: the first message may be lost during connection
+_DIAL_S = 2.0  # timeout of the connection
+_HEADERS_S = 2.0  # timeout for the headers of the processes
+_AGAIN_S = 0.5  # interval of repetition: the first message may be lost during connection
 _TWICE_S = 0.6  # time for two messages, if no confirmation is expected
 _TAKEN_S = 5.0  # timeout of the confirmation of a fault that begins at once
 
@@ -46,7 +46,7 @@ def inject(bus_config: BusConfig, name: str, tables: Sequence[FaultTable], clear
     Args:
         bus_config: connection to the loop.
         name: name of the faults.
-        tables: their times count from now.
+        tables: the faults; their times count from now.
         clear: first end the active faults.
 
     Raises Fault NO_PEER if no rig answers or confirms the fault, or a process cannot be reached.

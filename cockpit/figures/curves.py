@@ -15,12 +15,12 @@ from cockpit.figures.request import FigureRequest
 from cockpit.figures.signals import Floats, PlottedSignal, samples_of
 
 _HEAD = ("log", "signal", "t_s", "least", "mean", "largest")
-FIRST_LINE = ",".join(_HEAD) + "\n"  # of the table; a file with another first line is not ours and is not replaced
-_BINS = 2000  # across a figure: 300 dpi over 170 mm. Fewer samples are drawn unbinned
+FIRST_LINE = ",".join(_HEAD) + "\n"  # first line of the table; a file with another first line is not replaced
+_BINS = 2000  # bins across a figure: 300 dpi over 170 mm. Fewer samples are drawn unbinned
 
 
 class LogCurve(NamedTuple):
-    """One signal of one log in a figure, in SI units; with `is_raw`, least, mean and largest are the samples."""
+    """One signal of one log in a figure, in SI units; if `is_raw`, each point is a sample and no bin."""
 
     log: str
     signal: PlottedSignal
@@ -47,7 +47,7 @@ def window_of(runs: Sequence[RunData], request: FigureRequest) -> tuple[float, f
 
 
 def curve_of(run: RunData, log: str, signal: PlottedSignal, from_s: float, to_s: float) -> LogCurve:
-    """A signal between two times: its samples if few, else bins."""
+    """A signal between two times: its samples if at most `_BINS`, else bins."""
     t_s, values = samples_of(run, signal)
     inside = (t_s >= from_s) & (t_s <= to_s)
     t_s, values = t_s[inside], values[inside]

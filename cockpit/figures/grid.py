@@ -32,6 +32,6 @@ def on_grid(t_s: Floats, values: Floats, grid: Grid) -> Envelope:
     starts = np.flatnonzero(np.diff(at, prepend=-1))
     made = Envelope(*(np.full(grid.bins, np.nan) for _ in range(3)))
     if len(starts):
-        for each, filled in zip(made, envelope_of(values, starts), strict=True):
-            each[at[starts]] = filled
+        for column, filled in zip(made, envelope_of(values, starts), strict=True):
+            column[at[starts]] = filled
     return made

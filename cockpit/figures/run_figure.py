@@ -1,4 +1,4 @@
-"""One log, or two overlaid, as a figure: for a screen with the answer above it, or for a paper without."""
+"""One log, or two overlaid, as a figure: for a screen with the verdict as title, or for a paper without title."""
 
 import re
 import textwrap
@@ -35,7 +35,7 @@ _NEXT_MM = {SCREEN: 60.0, PAPER: 30.0}
 _FOOT_MM = 1.35  # width of a letter in the foot line
 _LETTER_MM, _KEY_MM = 0.18, 1.4  # width of a letter and of a key in the legend, per point of font size
 _ON_TOP = 3.0  # z-order of the first signal; later signals lie behind it
-_OTHER_ALPHA = 0.55  # of the second log, which is also dashed
+_SECOND_ALPHA = 0.55  # opacity of the second log, whose lines are also dashed
 
 
 class _Shown(NamedTuple):
@@ -52,7 +52,7 @@ class Plotted(NamedTuple):
 
     verdict: RunVerdict
     picture: Path
-    data: Path | None  # of the numbers
+    data: Path | None  # file with the numbers of the curves
     JSON_MERGED = "verdict"
 
 
@@ -91,11 +91,11 @@ def _shown(path: Path, name: str) -> _Shown:
 
 def _names(logs: Sequence[Path]) -> list[str]:
     """Distinct names of the logs: with their folders if the file names are equal, numbered if the paths are equal."""
-    alone = [shown_name(path.name) for path in logs]
-    if len({*alone}) == len(alone):
-        return alone
-    whole = [shown_name(str(path)) for path in logs]
-    return whole if len({*whole}) == len(whole) else [f"{name} ({at})" for at, name in enumerate(alone, 1)]
+    names = [shown_name(path.name) for path in logs]
+    if len({*names}) == len(names):
+        return names
+    paths = [shown_name(str(path)) for path in logs]
+    return paths if len({*paths}) == len(paths) else [f"{name} ({at})" for at, name in enumerate(names, 1)]
 
 
 def _literal(name: str) -> str:
@@ -150,7 +150,7 @@ def _rules(paper: bool) -> Any:
 
 
 def _title(shown: Sequence[_Shown], request: FigureRequest, window_s: tuple[float, float]) -> str:
-    """The answer for each log; for part of a run also its number of slips."""
+    """The headline of each log's verdict; for a part of a run also the number of slips in it."""
     lines: list[str] = []
     for log in shown:
         name = f"{log.name}: " if len(shown) > 1 else ""
@@ -191,8 +191,8 @@ def _legend(axes: Any, request: FigureRequest) -> None:
     if len(handles) < 2:
         return
     size = _rules(request.style == PAPER)["legend.fontsize"]
-    room = int(0.85 * request.width_mm / (size * (_KEY_MM + _LETTER_MM * max(map(_letters, labels)))))
-    columns = min(max(room, 1), len(handles))
+    fitting = int(0.85 * request.width_mm / (size * (_KEY_MM + _LETTER_MM * max(map(_letters, labels)))))
+    columns = min(max(fitting, 1), len(handles))
     axes.legend(handles, labels, ncols=columns, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0))
 
 
@@ -204,7 +204,7 @@ def _letters(label: str) -> int:
 def _draw(axes: Any, curve: LogCurve, label: str, second: bool, zorder: float) -> None:
     """Draw the mean as a line over the range from least to largest."""
     factor, colour = curve.signal.factor, curve.signal.colour
-    alpha = _OTHER_ALPHA if second else 1.0
+    alpha = _SECOND_ALPHA if second else 1.0
     if not curve.is_raw:
         low, high = factor * curve.values.least, factor * curve.values.most
         axes.fill_between(curve.t_s, low, high, color=colour, alpha=0.3 * alpha, linewidth=0, zorder=zorder)
@@ -214,7 +214,7 @@ def _draw(axes: Any, curve: LogCurve, label: str, second: bool, zorder: float) -
 
 
 def _mark_slips(axes: Any, shown: _Shown, window_s: tuple[float, float], second: bool, several: bool) -> None:
-    """Draw a triangle at each breakaway; the legend contains their number."""
+    """Draw a triangle at each breakaway; the legend states the number of slips."""
     if shown.cycles is None:
         return
     inside = (shown.cycles.breakaway_t_s >= window_s[0]) & (shown.cycles.breakaway_t_s <= window_s[1])

@@ -21,7 +21,7 @@ class Panel(NamedTuple):
 
     @property
     def signals(self) -> list["PlottedSignal"]:
-        """Its signals, in the order of `SIGNALS`."""
+        """Signals of this panel, in the order of `SIGNALS`."""
         return [signal for signal in SIGNALS.values() if signal.panel == self]
 
     def heading(self) -> dict[str, Any]:
@@ -33,15 +33,15 @@ class Panel(NamedTuple):
 class PlottedSignal(NamedTuple):
     """One signal; logs contain SI units, and `factor` converts them to `unit`."""
 
-    name: str  # as in the tables of `log export`
-    symbol: str  # as in the paper; may be empty
+    name: str  # column in the tables of `log export`
+    symbol: str  # symbol in the paper; may be empty
     words: str
     axis: str  # title of the axis; neighbours with equal axis and unit share a panel
     topic: str
     factor: float
     unit: str
     colour: str
-    panel: Panel | None = None  # of the pages
+    panel: Panel | None = None  # panel on the pages; None: on no page
     unknown: float | None = None  # value that means "not known"
 
     @property
@@ -58,7 +58,7 @@ class PlottedSignal(NamedTuple):
 
     @property
     def axis_title(self) -> str:
-        """`velocity [mm/s]`."""
+        """Name and unit of the axis, such as `velocity [mm/s]`."""
         return f"{self.axis} [{self.unit}]" if self.unit else self.axis
 
 
@@ -90,7 +90,7 @@ SIGNALS = {
         PlottedSignal("sliding_velocity_mps", "v_s", "slide, mean over a window", "velocity", "trace", 1e3, "mm/s", _GREEN),
         PlottedSignal("velocity_ratio", "", "v_a over v_d, measured", "v_a / v_d", "state", 1.0, "", _BLUE, unknown=0.0),
         PlottedSignal("amplitude_m", "u_0", "amplitude of the base, applied", "amplitude", "applied", 1e9, "nm", _BLUE, _STROKE),
-        PlottedSignal("wanted_amplitude_m", "", "amplitude asked for", "amplitude", "trace", 1e9, "nm", _GREY, _STROKE),
+        PlottedSignal("wanted_amplitude_m", "", "amplitude, commanded", "amplitude", "trace", 1e9, "nm", _GREY, _STROKE),
         PlottedSignal("frequency_Hz", "f", "frequency, applied", "frequency", "applied", 1.0, "Hz", _BROWN, _FREQUENCY,
             unknown=0.0),
         PlottedSignal("time_to_slip_s", "", "predicted time to slip", "time to slip", "trace", 1.0, "s", _BROWN, _TO_SLIP,
@@ -102,7 +102,7 @@ SIGNALS = {
         PlottedSignal("mass_position_m", "x", "slide's position", "position", "sensors", 1e3, "mm", _GREEN, _POSITIONS),
         PlottedSignal("drive_position_m", "s_d", "drive's position", "position", "sensors", 1e3, "mm", _RED, _POSITIONS),
         PlottedSignal("round_trip_ns", "", "block out to command in", "round trip", "applied", 1e-3, "µs", _BROWN, unknown=0),
-        PlottedSignal("heat_share", "", "exciter's warmth, over the allowed", "warmth", "applied", 1e2, "%", _RED),
+        PlottedSignal("heat_share", "", "exciter's temperature rise, over its limit", "heating", "applied", 1e2, "%", _RED),
     )
 }
 # fmt: on
@@ -112,7 +112,7 @@ class WordSignal(NamedTuple):
     """A code of a log and of a running rig, shown as a word."""
 
     title: str
-    column: str  # of `bridge.wire.words`
+    column: str  # column in `bridge.wire.words`
     topic: str
     field: str
     is_band: bool = True  # drawn as a band over time

@@ -1,4 +1,4 @@
-"""Stability of a rig as a picture: where it sticks and slips, and how much vibration removes that."""
+"""Stability of a rig as a picture: where it sticks and slips, and how much vibration removes stick-slip."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -18,7 +18,7 @@ _KINDS = (
     (1, _AMBER, "smooth if undisturbed; stick-slip that has started can go on"),
     (0, _GREEN, "stable: smooth sliding"),
 )
-_RATIO_SET_POINT = 1.2  # of v_a to v_d: the margin of the controller
+_RATIO_SET_POINT = 1.2  # v_a / v_d at the controller's default set point
 
 
 class MapResult(NamedTuple):
@@ -29,11 +29,11 @@ class MapResult(NamedTuple):
     drive_stiffness_N_per_m: float
     stable_without_vibration: bool
     growth_per_s: float  # largest real part of the poles at the operating point, without vibration
-    smallest_vibration_velocity_mps: float | None  # least stable value; None: none up to 5 v_d
-    # also ends stick-slip that has started: at least v_d if that could go on; 0 if no vibration is needed
+    smallest_vibration_velocity_mps: float | None  # least v_a with stable sliding; None: not stable up to 5 v_d
+    # least v_a that also ends stick-slip that has started; 0 if no vibration is needed
     removing_vibration_velocity_mps: float | None
     critical_velocity_mps: float | None  # None: steady sliding is unstable at every velocity
-    self_sustained_velocity_mps: float | None  # None: started stick-slip never dies out
+    self_sustained_velocity_mps: float | None  # None: stick-slip that has started never ends
     left_out: tuple[str, ...]  # effects of the rig outside this theory
     answer: str
 
@@ -150,7 +150,7 @@ def _draw_without_vibration(axes: Any, rig: RigConfig, result: MapResult) -> Non
     sustained = grid[0] < self_sustained_velocity_mps(rig, grid[1])
     areas = _regions(axes, velocity_mps * 1e3, stiffness * 1e-3, unstable, sustained)
     if result.critical_velocity_mps is None:
-        # without a border, draw the lines of slow growth instead
+        # unstable at every velocity: draw lines of slow growth in place of a border
         growth_per_s = stability_map(rig, *grid)
         for level_per_s, style in ((1.0, "-"), (1e-3, "--")):
             axes.contour(

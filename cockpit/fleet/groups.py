@@ -31,7 +31,7 @@ class RigGroup(NamedTuple):
     kind: Kind
     what: str  # effects, or the quantity that explains most of a signal; empty if unknown
     meaning: str
-    helps: float  # sum of the explained shares: number of gaps that a mended cause would close
+    helps: float  # sum of the explained shares: number of gaps that a repair of the cause would close
     rigs: tuple[GroupedRig, ...]  # the largest share first
 
 
@@ -85,7 +85,7 @@ def _placed(diagnosed: Diagnosed) -> tuple[tuple[Kind, str], GroupedRig]:
     """Group of a rig, and its row in the group."""
     diagnosis, gap = diagnosed.diagnosis, diagnosed.diagnosis.gap
     kind: Kind = "named"
-    what, size, explains, between = "", "", gap.shrinkage, gap.interval_90
+    what, size, explains, interval_90 = "", "", gap.shrinkage, gap.interval_90
     if diagnosis.verdict in ("effect", "partly"):
         what = " + ".join(sorted(diagnosis.effects))
         size = "; ".join(
@@ -95,21 +95,21 @@ def _placed(diagnosed: Diagnosed) -> tuple[tuple[Kind, str], GroupedRig]:
             for item in candidate.parameters.items()
         )
         shares = [share for share in diagnosis.shares if share.what in diagnosis.effects]
-        if explains is None and shares:  # without a fit: the share in one signal, from the relations
+        if explains is None and shares:  # no fit was made: take the share in one signal, from the relations
             most = max(shares, key=lambda share: share.share)
-            explains, between, size = most.share, most.interval_90, f"{most.signal}: {share_in_words(most)}"
+            explains, interval_90, size = most.share, most.interval_90, f"{most.signal}: {share_in_words(most)}"
     elif diagnosis.verdict == "no-gap":
-        kind, explains, between = "no-gap", None, None
+        kind, explains, interval_90 = "no-gap", None, None
     elif (most := mostly(diagnosis)) is not None:
         kind, what, size = "unexplained", f"{most.what} in the {most.signal}", share_in_words(most)
-        explains, between = most.share, most.interval_90
+        explains, interval_90 = most.share, most.interval_90
     else:
-        kind, explains, between = "unexplained", None, None
+        kind, explains, interval_90 = "unexplained", None, None
         if diagnosis.remainder is not None:
             what, size = f"something in the {diagnosis.remainder.where}", remainder_in_words(diagnosis.remainder)
     # a fit below the noise floor closes the whole gap and not more; a fit that widens the gap counts as 0
     explains = None if explains is None else min(max(explains, 0.0), 1.0)
     answer, after = words.answer(diagnosis), diagnosis.next_experiment.what
     return (kind, what), GroupedRig(
-        diagnosed.evidence, diagnosed.report, diagnosis.verdict, answer, explains, between, size, after
+        diagnosed.evidence, diagnosed.report, diagnosis.verdict, answer, explains, interval_90, size, after
     )

@@ -14,7 +14,7 @@ from diagnosis.evidence.manifest import MANIFEST, read_manifest
 from diagnosis.result import Diagnosis
 
 FORMAT = "fleet-result/1"
-RESULTS = "results"  # in the folder of a fleet
+RESULTS = "results"  # name of the folder of stored results, in the folder of a fleet
 
 
 def evidence_files(folder: Path) -> list[Path]:
@@ -45,7 +45,7 @@ def keep(fleet: Path, digest: str, diagnosis: Diagnosis, report: str) -> None:
 
 
 def kept(fleet: Path, digest: str) -> tuple[Diagnosis, str] | None:
-    """A result without its pictures, and the file of its report; None without an intact result."""
+    """A stored result without its pictures, and the file of its report; None without an intact result."""
     try:
         table: dict[str, Any] = read_json(_place(fleet, digest))
         if table["format"] != FORMAT or file_sha256(fleet / table["report"]) != table["report_sha256"]:

@@ -18,7 +18,7 @@ from diagnosis.result import Diagnosis
 from diagnosis.version import tool_version
 
 INDEX, INDEX_JSON = "index.html", "index.json"
-_LONGEST_NAME_BYTES = 200  # of the 255 bytes of a file name; a number and `.html.part` follow
+_LONGEST_NAME_BYTES = 200  # longest name of a report: a number and `.html.part` follow, up to 255 bytes are possible
 
 
 class FleetFolder:
@@ -103,8 +103,8 @@ def with_estimate(outcomes: Iterator[FolderResult], left: int) -> Generator[tupl
     """Each outcome with the estimated time left, in words; empty after the last outcome.
 
     Args:
-        outcomes: in order of completion.
-        left: their number.
+        outcomes: outcomes in order of completion.
+        left: number of outcomes.
 
     """
     began_s = time.monotonic()
@@ -129,11 +129,11 @@ def report_names(names: list[str]) -> dict[str, str]:
     reports: dict[str, str] = {}
     taken = {Path(INDEX).stem}
     for name in names:
-        whole = name.strip("/").replace("/", "_")
-        while len(os.fsencode(whole)) > _LONGEST_NAME_BYTES:  # keep the end of a path, its most specific part
-            whole = whole[1:]
-        tries = (whole if number == 1 else f"{whole}-{number}" for number in count(1))
-        unique = next(stem for stem in tries if stem.casefold() not in taken)  # some file systems ignore case
+        base = name.strip("/").replace("/", "_")
+        while len(os.fsencode(base)) > _LONGEST_NAME_BYTES:  # keep the end of a path, its most specific part
+            base = base[1:]
+        stems = (base if number == 1 else f"{base}-{number}" for number in count(1))
+        unique = next(stem for stem in stems if stem.casefold() not in taken)  # some file systems ignore case
         taken.add(unique.casefold())
         reports[name] = f"{unique}.html"
     return reports

@@ -15,11 +15,11 @@ from cockpit.judge.setup import is_known
 from cockpit.judge.verdict import RunVerdict
 from diagnosis.slips import Cycles
 
-_PIECE_ROWS = 4096  # of a log in memory, per call of the judge
+_PIECE_ROWS = 4096  # messages of a log in memory that the judge takes per call
 
 
 class Judged(NamedTuple):
-    """Results of a log."""
+    """Verdict, findings and judge of a log."""
 
     verdict: RunVerdict
     check: LogCheck  # the findings of `log check`
@@ -41,9 +41,9 @@ def judge_log(
     """Judge and check a log in one pass, in constant memory. Raises Fault BAD_LOG.
 
     Args:
-        path: of the log.
+        path: path of the log.
         progress: called with the share of the log read so far, 0 to 1.
-        stretch_from_s: as in `RunJudge`.
+        stretch_from_s: begin of a further stretch, see `RunJudge`.
 
     """
     check_log_file(path)
@@ -63,12 +63,12 @@ def judge(path: Path) -> RunVerdict:
 
 
 def judge_tables(run: RunData) -> tuple[RunVerdict, Cycles | None]:
-    """Judge a log in memory, for figures and pages; its verdict and slips. Raises Fault BAD_LOG."""
+    """Judge a log in memory, for figures and pages; returns verdict and slips. Raises Fault BAD_LOG."""
     judge = RunJudge(run.path, run.headers)
     judge.log.events.add(run.events)
     tables = {name: getattr(run, name) for name in ("trace", "applied", "command", "state", "announce", "sensors")}
     pieces = max(map(len, tables.values())) // _PIECE_ROWS + 1
-    for piece in range(pieces):  # of the same time, except for missing messages
+    for piece in range(pieces):  # the pieces of all tables are of the same time, apart from missing messages
         for name, table in tables.items():
             part = table[len(table) * piece // pieces : len(table) * (piece + 1) // pieces]
             judge.add(name, part, part["t_ns"])

@@ -22,9 +22,9 @@ class JudgedWindows:
     Args:
         setup, of: numbers of the run, and description of its rig.
         log, frozen: watches of its messages.
-        interruptions: of its controller.
+        interruptions: interruptions of its controller.
         began_s: begin of its first block.
-        stretch_from_s: begin of a further stretch to the end, with or without a controller.
+        stretch_from_s: begin of a further stretch, see `RunJudge`.
 
     """
 
@@ -43,7 +43,7 @@ class JudgedWindows:
         self._cycles: list[Cycles] = []
         self._has_force = False  # some block has a force
         self.checked = False  # some window has blocks of a run, not of an imported log
-        self.alone = PhaseSum(0.0, np.inf)  # without a controller
+        self.alone = PhaseSum(0.0, np.inf)  # stretches without a controller
         self.phases = {
             "before": PhaseSum(began_s, setup.enabled_from_s),
             "taking_over": PhaseSum(setup.enabled_from_s, setup.settled_from_s),
@@ -70,9 +70,9 @@ class JudgedWindows:
         for name, sum_ in self.phases.items():
             sum_.to_s = min(sum_.to_s, last_s) if is_last else sum_.to_s
             sum_.add(forces, motion, without if name in ("taking_over", "after") else [])
-        if gone := self._interruptions.gone():
-            self.alone.from_s, self.alone.to_s = gone[0][0], gone[-1][1]
-            self.alone.add(forces, motion, apart((0.0, np.inf), gone))
+        if absences := self._interruptions.gone():
+            self.alone.from_s, self.alone.to_s = absences[0][0], absences[-1][1]
+            self.alone.add(forces, motion, apart((0.0, np.inf), absences))
         self._cycles.append(forces.cycles)
         self._has_force |= len(forces.t_s) > 0
         return window, forces

@@ -15,10 +15,10 @@ class Losses(NamedTuple):
     """Losses of one log."""
 
     planned_s: float  # planned length if the log ends earlier and without the plant's END; else 0
-    blocks: int
-    at_the_end: int  # of `blocks`: after the last one in the log, by the plant's END
+    blocks: int  # missing blocks
+    at_the_end: int  # part of `blocks` after the last block in the log, by the plant's END
     blocks_known: bool  # False: a cut or damaged log may lack more
-    messages: int  # blocks included
+    messages: int  # missing messages, blocks included
     absent: list[str]  # topics without any message that should have one per block
     misses_known: bool  # False: the log lacks steps of the controller, so it may have missed more blocks
 

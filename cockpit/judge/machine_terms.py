@@ -23,10 +23,11 @@ from bridge.log.watches.arrays import noise_of
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.judge.window import HasMoved, Window
 
-_FOLLOWS = 0.5  # share of the drive's travel: a slide with more has ended its stick
-_AT_TURN_SIGMAS = 6.0  # of the drive's noise: within it the drive is at its turning point
-_CHANGE_S = 0.25  # margin before the turn at the end of a window, as the report may be early or late
-_SEEN_SIGMAS = 10.0  # of the noise of both positions: travel of the drive over which its slide is judged
+_FOLLOWS = 0.5  # share of the drive's travel; a slide that moves farther no longer sticks
+_AT_TURN_SIGMAS = 6.0  # distance to the turning point within which the drive turns, in rms noises of its position
+# Reversals reported in this time before the end of a window are left to the next window, as reports are early or late.
+_CHANGE_S = 0.25
+_SEEN_SIGMAS = 10.0  # travel of the drive over which the slide is compared, in rms noises of both positions
 
 
 class Following(NamedTuple):
@@ -44,18 +45,18 @@ class Following(NamedTuple):
 class Reversal(NamedTuple):
     """One change of sign of the drive's velocity."""
 
-    reported_s: float  # by the controller, which is up to 0.03 s early or late
-    t_s: float
-    stick_s: float  # until the slide makes half of the drive's travel, at most to the end of the stroke
+    reported_s: float  # time by the controller, up to 0.03 s early or late
+    t_s: float  # turning point by the drive position
+    stick_s: float  # time until the slide makes half of the drive's travel, at most to the end of the stroke
     quadrant_error_m: float  # 0 if the slide never follows
 
 
 class BlockMotion(NamedTuple):
-    """A stretch of a run block by block, [blocks] each, and its reversals."""
+    """Motion in a stretch of a run, [blocks] each, and its reversals."""
 
     t_s: Floats
     error_m: Floats | None  # drive less slide; None if a position is missing
-    direction: npt.NDArray[np.int64]  # of the drive, 0 at rest
+    direction: npt.NDArray[np.int64]  # direction of the drive: 1, -1, 0 at rest
     dose_m2_per_s: Floats  # v_a^2 times the block duration, 0 while the exciter rests
     reversals: list[Reversal]
 
@@ -97,7 +98,7 @@ class FollowingSum:
                 self._quadrant_m = max(self._quadrant_m, reversal.quadrant_error_m)
 
     def result(self, block_s: float) -> Following | None:
-        """The sums; None without motion or without a position."""
+        """Figures of the stretch; None without motion or without a position."""
         if not self._blocks:
             return None
         return Following(
@@ -112,17 +113,18 @@ class FollowingSum:
 
     @property
     def dose_mm2_per_s(self) -> float:
-        """The integral of v_a^2."""
+        """Integral of v_a^2 over time."""
         return 1e6 * self._dose_m2_per_s
 
 
 class MotionOf:
-    """Motion of a run, window by window, from its positions and the drive velocity of its controller."""
+    """Motion of a run, window by window, from both positions and the drive velocity that the controller measured."""
 
     def __init__(self) -> None:
         self._moved = HasMoved()
-        self._last: tuple[float, float, float, int] | None = None  # moving block, the last of the windows before
-        self._until_s = -np.inf  # changes of direction are judged up to this time
+        # last moving block so far: time, slide, drive, direction
+        self._last: tuple[float, float, float, int] | None = None
+        self._until_s = -np.inf  # reversals are judged up to this time
 
     def __call__(self, window: Window, block_s: float) -> BlockMotion:
         """Motion in the judged rows of a window."""
@@ -143,14 +145,14 @@ class MotionOf:
     def _reversals(
         self, window: Window, t_s: Floats, slide_m: Floats, drive_m: Floats, direction: npt.NDArray[np.int64]
     ) -> list[Reversal]:
-        """Changes of direction in a window. A change at its end belongs to the next window, with the stroke after it."""
+        """Reversals in a window. A reversal at its end belongs to the next window, which has the stroke after it."""
         until_s = np.inf if window.is_last else window.own_ns[1] * 1e-9 - _CHANGE_S
         columns: Any = t_s, slide_m, drive_m, direction
         if self._last is not None and self._last[0] < t_s[0]:  # the drive may have rested since
             columns = tuple(
                 np.concatenate([[value], column]) for value, column in zip(self._last, columns, strict=True)
             )
-        judged = [each for each in reversals_of(*columns) if self._until_s <= each.reported_s < until_s]
+        judged = [turn for turn in reversals_of(*columns) if self._until_s <= turn.reported_s < until_s]
         self._until_s = until_s
         moving = np.flatnonzero((direction != 0) & (t_s < until_s))
         if len(moving):
@@ -179,7 +181,7 @@ def reversals_of(t_s: Floats, slide_m: Floats, drive_m: Floats, direction: npt.N
 
     Args:
         t_s, slide_m, drive_m: time and positions, [blocks].
-        direction: of the drive, 0 at rest; it may be late.
+        direction: direction of the drive, 0 at rest; it may lag the position.
 
     """
     moving = np.flatnonzero(direction)
@@ -190,7 +192,7 @@ def reversals_of(t_s: Floats, slide_m: Floats, drive_m: Floats, direction: npt.N
     seen_m = _SEEN_SIGMAS * np.hypot(noise_of(slide_m), noise_of(drive_m))
     at_turn_m = _AT_TURN_SIGMAS * noise_of(drive_m)
     begins = [0]
-    for change in changes:  # from the reported sign back to the turning point
+    for change in changes:  # search the turning point, back from the reported change
         place_m = direction[change] * drive_m[begins[-1] : change + 1]
         begins.append(begins[-1] + int(np.flatnonzero(place_m <= place_m.min() + at_turn_m)[-1]))
     ends = [*np.minimum(begins[2:], lasts[1:] + 1), moving[-1] + 1]
@@ -206,10 +208,8 @@ def reversals_of(t_s: Floats, slide_m: Floats, drive_m: Floats, direction: npt.N
 
 def _stick(t_s: Floats, slide_m: Floats, drive_m: Floats, seen_m: float) -> tuple[float, float, float]:
     """Begin and length of the stick after a turn, and quadrant error; both positions along the drive's direction."""
-    back = (
-        np.searchsorted(np.maximum.accumulate(drive_m), drive_m - seen_m, side="right") - 1
-    )  # position `seen_m` earlier
-    back = np.minimum(back, np.arange(len(back)) - 1)
+    back = np.searchsorted(np.maximum.accumulate(drive_m), drive_m - seen_m, side="right") - 1
+    back = np.minimum(back, np.arange(len(back)) - 1)  # block in which the drive was `seen_m` behind
     now = np.flatnonzero(back >= 0)
     way_m = drive_m[now] - drive_m[back[now]]
     follows = now[(way_m > 0.0) & (slide_m[now] - slide_m[back[now]] > _FOLLOWS * way_m)]

@@ -14,7 +14,7 @@ from bridge.log.watches.histogram import Histogram
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.judge.window import Window
 
-_NEAR_LIMIT = 0.95
+_NEAR_LIMIT = 0.95  # share of the amplitude limit; an exciter that used more is reported as at its limit
 
 
 class Margins(NamedTuple):
@@ -26,7 +26,7 @@ class Margins(NamedTuple):
     delivered_min: float  # 5 % quantile of delivered over commanded v_a
     delivered_max: float  # 95 % quantile
     amplitude_m: float  # largest command
-    amplitude_max_m: float  # its limit
+    amplitude_max_m: float  # limit of the commands
 
 
 class MarginSum:
@@ -73,7 +73,7 @@ class MarginSum:
 
 
 def margins_in_words(margins: Margins) -> list[str]:
-    """Lines for the operator."""
+    """Margins of the loop and use of the stroke, as lines for the operator."""
     m = margins
     lines = [
         f"loop     {m.loop_delay_s * 1e3:.3g} ms delay, learned; at one block more: phase margin {m.phase_margin_deg:.0f} "

@@ -17,7 +17,7 @@ Times = npt.NDArray[np.floating[Any]] | npt.NDArray[np.int64]
 # Lateness above which a process counts as stalled. Smaller: the scheduling jitter of a busy desktop, 1 to 3 ms, counts. Larger:
 # stalls are missed in which the rig falls back. A stall of up to 16 ms loses nothing.
 _STALL_NS = 5_000_000
-_MOST_OF_A_ROW = 1 << 16  # limit of the late commands per block: more are damaged bytes
+_MOST_LATE = 1 << 16  # largest credible number of late commands in a row of the plant; a larger one is damaged
 
 
 class Pauses(NamedTuple):
@@ -27,9 +27,9 @@ class Pauses(NamedTuple):
     total_ms: float
     longest_ms: float
     late_inside: int  # commands later than 1 ms with a stall between their block and the plant
-    late_outside: int  # all other late ones
-    late_one_core: int  # part of `late_outside` while one core alone stalled, not because of the loop's priority
-    within_1_ms_outside: float  # share of the commands without a stall
+    late_outside: int  # all other late commands
+    late_one_core: int  # part of `late_outside`, during a stall of one core, which no real-time priority prevents
+    within_1_ms_outside: float  # share of the commands not delayed by a stall
 
 
 class Computer(NamedTuple):
@@ -37,7 +37,7 @@ class Computer(NamedTuple):
 
     stalls: int
     longest_ms: float
-    whose: str  # plant, controller, or every core; empty if nothing was late
+    whose: str  # stalled process, plant or controller, or every core; empty if nothing was late
     at_s: float  # begin of the longest stall
 
 
@@ -57,10 +57,12 @@ class CommandSum:
         applied = window.applied[window.own(window.applied)]
         if not len(applied):
             return
-        newest = np.maximum.accumulate(applied["command_block"].astype(np.int64))  # "none" becomes -1
+        newest = np.maximum.accumulate(
+            applied["command_block"].astype(np.int64)
+        )  # the number for "no command" becomes -1
         before = np.concatenate([[newest[0] - 1 if self._newest is None else self._newest], newest[:-1]])
         self._newest = int(newest[-1])
-        late = np.minimum(applied["commands_late"], _MOST_OF_A_ROW)
+        late = np.minimum(applied["commands_late"], _MOST_LATE)
         row, first = np.repeat(np.arange(len(applied)), late), np.repeat(np.cumsum(late) - late, late)
         # the oldest commands of a row are late; a stale command answers the newest block again
         block = np.minimum(before[row] + 1 + np.arange(len(row)) - first, newest[row])
@@ -70,7 +72,7 @@ class CommandSum:
         self._one_core += int(np.count_nonzero(_held_up(due_ns, came_ns, self._events.core_pauses) & ~inside))
 
     def result(self, latency: LatencyWatch, end_ns: int) -> Pauses:
-        """The sums, with the stalls of every core up to the end of the run."""
+        """Stalls of every core up to the end of the run, and the late commands."""
         pauses = sorted(self._events.pauses)
         lengths_ms = [(pause.until_ns - pause.from_ns) * 1e-6 for pause in pauses if pause.from_ns < end_ns]
         outside = latency.late - self._inside
@@ -128,7 +130,7 @@ class StallSum:
                 self._until_ns = max(self._until_ns, end_ns)
 
     def result(self) -> Computer:
-        """The sums."""
+        """Number of stalls, and the longest."""
         length_ns, at_ns, whose = self._longest
         return Computer(self._stalls, length_ns * 1e-6, whose, at_ns * 1e-9)
 

@@ -15,7 +15,7 @@ from cockpit.judge.watches import StepWatch
 
 Stretches = list[tuple[float, float]]
 
-# Begin of a phase, half of it at most, without its swing: the first ramp of a run starts from an unloaded spring.
+# Begin of a phase, at most half of it, that does not count for the swing: a run starts with an unloaded spring.
 _RAMP_S = 4.0
 
 
@@ -25,9 +25,7 @@ class Phase(NamedTuple):
     seconds: float
     slips: int
     slips_per_min: float
-    swing_N: (
-        float  # of the drive force, largest to smallest block mean in the steady part of a stroke; median of strokes
-    )
+    swing_N: float  # drive force: largest less smallest block mean in the steady part of a stroke, median of strokes
     strokes: int  # number of these strokes; 0 without even motion: then the swing is over all blocks
     mean_force_N: float
     following: Following | None  # None without motion of the drive or without a measured position
@@ -96,7 +94,7 @@ class PhaseSum:
 
 
 class Interruptions:
-    """Stretches in which the controller was stopped, not armed, late or absent; of the part of the log read so far."""
+    """Stretches in which the controller was stopped, not armed, late or absent, in the part of the log read so far."""
 
     def __init__(self, setup: Setup, charge: ChargeWatch, steps: StepWatch) -> None:
         self._setup, self._charge, self._steps = setup, charge, steps
@@ -111,11 +109,11 @@ class Interruptions:
         return [*self._charge.stretches, *([(since_s, np.inf)] if since_s is not None else [])]
 
     def gone(self) -> Stretches:
-        """Fallbacks too long for a stall."""
+        """Fallbacks too long for a stall of the computer: the controller was absent."""
         return [stretch for stretch in self.fallbacks() if stretch[1] - stretch[0] > GONE_S]
 
     def stalls(self) -> Stretches:
-        """All others after the settling of the controller, each with its settling second."""
+        """Shorter fallbacks and late blocks after the settling of the controller, each with its settling second."""
         settled_s = self._setup.settled_from_s
         short = [
             (max(from_s, settled_s), until_s) for from_s, until_s in self.fallbacks() if until_s - from_s <= GONE_S
@@ -144,9 +142,9 @@ def within(at_s: Floats, stretches: Iterable[tuple[float, float]]) -> Any:
     return inside
 
 
-def apart(whole: tuple[float, float], without: Stretches) -> Stretches:
-    """Parts of a stretch outside of all others, which may overlap."""
-    at_s, end_s = whole
+def apart(stretch: tuple[float, float], without: Stretches) -> Stretches:
+    """Parts of `stretch` outside of the stretches `without`, which may overlap."""
+    at_s, end_s = stretch
     parts: Stretches = []
     for from_s, until_s in sorted(without):
         if from_s > at_s:

@@ -1,4 +1,4 @@
-"""v_a over v_d while the rig vibrates, judged at both ends.
+"""v_a over v_d while the rig vibrates, with a lower and an upper limit.
 
 Below 1.05 stick-slip may return. Far above the set point the vibration wears exciter, mount and workpiece without benefit, or v_a
 is measured wrongly. The set point is the configured one, or a higher one if the controller raised it after slips.
@@ -21,19 +21,20 @@ from cockpit.judge.watches import STANDSTILL_MPS
 from cockpit.judge.window import Rows, Window
 
 ALARM_RATIO = 1.05
-# Limit of v_a / v_d in set points, and of the time above it without a break. In a sound run a rising set point or a resonance of
+# Largest v_a / v_d in set points, and longest time above it without a break. In a sound run a rising set point or a resonance of
 # the mount exceeds it repeatedly for the 10 to 60 ms of the loop's response. Shipped scenarios: 0.02 s at most.
-# Smaller ratio: a drive that slows down by more than a third fails. Shorter: the delay of the loop counts. Larger: 3.18 passes.
+# Smaller ratio: a drive that slows down by more than a third fails. Shorter: the delay of the loop counts. Larger: a loop that
+# vibrates harder than commanded passes.
 _MOST_SET_POINTS = 1.5
 MOST_ABOVE_S = 0.2
-_RAMP_S = 0.15  # 40 ms of ramp at the default slew, plus the filter of the measurement
+_RAMP_S = 0.15  # not judged after each begin: 40 ms of ramp at the default slew, plus the filter of the measurement
 _STEADY_S, _STEADY_SHARE = 0.1, 0.1  # a smaller change of the drive velocity in this time counts as even motion
-_RAMPED_DOWN = (wire.STALE_INPUT, wire.NOT_FINITE, wire.OPERATOR_STOP)
-_LATE_BLOCKS = 2.0  # delay of a block that counts as a stall of the computer
+_RAMPED_DOWN = (wire.STALE_INPUT, wire.NOT_FINITE, wire.OPERATOR_STOP)  # limits that fade the vibration
+_LATE_BLOCKS = 2.0  # lateness, in block times, from which a stall of the computer counts
 
 
 class RatioVerdict(NamedTuple):
-    """v_a over v_d in a run; 0 if nothing was judged."""
+    """v_a over v_d in a run; all 0 if nothing was judged."""
 
     lowest: float
     highest: float
@@ -88,9 +89,8 @@ class RatioWatch:
         self._highest = max(self._highest, float(ratio[counts].max(initial=0.0)))
         self._judged += int(np.count_nonzero(counts))
         self._below += int(np.count_nonzero(ratio[counts] < ALARM_RATIO))
-        set_point = np.maximum(
-            trace["velocity_ratio"], self._setup.v_ratio
-        )  # older logs have no set point in the trace
+        # older logs have no set point in the trace
+        set_point = np.maximum(trace["velocity_ratio"], self._setup.v_ratio)
         above = (counts & (ratio > _MOST_SET_POINTS * set_point))[judged]
         self._all_above += int(np.count_nonzero(above))
         self._above.add(above)
@@ -103,7 +103,7 @@ class RatioWatch:
         return steady
 
     def _after_stall(self, t_s: Floats, trace: Rows, applied: Rows) -> Bools:
-        """Steps in a stall of either side, or in the second after it."""
+        """Steps in a stall of plant or controller, or in the second after it."""
         # a fallback before the first command does not count as a stall
         answers = applied["command_block"] != np.uint64(NO_COMMAND)
         stalls = ((applied["fallback"] != 0) & answers) | (applied["late_ns"] > _LATE_BLOCKS * self._block_s * 1e9)

@@ -1,7 +1,7 @@
 """Relations between the sensors of an axis, second by second: force and spring, and vibration of base, slide and controller.
 
 A channel that is swapped, of the wrong sign or scale, or not connected breaks a relation. A relation is compared in each second
-in which its signals exceed their noise; a single broken second is a doubt.
+in which its signals exceed their noise; a single broken second is a doubt. "Bank": the simulated axes of docs/method/bank.md.
 """
 
 import math
@@ -21,25 +21,25 @@ _PARTS = 4
 # Power of force or extension over the power of both noises above which a second is compared. Smaller: a larger part of the
 # difference is noise, 4 % of the power at 25. Larger: less of a run is compared.
 _EXCITED = 25.0
-# Least compared vibration, over the noise of the accelerometer. Smaller: noise counts. Larger: no slow feed is compared.
+# Least vibration that is compared, in noises of the accelerometer. Smaller: noise counts. Larger: no slow feed is compared.
 _SEEN = 100.0
 # Share of vibration in a second above which it is compared. Larger: an inching drive is never compared. Smaller: ramps of the
 # vibration fill most of a second, at 0.05 in `mount-stops` of the bank; at 0.25 they fill a twelfth at most.
 _COMPARED = 0.25
-# Allowed factor between v_a in the log and in the controller, either way. Smaller: 1.05 doubts none of 19 sound logs, but counts
-# other vibration of a real base, which the controller filters out. Larger: with 1.5 five of nine logs with clipping pass.
+# Allowed factor between v_a in the log and in the controller, either way. Smaller: other vibration of a real base counts, which
+# the controller filters out. Larger: clipped accelerometers pass, half of them at 1.5.
 _SAME_V_A = 1.25
 # rms of the slide over rms of the base under vibration: 0.5 at most in the bank, except in slips. Smaller: a stiff contact
 # counts. Larger: swapped accelerometers pass.
 _LOUDER = 1.3
-# In noises of the slide's accelerometer: below the first it shows only noise, above the second friction must be visible. In the
-# bank it shows at least 0.16 of the expectation. Second smaller: the long slip of `drill-string`, 11, counts. Larger: less is
-# compared.
+# In noises of the slide's accelerometer: a signal below the first is noise alone, and expected friction above the second must
+# show. In the bank it shows at least 0.16 of the expectation. Second smaller: the long slip of `drill-string`, 11, counts.
+# Larger: less is compared.
 _QUIET, _SHAKEN = 2.0, 20.0
 
 
 class Doubt(NamedTuple):
-    """A faulty channel, or a broken relation."""
+    """Finding on a faulty channel, or on a broken relation."""
 
     code: str
     text: str
@@ -55,7 +55,7 @@ class ChannelRelations:
         steps_N = [position_N, position_N, of.channels["drive_force_N"].step]
         self._steps_N2 = float(np.nansum(np.square(steps_N))) / 12.0  # noise of the resolutions of positions and force
         self.vibrated = False
-        self._found: dict[str, tuple[str, int]] = {}  # by code: text of the first broken second, and their number
+        self._broken: dict[str, tuple[str, int]] = {}  # by code: text of the first broken second, and their number
 
     def add(self, window: Window) -> None:
         """Add a window, cut into seconds backwards from its end; its first second may begin in the window before."""
@@ -88,7 +88,7 @@ class ChannelRelations:
     def _vibration(self, t_s: Floats, window: Window, at: Rows, force_N: Floats) -> None:
         """Base, slide and controller while the rig vibrates, [seconds, blocks]."""
 
-        def most(code: str, compared: Bools, holds: Bools, text: str, *shown: Floats) -> None:
+        def compare(code: str, compared: Bools, holds: Bools, text: str, *shown: Floats) -> None:
             wrong, blocks = compared & ~holds, compared.sum(axis=1)
             broken = (blocks >= _COMPARED * self._count) & (wrong.sum(axis=1) > 0.5 * blocks)
             middle = (wrong.cumsum(axis=1) > 0.5 * wrong.sum(axis=1, keepdims=True)).argmax(axis=1)
@@ -102,13 +102,13 @@ class ChannelRelations:
         vibrates = omega**2 * amplitude_m > _SEEN * np.nan_to_num(base_noise_mps2)
         text = "mass_accel_mps2 vibrates by {:.3g} m/s2, more than base_accel_mps2 by {:.3g} m/s2: are they swapped, or is "
         text += "base_accel_mps2 not connected?"
-        most("SENSOR_SWAPPED", vibrates, slide_mps2 <= _LOUDER * base_mps2, text, slide_mps2, base_mps2)
+        compare("SENSOR_SWAPPED", vibrates, slide_mps2 <= _LOUDER * base_mps2, text, slide_mps2, base_mps2)
         per_omega_s = np.divide(1.0, omega, out=np.zeros(at.shape), where=vibrates)
         # transmitted by a sticking contact, limited by the sliding friction
         shaken_mps2 = np.minimum(self._of.contact_per_s2 * base_mps2 * per_omega_s**2, force_N / self._of.mass_kg)
         shakes = vibrates & (shaken_mps2 > _SHAKEN * noise_mps2)
         text = "mass_accel_mps2 shows {:.3g} m/s2, its noise, where friction shakes the slide by {:.3g} m/s2: is it connected?"
-        most("SENSOR_DEAD", shakes, slide_mps2 >= _QUIET * noise_mps2, text, slide_mps2, shaken_mps2)
+        compare("SENSOR_DEAD", shakes, slide_mps2 >= _QUIET * noise_mps2, text, slide_mps2, shaken_mps2)
         # the controller does not measure v_a during a loop check
         trace = _rows_at(window.trace, "block", window.blocks.sequence[at])
         v_a_mps = trace["vibration_velocity_mps"]
@@ -119,17 +119,17 @@ class ChannelRelations:
         text = (
             "v_a is {:.3g} m/s by base_accel_mps2 and {:.3g} m/s in the controller: did both receive the same signal?"
         )
-        most("SENSOR_OTHER", both, same, text, shown_mps, v_a_mps)
+        compare("SENSOR_OTHER", both, same, text, shown_mps, v_a_mps)
 
     def _take(self, code: str, t_s: Floats, broken: Bools, text: str, *shown: Floats) -> None:
         for second in np.flatnonzero(broken).tolist():
             first = f"from {t_s[second]:.1f} s on {text.format(*(values[second] for values in shown))}"
-            first, seconds = self._found.get(code, (first, 0))
-            self._found[code] = first, seconds + 1
+            first, seconds = self._broken.get(code, (first, 0))
+            self._broken[code] = first, seconds + 1
 
     def doubts(self) -> list[Doubt]:
-        """Broken relations."""
-        return [Doubt(code, f"{text} ({seconds} s in all)", True) for code, (text, seconds) in self._found.items()]
+        """A finding for each broken relation."""
+        return [Doubt(code, f"{text} ({seconds} s in all)", True) for code, (text, seconds) in self._broken.items()]
 
 
 def _rows_at(rows: Rows, name: str, number: Rows) -> Rows:

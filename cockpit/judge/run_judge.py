@@ -35,9 +35,9 @@ from cockpit.judge.watches import FrozenWatch, LatencyWatch, RigWatch, StepWatch
 from cockpit.judge.window import LAYOUTS, WaitingRows, reduced
 from diagnosis.slips import Cycles
 
-# Counted from blocks and steps; a drive is unseen at some of its turns too, 17 times in an hour of the belt axis.
+# Events left out of the findings: the judge counts them from blocks and steps, and DRIVE_UNSEEN also occurs at sound turns.
 _COUNTED_ELSEWHERE = {"NOT_FINITE", "DRIVE_UNSEEN", *WEAK_REASONS}
-# before the help of a cause, in older logs as a letter; redundant in a line marked as trip or warning
+# Severity before the text of a cause, a letter in older logs: removed, as each line is marked as trip or warning.
 _SEVERITY = re.compile(rf"(^|: )({'|'.join([*filter(None, SEVERITIES), *SEVERITIES.values()])}): ")
 
 
@@ -49,16 +49,16 @@ class RunJudge:
     """Judges one run.
 
     Args:
-        path: of its log.
-        headers: tables of the log, possibly filled during reading.
-        stretch_from_s: begin of a further stretch to the end, with or without a controller.
+        path: the log.
+        headers: configurations in the log; they may arrive while it is read.
+        stretch_from_s: begin of a further stretch that is judged to the end of the run, with or without a controller.
 
     """
 
     def __init__(self, path: Path, headers: Metadata, stretch_from_s: float | None = None) -> None:
         self.log = LogWatch()
-        self.cycles: Cycles | None = None  # all slips, after `result`; None without a force
-        self.stretch: Phase | None = None  # the stretch from `stretch_from_s`, after `result`
+        self.cycles: Cycles | None = None  # all slips, set by `result`; None without a force
+        self.stretch: Phase | None = None  # the stretch from `stretch_from_s`, set by `result`
         self._stretch_from_s = stretch_from_s
         self._path, self._headers = path, headers
         self._latency, self._rig, self._steps, self._frozen = LatencyWatch(), RigWatch(), StepWatch(), FrozenWatch()
@@ -73,7 +73,7 @@ class RunJudge:
         self._first_ns: int | None = None
 
     def begin(self, headers: Metadata) -> None:
-        """Set the tables of a log begun after the creation of the judge."""
+        """Set the configurations of a log that begins after this judge was created."""
         self._headers = headers
 
     def add(self, topic: str, records: Records, log_time_ns: npt.NDArray[np.int64]) -> None:
@@ -131,10 +131,10 @@ class RunJudge:
         phases = {name: sum_.result(block_s) for name, sum_ in windows.phases.items()}
         self.stretch = phases.get("stretch")
         after = phases.get("after")
-        stops, gone = gaps.stops(is_last=True), gaps.gone()
+        stops, absences = gaps.stops(is_last=True), gaps.gone()
         stopped_s = sum(min(until_s - SETTLING_S, seconds) - from_s for from_s, until_s in stops)
         enabled_s = min(setup.enabled_from_s, seconds) if setup.imported else setup.enabled_from_s
-        in_charge_s = seconds - enabled_s - stopped_s - sum(until_s - from_s for from_s, until_s in gone)
+        in_charge_s = seconds - enabled_s - stopped_s - sum(until_s - from_s for from_s, until_s in absences)
         losses = losses_of(self.log, steps, setup, damage, seconds)
         latency = self._latency.result()
         not_watched = events.not_watched if latency is not None else ""
@@ -166,7 +166,7 @@ class RunJudge:
             after=after,
             unsure_slips=windows.phases["after"].unsure if after is not None else 0,
             stopped_slips=_slips_in(slips_s, stops),
-            stalled_slips=_slips_in(slips_s, gaps.stalls(), [*stops, *settling(gone)]),
+            stalled_slips=_slips_in(slips_s, gaps.stalls(), [*stops, *settling(absences)]),
             drive_velocity_max_mps=steps.drive_velocity_max_mps,
             velocity_ratio_min=ratio.lowest if ratio is not None else 0.0,
             velocity_ratio_max=ratio.highest if ratio is not None else 0.0,
@@ -217,10 +217,10 @@ class RunJudge:
         others += foreign_in_words(foreign)
         for code, text, is_fault in charge.sentences():
             (faults if is_fault else others).append(f"{code}: {text}")
-        looks = {name: self.log.signals[name].result() for name, row in SENSOR_CHANNELS.items() if row.is_controlled}
-        gone = [finding for name, seen in looks.items() for finding in not_finite(name, seen, self.log.sample_s)]
+        channels = {name: self.log.signals[name].result() for name, row in SENSOR_CHANNELS.items() if row.is_controlled}
+        gaps = [finding for name, seen in channels.items() for finding in not_finite(name, seen, self.log.sample_s)]
         faults += [clock] if (clock := clock_fault(self.log)) else []
-        faults += [f"NOT_FINITE: {finding.where}: {finding.text}; left out" for finding in gone]
+        faults += [f"NOT_FINITE: {finding.where}: {finding.text}; left out" for finding in gaps]
         changed = [f"{finding.kind}: {finding.text}" for finding in checksum_findings(checksums, self._path)]
         return [*faults, *damaged, *changed], others
 
@@ -245,13 +245,13 @@ class RunJudge:
         return [doubt for doubt in doubts if doubt]
 
 
-def _slips_in(slips_s: Floats, stretches: Stretches, but: Iterable[tuple[float, float]] = ()) -> int:
-    """Number of slips inside any of the stretches and outside of the stretches `but`."""
-    return int(np.count_nonzero(within(slips_s, stretches) & ~within(slips_s, but)))
+def _slips_in(slips_s: Floats, stretches: Stretches, without: Iterable[tuple[float, float]] = ()) -> int:
+    """Number of slips inside any of the stretches and outside of the stretches `without`."""
+    return int(np.count_nonzero(within(slips_s, stretches) & ~within(slips_s, without)))
 
 
 def _open_loop(event: wire.Event, fallbacks: Stretches) -> str:
-    """Text of the controller's trip. A preceding time without a fresh command explains the low v_a."""
+    """Text of an OPEN_LOOP event; it names a preceding time without a fresh command as the cause of the low v_a."""
     at_s = event.t_ns * 1e-9
     for from_s, until_s in fallbacks:
         if from_s <= at_s <= until_s + SETTLING_S:

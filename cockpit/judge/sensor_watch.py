@@ -19,7 +19,7 @@ from cockpit.judge.slips import Forces
 from cockpit.judge.watches import FrozenWatch
 from cockpit.judge.window import Window
 
-_FROZEN_S = 0.1  # of repeated blocks. Larger: a shorter failure passes. Smaller: a single doubled block counts
+_FROZEN_S = 0.1  # longest allowed repetition of a block. Larger: a failure passes. Smaller: one doubled block counts
 # Share of samples that are not finite above which a channel cannot support a verdict. Larger: slips may hide in these samples.
 # Smaller: one dropout prevents the verdict on a long run.
 _NOT_FINITE_SHARE = 1e-3
@@ -30,10 +30,10 @@ class SensorVerdict(NamedTuple):
     """Findings on the sensors, and three counts of slips."""
 
     findings: list[Doubt]
-    by_force: int  # slips in the judged stretches
-    by_position: int | None  # None if the positions cannot show a slip
-    by_trace: int
-    surges: int  # of `by_trace`
+    by_force: int  # slips in the judged stretches, by the drive force
+    by_position: int | None  # slips by both positions; None if these cannot show a slip
+    by_trace: int  # slips and surges counted by the controller
+    surges: int  # surges alone
 
 
 class SensorWatch:
@@ -42,9 +42,7 @@ class SensorWatch:
     def __init__(self, of: Described, log: LogWatch, frozen: FrozenWatch, block_s: float) -> None:
         self._of, self._log, self._frozen = of, log, frozen
         self._relations = ChannelRelations(of, block_s)
-        self._least_N = self._least_m = (
-            0.0  # smallest falls of force and of drive less slide that count in every window
-        )
+        self._least_N = self._least_m = 0.0  # smallest fall of force, and of drive less slide, counted in every window
         self._slips_s: dict[str, list[Floats]] = {"position": [], "slips": [], "surges": []}
 
     def add(self, window: Window, forces: Forces) -> None:
@@ -66,18 +64,18 @@ class SensorWatch:
         findings += [doubt for doubt in self._relations.doubts() if not any(name in doubt.text for name in broken)]
         slips_s = {name: np.concatenate([np.empty(0), *parts]) for name, parts in self._slips_s.items()}
         slips_s["force"] = force_slips_s
-        whole = {name: len(at_s) for name, at_s in slips_s.items()}
+        in_log = {name: len(at_s) for name, at_s in slips_s.items()}
         inside = {name: int(within(at_s, judged).sum()) for name, at_s in slips_s.items()}
-        # Surges do not decide: they occur at stops and turns as well. Nor does the controller alone: in the bank it counts up to
-        # 7 false slips.
-        if of.uses_force and any(not by["force"] and by["position"] and by["slips"] for by in (inside, whole)):
+        # Surges do not decide: they occur at stops and turns as well. Nor does the controller alone: in the simulated axes of
+        # docs/method/bank.md it counts up to 7 false slips.
+        if of.uses_force and any(not by["force"] and by["position"] and by["slips"] for by in (inside, in_log)):
             text = "{force} by drive_force_N, {position} by the positions and {slips} by the controller"
-            text = f"slips with the controller in charge: {text.format(**inside)}; in the whole log: {text.format(**whole)}"
+            text = f"slips with the controller in charge: {text.format(**inside)}; in the whole log: {text.format(**in_log)}"
             findings.append(Doubt("SLIPS_DISAGREE", text, True))
         if of.uses_force and of.slip_m > 0.0 and of.fall_N < self._least_N < math.inf:
-            text = f"drive_force_N shows only falls above {self._least_N:.3g} N, and a slip is {of.fall_N:.3g} N: use less noise"
+            text = f"drive_force_N is too noisy: it shows falls above {self._least_N:.3g} N only, and a slip is {of.fall_N:.3g} N"
             findings.append(Doubt("SENSOR_NOISE", text, True))
-        by_position = inside["position"] if self._least_m < of.slip_m or whole["position"] else None
+        by_position = inside["position"] if self._least_m < of.slip_m or in_log["position"] else None
         by_trace = inside["slips"] + inside["surges"]
         return SensorVerdict(findings, inside["force"], by_position, by_trace, inside["surges"])
 

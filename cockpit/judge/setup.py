@@ -22,11 +22,11 @@ class Setup(NamedTuple):
     imported: str  # source file of an imported log; empty for a run
     block_s: float
     enabled_from_s: float  # infinite for an imported log, which has no controller
-    slowest_fall_s: float  # of a slip
+    slowest_fall_s: float  # slowest fall of the force that counts as a slip
     absent: list[str]  # channels missing in the source file of an imported log; they are zeros in the log
-    known_gain: bool  # of the exciter, by the configuration
+    known_gain: bool  # the configuration declares the exciter's gain as verified
     v_ratio: float  # configured set point of v_a / v_d; infinite if unknown
-    duration_s: float  # of the whole run, by the plant's configuration; 0: unlimited or unknown
+    duration_s: float  # planned length of the run, by the plant's configuration; 0: unlimited or unknown
 
     @property
     def settled_from_s(self) -> float:
@@ -38,17 +38,15 @@ class Described(NamedTuple):
     """Description of a rig and its controller; NaN for unknown numbers."""
 
     channels: dict[str, ChannelLimits]
-    stiffness_N_per_m: (
-        float  # of the drive, in readings of the force sensor; without a rig, from the controller's configuration
-    )
-    apart: float  # allowed difference of force and spring, as a share
-    fall_N: float  # of the force in a slip, 2 (F_s - F_c)
+    stiffness_N_per_m: float  # drive spring, in readings of the force sensor; without a rig, as the controller has it
+    apart: float  # allowed difference of force and spring, as a share of the larger
+    fall_N: float  # fall of the force in a slip, 2 (F_s - F_c)
     slip_m: float  # length of a slip, 2 (F_s - F_c) / k_d
-    mass_kg: float  # of the slide
+    mass_kg: float  # mass of the slide
     contact_per_s2: float  # stiffness of the contact over the mass
     uses_force: bool  # the verdict depends on the force: the controller uses it, or the rig is described
     uses_slide: bool
-    accel_bandwidth_Hz: float  # for which the controller corrects v_a; infinite if unknown
+    accel_bandwidth_Hz: float  # bandwidth for which the controller corrects v_a; infinite if unknown
 
 
 def settled_from_s(enabled_from_s: float) -> float:
@@ -66,7 +64,7 @@ def setup_of(headers: Metadata, path: Path, period_ns: float) -> Setup:
     absent = absent_channels(headers, path)
     plant = plant_of(headers, path)
     mass_kg, stiffness = _number(plant, "rig.slide.mass_kg"), _number(plant, "rig.drive.stiffness_N_per_m")
-    # 1.6 times the slip of the slide on its spring
+    # 1.6 times the time in which a slide on its spring slips from 10 to 90 % of the fall
     fall_s = max(0.1, 3.0 * math.sqrt(mass_kg / stiffness)) if mass_kg > 0.0 and stiffness > 0.0 else 0.1
     if source := source_of_import(headers, path):
         return Setup(source, period_ns * 1e-9, math.inf, fall_s, absent, True, math.inf, 0.0)
@@ -94,7 +92,7 @@ def absent_channels(headers: Metadata, path: Path) -> list[str]:
 
 
 def described(plant: Mapping[str, Any], controller: Mapping[str, Any]) -> Described:
-    """Description from the configurations in a log; empty for a missing one."""
+    """Description from the configurations in a log; an empty mapping for a missing configuration."""
 
     def rig(path: str, otherwise: float = math.nan) -> float:
         return _number(plant, f"rig.{path}", otherwise)

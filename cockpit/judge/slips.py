@@ -22,19 +22,19 @@ from cockpit.judge.strokes import DriveStroke, steady_parts, strokes_of
 from cockpit.judge.window import HasMoved, Window
 from diagnosis.slips import Cycles, find_cycles, joined, smallest_drop_N, steep_part
 
-BIN_S = 1e-3  # of the means in which slips are searched
-# Before and after a fall: the drive velocity is taken in these times, and no block may be missing in them.
+BIN_S = 1e-3  # length of a bin; slips are searched in the means of bins
+# Time before and after a fall: the drive velocity is taken in both, and a block missing in one makes the slip unsure.
 _BESIDE_S = 0.02
-_STOPS = 0.5  # share of the drive velocity before the fall
-# Mean velocity of the slide over the drive from 10 to 90 % of a fall: a sine with the peak of a slip, 1.5 v_d.
+_STOPS = 0.5  # share of the drive velocity before the fall; a drive that is slower after the fall stopped
+# Least velocity of a slipping slide in drive velocities, mean from 10 to 90 % of the fall: 1.4 for a sine that peaks at 1.5.
 _RUNS_AHEAD = 1.4
 
 
 class Forces(NamedTuple):
     """Slips of a window, and its blocks with a finite force, [blocks]."""
 
-    cycles: Cycles  # forces at breakaway and re-stick keep their sign of the log
-    unsure: npt.NDArray[np.bool_]  # slips with missing blocks, in which the force is unknown, [slips]
+    cycles: Cycles  # slips; their forces have the sign of the log
+    unsure: npt.NDArray[np.bool_]  # slips during which blocks are missing, so the force is unknown, [slips]
     t_s: Floats
     mean_N: Floats
     part: npt.NDArray[np.int64]  # number of the stroke whose steady part contains the block; -1 outside
@@ -43,7 +43,7 @@ class Forces(NamedTuple):
     turned: bool
     stroke: int  # number of the stroke at `end`
     least_N: float  # smallest fall of the force that counts; infinite without a force
-    by_position_s: Floats  # slip times in drive less slide, by the rule for the force
+    by_position_s: Floats  # times of the slips that drive less slide shows, by the rule for the force
     least_m: float  # smallest fall of drive less slide that counts; infinite without a position
 
 
@@ -101,16 +101,16 @@ def forces_of(window: Window, setup: Setup, moved: HasMoved) -> Forces:
             places = _Stroke(t_s, drive - slide, drive, slide)
             by_position_s.append(_slips_among(falls, limits_s, places, bin_s).breakaway_t_s)
     cycles = joined(slips)
-    mine = slice(first, int(np.searchsorted(usable, end)))
+    judged = slice(first, int(np.searchsorted(usable, end)))
     steps = np.diff(blocks.sequence, prepend=blocks.sequence[:1] - 1) - 1
     goes_on = (i for i, stroke in enumerate(strokes) if usable[begins + stroke.end - 1] >= end)
     return Forces(
         cycles,
         _unsure(cycles, blocks.t_ns * 1e-9, steps),
-        blocks.t_ns[mine] / 1e9,
-        mean_N[mine],
-        part[mine],
-        np.maximum(steps, 0)[mine],
+        blocks.t_ns[judged] / 1e9,
+        mean_N[judged],
+        part[judged],
+        np.maximum(steps, 0)[judged],
         end,
         turned,
         window.stroke - present + next(goes_on, present),
@@ -129,7 +129,7 @@ def _end(window: Window, turns: list[int]) -> tuple[int, bool]:
 
 
 def _unsure(cycles: Cycles, t_s: Floats, steps: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-    """Slips with missing blocks, [slips]."""
+    """True for slips during which blocks are missing, [slips]."""
     gaps = np.flatnonzero(steps > 0)
     unsure = np.zeros(cycles.slips, bool)
     for at in gaps if len(gaps) and cycles.slips else ():
@@ -167,7 +167,7 @@ def _signed(cycles: Cycles, way: int) -> Cycles:
 
 
 def _slips_among(falls: Cycles, limits_s: Sequence[float], stroke: _Stroke, bin_s: float) -> Cycles:
-    """Falls of a stroke between the limits that are slips."""
+    """Falls of a stroke that begin inside the limits and are slips."""
     judged = (falls.breakaway_t_s >= limits_s[0]) & (falls.breakaway_t_s < limits_s[1])
     first = np.searchsorted(stroke.t_s, falls.breakaway_t_s, side="right") - 1
     last = [*first, len(stroke.t_s) - 1][1:]
@@ -178,7 +178,7 @@ def _slips_among(falls: Cycles, limits_s: Sequence[float], stroke: _Stroke, bin_
 
 
 def _is_slip(stroke: _Stroke, first: int, last: int, bin_s: float) -> bool:
-    """True if the slide outruns the drive in the fall between two bins; without its position: if the drive goes on."""
+    """True if the slide outruns the drive in the fall between two bins; without a slide position: if the drive goes on."""
     begin, end = steep_part(stroke.force_N, first, last)
     beside = max(end - begin, math.ceil(_BESIDE_S / bin_s))
     before, after = max(begin - beside, 0), min(end + beside, len(stroke.t_s) - 1)
@@ -187,6 +187,6 @@ def _is_slip(stroke: _Stroke, first: int, last: int, bin_s: float) -> bool:
     was = (stroke.drive_m[begin] - stroke.drive_m[before]) / (begin - before)
     goes_on = (stroke.drive_m[after] - stroke.drive_m[end]) / (after - end)
     slides, drives = ((place_m[end] - place_m[begin]) / (end - begin) for place_m in (stroke.slide_m, stroke.drive_m))
-    if not slides > drives:  # no position, or a wrong one: the force falls only if the slide outruns its drive
+    if not slides > drives:  # the position is missing or wrong: the force falls only if the slide outruns its drive
         return not goes_on < _STOPS * was
     return not slides <= _RUNS_AHEAD * max(was, goes_on)

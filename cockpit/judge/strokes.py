@@ -10,20 +10,20 @@ from bridge.arrays import Floats
 from bridge.log.watches.arrays import median, noise_of
 from diagnosis.slips import turning_points
 
-_SHORTEST_STROKE = 1e-3  # of the whole travel of the drive: a few steps of its encoder
-_TURN_SIGMAS = 10.0  # of the noise of the drive position: shortest stroke
-_BESIDE_S = 0.02  # before and after a block, for the drive velocity; the smaller counts
-_MOVES = 0.02  # of the fastest of the stroke: slower is a dwell
-_AWAY_FROM_TURN = 0.5  # of the median velocity of the stroke: slower next to a turn is part of the turn
-_WHOLE = 0.5  # of the longest steady part: a shorter part, cut by the end of a phase, underestimates the swing
+_SHORTEST_STROKE = 1e-3  # shortest stroke, as a share of the travel of the drive: a few steps of its encoder
+_TURN_SIGMAS = 10.0  # shortest stroke, in rms noises of the drive position
+_BESIDE_S = 0.02  # time before and after a block over which its drive velocity is taken; the smaller velocity counts
+_MOVES = 0.02  # share of the stroke's largest velocity; a slower drive dwells
+_AWAY_FROM_TURN = 0.5  # share of the stroke's median velocity; slower blocks next to a turn are part of the turn
+_UNCUT = 0.5  # share of the longest steady part; a shorter part, cut by the end of a phase, underestimates the swing
 
 
 class DriveStroke(NamedTuple):
-    """Travel of the drive between two turns, or an end of the record."""
+    """Travel of the drive from a turn, or the begin of the record, to the next turn or the end."""
 
     first: int
     end: int  # the block after the last
-    way: int  # 1 or -1
+    way: int  # direction: 1 or -1
 
 
 def strokes_of(drive_m: Floats) -> list[DriveStroke]:
@@ -45,7 +45,7 @@ def steady_parts(
 
     Args:
         drive_m, force_N: position of the drive, NaN if unknown, and force of its spring, [blocks].
-        strokes: of the drive.
+        strokes: strokes of the drive.
         block_s: duration of a block.
         after_turn: the drive turned at the first block.
 
@@ -57,7 +57,7 @@ def steady_parts(
     for number, (first, end, way) in enumerate(strokes):
         way_m = np.pad(way * drive_m[first:end], beside, mode="edge")
         way_m = way_m[beside:] - way_m[:-beside]
-        speed = np.minimum(way_m[:-beside], way_m[beside:])  # before and after the block
+        speed = np.minimum(way_m[:-beside], way_m[beside:])  # travel before and after the block, whichever is smaller
         moving = np.flatnonzero(speed > _MOVES * speed.max())
         if not len(moving):
             continue
@@ -82,7 +82,7 @@ class Swing:
         self.blocks = 0
         self._sum_N = 0.0
         self._lowest_N, self._highest_N = np.inf, -np.inf
-        self._strokes: dict[int, tuple[int, float, float]] = {}  # blocks, lowest and highest force
+        self._strokes: dict[int, tuple[int, float, float]] = {}  # by stroke: number of blocks, lowest and highest force
 
     def add(self, force_N: Floats, part: npt.NDArray[np.int64]) -> None:
         """Add forces with the number of their stroke, -1 outside of steady parts; [blocks], in order of time."""
@@ -109,9 +109,9 @@ class Swing:
         return self._sum_N / self.blocks
 
     def result(self) -> tuple[float, int]:
-        """Median over strokes of the largest less smallest force in the steady part; number of strokes, 0: over all blocks."""
+        """Largest less smallest force in a steady part, median over strokes; number of strokes, 0: swing over all blocks."""
         if not self._strokes:
             return self._highest_N - self._lowest_N, 0
         counts, lows, highs = np.array(list(self._strokes.values())).T
-        whole = counts >= _WHOLE * counts.max()
-        return median((highs - lows)[whole]), int(whole.sum())
+        uncut = counts >= _UNCUT * counts.max()
+        return median((highs - lows)[uncut]), int(uncut.sum())

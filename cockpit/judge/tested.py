@@ -1,4 +1,4 @@
-"""Why a run does not test its controller, in words."""
+"""Reasons for which a run does not test its controller, in words."""
 
 from collections.abc import Mapping
 
@@ -19,13 +19,13 @@ def untested(
     """Reason for which nothing was tested; empty if something was.
 
     Args:
-        setup: of the run.
-        steps: of the controller.
+        setup: numbers of the run.
+        steps: watch of the controller's steps.
         seconds: end of the last block; 0 without any.
         unreadable: error of the first unreadable block; empty without any.
-        answered: a block has a fresh command.
+        answered: at least one block had a fresh command.
         after: the stretch in which the controller is judged.
-        in_charge_s: time of the controller, including its settling.
+        in_charge_s: time in which the controller was in charge, including its settling.
 
     """
     if setup.imported:
@@ -63,5 +63,5 @@ def too_little(after: Phase | None, phases: Mapping[str, PhaseSum], block_s: flo
         return f"the drive did not move in the {after.seconds:.2g} s with the controller in charge"
     if before.slips and moving_s < (period_s := before.moving * block_s / before.slips):
         line = f"the drive moved for {moving_s:.2g} s with the controller in charge"
-        return f"{line}: must be {period_s:.2g} s, the time of a slip before; make the run longer"
+        return f"{line}, less than the {period_s:.2g} s between two slips before: make the run longer"
     return ""

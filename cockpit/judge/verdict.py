@@ -21,7 +21,7 @@ Control = Literal["ok", "not ok", "not judged"]
 # Allowed share of missing blocks in the judged time. Larger: slips hide in a gap. Smaller: one stall of the recorder, 80 ms in
 # 8 s, leaves a run without a verdict.
 MISSING_SHARE = 0.01
-# harmful events of the log, not of the rig
+# harmful events that concern the log alone, not the rig
 _OF_THE_LOG = {"GAP", "DROPPED", "LOG_WRITE", "LOG_LOST", "LOG_REPLACED"}
 _OF_THE_RIG = {code for code in EVENTS if harms(code)} - _OF_THE_LOG
 _TRIPS = {"FAULT", *TRIPS}
@@ -41,20 +41,20 @@ class RunVerdict(NamedTuple):
     controller_missed: int  # blocks lost before the controller, by its count
     misses_known: bool  # False: the log lacks steps of the controller, so it may have missed more blocks
     enabled_from_s: float
-    stopped_s: float  # by an operator; excluded from `after`
+    stopped_s: float  # time for which the controller was stopped or the rig not armed; excluded from `after`
     charge: InCharge  # times without a controller, excluded from `after`, and blocks without an answer
     alone: Phase | None  # the rig without a controller, for longer than a stall explains
     before: Phase | None
     taking_over: Phase | None  # the settling second between `before` and `after`
     after: Phase | None
     unsure_slips: int  # slips in `after` with missing blocks
-    stopped_slips: int  # in `stopped_s` and the second after it; excluded from `after`
-    stalled_slips: int  # in short fallbacks and the second after each; excluded from `after`
+    stopped_slips: int  # slips in `stopped_s` and the second after it; excluded from `after`
+    stalled_slips: int  # slips in short fallbacks and the second after each; excluded from `after`
     drive_velocity_max_mps: float  # measured
     velocity_ratio_min: float
     velocity_ratio_max: float
     ratio: RatioVerdict | None  # v_a over v_d, judged at both ends; None for an imported log
-    highest_set_point: float  # of v_a over v_d during vibration: the controller raises it at the start and after slips
+    highest_set_point: float  # highest set point of v_a / v_d: the controller raises it at the start and after slips
     sensors: SensorVerdict | None  # whether they can support a verdict; None for an imported log
     latency: Latency | None
     late_commands: int  # later than 1 ms
@@ -62,7 +62,7 @@ class RunVerdict(NamedTuple):
     computer: Computer | None  # all stalls; None in lockstep
     not_watched: str  # reason for which stalls are unknown; else empty
     faults: list[str]  # harmful events and findings
-    told: list[str]  # other events
+    told: list[str]  # events and findings without harm
     checksums: Checksums
     normal_scheduling: list[str]  # processes without a real-time priority; irrelevant in lockstep
     untested: str  # reason for which nothing was tested; empty if the drive moved under control
@@ -72,7 +72,7 @@ class RunVerdict(NamedTuple):
 
     @in_json
     def headline(self) -> str:
-        """The answer in one line; for a cut log preceded by its end."""
+        """The verdict in one sentence; for a cut log preceded by the time of its end."""
         from cockpit.judge.verdict_words import headline
 
         return headline(self)
@@ -96,13 +96,13 @@ class RunVerdict(NamedTuple):
 
     @property
     def cut(self) -> str:
-        """End of the log, in words, if before the end of its run; else empty."""
+        """End of the log, in words, if the log ends before its run; else empty."""
         ends = f"the log ends at {self.seconds:.2f} s, the run was to end at {self.planned_s:.2f} s"
         return ends if self.planned_s and self.blocks else ""
 
     @in_json
     def good(self) -> bool:
-        """True if control is OK; for an imported log, without a controller, if it is complete."""
+        """True if control is OK; for an imported log, which has no controller, if the log is complete."""
         if self.imported:
             return self.lost_blocks == 0 and not self.faults
         return self.control == OK
@@ -120,8 +120,8 @@ class RunVerdict(NamedTuple):
     @in_json
     def warnings(self) -> list[str]:
         """All other events and findings."""
-        apart = {*self.trips, *self.injected}
-        return [line for line in (*self.faults, *self.told) if line not in apart]
+        others = {*self.trips, *self.injected}
+        return [line for line in (*self.faults, *self.told) if line not in others]
 
     def exit_status(self, strict: bool) -> int:
         """Exit status of a judging command: 0 ok, 1 not ok, 14 not judged; `strict`: also 1 for any loss or late command."""
@@ -146,18 +146,18 @@ class RunVerdict(NamedTuple):
     def _judged(self) -> tuple[Control, str]:
         if self.imported:
             return NOT_JUDGED, self.untested
-        wrong = self._who_failed()
+        wrong = self._failures_without_sensors()
         if not wrong and (self.untested or self.after is None):
             return NOT_JUDGED, self.untested
         blind = self.blind
-        if not blind:  # else the sensors' figures decide nothing
-            wrong += self._figures_that_fail()
+        if not blind:  # figures of a faulty sensor decide nothing
+            wrong += self._failures_by_sensors()
         if wrong:
             return NOT_OK, "; ".join(wrong)
         doubts = [f"{self.cut}; record the run again"] if self.cut else []
         doubts += [*blind, *(f"no message of /{name} is in the log" for name in self.absent), *self.doubts]
         if self.unsure_slips:
-            doubts.append(f"blocks are missing within {counted(self.unsure_slips, 'slip')}, which may be none")
+            doubts.append(f"blocks are missing within {counted(self.unsure_slips, 'slip')}: they may not be slips")
         return (NOT_JUDGED, "; ".join(doubts)) if doubts else (OK, "")
 
     @property
@@ -166,16 +166,16 @@ class RunVerdict(NamedTuple):
         findings = self.sensors.findings if self.sensors is not None else []
         return [f"{finding.code}: {finding.text}" for finding in findings if finding.decides]
 
-    def _who_failed(self) -> list[str]:
+    def _failures_without_sensors(self) -> list[str]:
         """Failures known without a sensor of the axis: absent controller, trips, ineffective vibration."""
         if self.alone is not None:
             held_s = max(self.seconds - self.enabled_from_s - self.stopped_s - self.alone.seconds, 0.0)
-            gone = ", then it was gone" if self.charge.controller_until_s is not None else ""
-            return [f"the controller was in charge for {held_s:.2f} of {self.seconds:.2f} s only{gone}"]
+            end = ", then it was gone" if self.charge.controller_until_s is not None else ""
+            return [f"the controller was in charge for {held_s:.2f} of {self.seconds:.2f} s only{end}"]
         wrong = [fault for fault in self.faults if _code(fault) in _OF_THE_RIG]
         return [*wrong, *(name for name, seconds in self.charge.reasons_s.items() if seconds > WEAK_S)]
 
-    def _figures_that_fail(self) -> list[str]:
+    def _failures_by_sensors(self) -> list[str]:
         """Failures shown by the sensors: slips, and far too much vibration."""
         wrong: list[str] = []
         if self.after is not None and self.after.slips > self.unsure_slips:

@@ -12,17 +12,17 @@ from cockpit.judge.pauses import computer_in_words, pauses_in_words
 from cockpit.judge.phases import Phase
 from cockpit.judge.verdict import NOT_JUDGED, NOT_OK, OK, RunVerdict
 
-_MOST_WARNINGS = 3  # in the short form; more would scroll the six lines off the screen
-_FADE_S = 0.2  # of the vibration at the end of a run
+_MOST_WARNINGS = 3  # warnings in the short form; more would push its six lines off the screen
+_FADE_S = 0.2  # shorter stops are not printed: each run ends with one, while the vibration fades
 
 
 def in_words(verdict: RunVerdict, verbose: bool, without: Phase | None = None) -> list[str]:
     """The verdict in six lines, or with `verbose` with all figures.
 
     Args:
-        verdict: of the run.
+        verdict: verdict on the run.
         verbose: all figures.
-        without: the stretch after, simulated without the controller, if available.
+        without: the stretch `after`, simulated without the controller, if available.
 
     """
     v = verdict
@@ -59,7 +59,7 @@ def shortened(lines: list[str], verbose: bool) -> list[str]:
 
 
 def _figures(verdict: RunVerdict) -> list[str]:
-    """The lines beyond the first six."""
+    """The lines of the long form after the first six."""
     v = verdict
     lines: list[str] = []
     if v.taking_over is not None and v.taking_over.slips:
@@ -72,7 +72,7 @@ def _figures(verdict: RunVerdict) -> list[str]:
         when = "while the rig had no fresh command for a moment, or in the second after"
         lines.append(f"stalled  {counted(v.stalled_slips, 'slip')} {when}")
     if v.stopped_s > _FADE_S:
-        slips = f"; {counted(v.stopped_slips, 'slip')} then" if v.stopped_slips else ""
+        slips = f"; {counted(v.stopped_slips, 'slip')} in this time" if v.stopped_slips else ""
         lines.append(
             f"stopped  by an operator, or not armed, for {v.stopped_s:.1f} s (counted neither before nor after){slips}"
         )
@@ -137,18 +137,18 @@ def _machine_terms(before: Phase | None, after: Phase | None) -> list[str]:
     lines = following_in_words(after.following, was, "before")
     if after.vibration_dose_mm2_per_s > 0.0:
         dose, rms = after.vibration_dose_mm2_per_s, math.sqrt(after.vibration_dose_mm2_per_s / after.seconds)
-        lines.append(f"dose     v_a^2 over the {after.seconds:.1f} s after is {dose:.3g} mm2/s, {rms:.2f} mm/s rms")
+        lines.append(f"dose     v_a^2 over the {after.seconds:.1f} s of `after`: {dose:.3g} mm2/s, {rms:.2f} mm/s rms")
     return lines
 
 
-def following_in_words(now: Following, other: Following | None, name: str) -> list[str]:
-    """Following error and reversals of a stretch as lines, with another stretch `name` for comparison, if given."""
+def following_in_words(now: Following, base: Following | None, name: str) -> list[str]:
+    """Following error and reversals of a stretch as lines, compared with the stretch `base`, called `name`, if given."""
     lines = [f"error    {_error(now)}"]
-    if other is not None:
-        lines[0] += f" ({name}: {_um(other.error_rms_m)}, {_um(other.error_peak_m)}, {_um(other.error_ripple_m)})"
+    if base is not None:
+        lines[0] += f" ({name}: {_um(base.error_rms_m)}, {_um(base.error_peak_m)}, {_um(base.error_ripple_m)})"
     if now.reversals:
         line = f"reversal quadrant error {_worst_reversal(now)}"
-        lines.append(line + (f" ({name}: {_worst_reversal(other)})" if other is not None and other.reversals else ""))
+        lines.append(line + (f" ({name}: {_worst_reversal(base)})" if base is not None and base.reversals else ""))
     return lines
 
 
@@ -184,14 +184,14 @@ def _um(size_m: float) -> str:
 
 def noted(verdict: RunVerdict) -> dict[str, Any]:
     """Fields of the verdict file of a log."""
-    # the name of the log may change, and the file names the digest itself
-    apart = "log", "checksums", "good", "headline"
-    figures = {name: value for name, value in strict_json(verdict).items() if name not in apart}
+    # the log may be renamed, and the file has the other three in fields at its top
+    without = "log", "checksums", "good", "headline"
+    figures = {name: value for name, value in strict_json(verdict).items() if name not in without}
     return {"good": verdict.good, "headline": headline(verdict), "figures": figures}
 
 
 def headline(verdict: RunVerdict) -> str:
-    """The answer in one line; for a cut log preceded by its end."""
+    """The verdict in one sentence; for a cut log preceded by the time of its end."""
     answer = _answer(verdict)
     return f"{verdict.cut}; {answer}" if verdict.cut and verdict.cut not in answer else answer
 
@@ -209,7 +209,7 @@ def _answer(verdict: RunVerdict) -> str:
     if v.control == NOT_JUDGED and (v.untested or v.after is None):
         return v.untested
     rest = ""
-    if v.stopped_slips:  # visible in a figure of the run
+    if v.stopped_slips:  # they are visible in a figure of the run, so the sentence must explain them
         rest = f"; {counted(v.stopped_slips, 'slip')} while it was stopped or not armed"
     if v.after is not None and v.after.slips > v.unsure_slips and not v.blind:
         return f"stick-slip is still there: {counted(v.after.slips, 'slip')} while the controller was in charge{rest}"
@@ -225,8 +225,8 @@ def _answer(verdict: RunVerdict) -> str:
 
 def _imported_answer(verdict: RunVerdict) -> str:
     """Answer for measured data of another program."""
-    whole = verdict.before
-    if whole is None:
+    record = verdict.before
+    if record is None:
         return f"{verdict.seconds:.1f} s of measured data without a drive force: slips cannot be counted"
-    many = counted(whole.slips, "slip") if whole.slips else "no slip"
-    return f"{many} in {whole.seconds:.1f} s, {_swing(whole)}"
+    many = counted(record.slips, "slip") if record.slips else "no slip"
+    return f"{many} in {record.seconds:.1f} s, {_swing(record)}"

@@ -12,16 +12,16 @@ from bridge.wire.channels import CHANNELS
 from bridge.wire.messages import STALE, Records
 from cockpit.judge.setup import SETTLING_S
 
-STANDSTILL_MPS = 2e-5  # default of the controller
+STANDSTILL_MPS = 2e-5  # a slower drive is at standstill; the default of the controller
 
 
 class Latency(NamedTuple):
     """Latency from a block to its command."""
 
-    p50_us: float  # percentiles to 0.25 %
+    p50_us: float  # the percentiles are accurate to 0.25 %
     p99_us: float
     p999_us: float
-    within_1_ms: float  # share
+    within_1_ms: float  # share of the blocks
 
 
 class LatencyWatch:
@@ -51,7 +51,7 @@ class LatencyWatch:
 
 
 class RigWatch:
-    """Answers to the rig, its gain and its disarming."""
+    """Whether commands reached the rig, whether its gain was verified, and whether it disarmed itself."""
 
     def __init__(self) -> None:
         self.answered = False  # some block has a fresh command
@@ -64,9 +64,9 @@ class RigWatch:
         self.answered |= bool((records["fallback"] == 0).any())
         self.gain_seen |= bool(np.isin(records["cause"], (wire.CHECK_PASSED, wire.GAIN_ACCEPTED)).any())
         self.end_ns = max(self.end_ns, int(records["t_ns"].max()))
-        left = (records["guard_state"] == wire.DISARMED) & (records["cause"] == wire.COMMAND_LOST)
-        if left.any():
-            self._disarmed_s = min(self._disarmed_s, 1e-9 * float(records["t_ns"][left.argmax()]))
+        disarmed = (records["guard_state"] == wire.DISARMED) & (records["cause"] == wire.COMMAND_LOST)
+        if disarmed.any():
+            self._disarmed_s = min(self._disarmed_s, 1e-9 * float(records["t_ns"][disarmed.argmax()]))
 
     def disarmed(self) -> str:
         """Sentence if the rig disarmed itself; else empty."""
@@ -80,7 +80,7 @@ class FrozenWatch:
     """Blocks equal to the block before, sample by sample: the driver of a stopped converter resends its last buffer."""
 
     def __init__(self) -> None:
-        self.runs = {name: Longest() for name in CHANNELS}  # of repeated blocks
+        self.runs = {name: Longest() for name in CHANNELS}  # longest sequence of repeated blocks, by channel
         self._last: dict[str, npt.NDArray[np.float32]] = {}
 
     def add(self, records: Records) -> None:
@@ -103,11 +103,11 @@ class StepWatch:
         self.missed = 0  # blocks lost before the controller
         self.last_block = -1
         self.armed = self.moved = False
-        self.highest_set_point = 0.0  # of v_a / v_d during vibration
+        self.highest_set_point = 0.0  # highest set point of v_a / v_d during vibration
         self.drive_velocity_max_mps = 0.0
         self.loop_delay_s = 0.0
-        self.stale: list[tuple[float, float]] = []  # first and last step of stretches without a timely block
-        self._idle: list[tuple[float, float]] = []  # first and last step of each finished stretch
+        self.stale: list[tuple[float, float]] = []  # first and last step of stretches without a timely block [s]
+        self._idle: list[tuple[float, float]] = []  # first and last step of each finished stop [s]
         self._idle_from_s: float | None = None
         self._last_s = 0.0
 
@@ -137,7 +137,7 @@ class StepWatch:
         self._last_s = float(t_s[-1])
 
     def stops(self, block_s: float, is_last: bool) -> list[tuple[float, float]]:
-        """Stretches with a stopped controller or a rig not armed, with the second after each [s]."""
+        """Stretches in which the controller is stopped or the rig not armed, each with its settling second [s]."""
         stretches = [(from_s - block_s, last_s + SETTLING_S) for from_s, last_s in self._idle]
         if self._idle_from_s is not None:
             until_s = self._last_s + SETTLING_S if is_last else np.inf

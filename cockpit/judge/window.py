@@ -19,7 +19,7 @@ Rows = npt.NDArray[Any]
 # Fewer: strokes are cut. With 5000 the shipped scenarios give the same slips; the swing of the pneumatic seal, which has longer
 # strokes, is 2.9 instead of 1.1 N.
 WINDOW_BLOCKS = 60_000
-# Known rows after a judged window. Less than 8 s: the part of a phase excluded from its swing may depend on the end of the run.
+# Rows known after a window when it is judged. Less than 8 s: the swing of a phase may depend on a later end of the run.
 # More: memory.
 AHEAD_S = 10.0
 # Rows before a window kept for context. Less: a slip (0.1 s) or a ramp of the vibration (0.15 s) that began earlier is cut.
@@ -49,10 +49,10 @@ class JudgedBlocks(NamedTuple):
     sequence: Rows  # int64, [blocks]
     t_ns: Rows  # int64, [blocks]
     force_N: Rows  # float32, [blocks, samples]
-    drive_m: Rows  # float64, means of bins, [blocks, bins]
-    slide_m: Rows
-    base_mps2: Rows  # float64, rms about the mean of each block, [blocks]
-    slide_mps2: Rows  # the same for the slide's accelerometer
+    drive_m: Rows  # drive position: float64, means of bins, [blocks, bins]
+    slide_m: Rows  # slide position, likewise
+    base_mps2: Rows  # base accelerometer: float64, rms about the mean of each block, [blocks]
+    slide_mps2: Rows  # slide's accelerometer, likewise
 
     def part(self, rows: Any) -> "JudgedBlocks":
         """A selection of the blocks."""
@@ -75,8 +75,8 @@ def reduced(sensors: Records, bins: int) -> JudgedBlocks:
 def means(samples: npt.NDArray[Any], bins: int) -> npt.NDArray[np.float64]:
     """Means of the bins of blocks, [blocks, bins]."""
     count = samples.shape[1] // bins
-    whole = np.ascontiguousarray(samples).astype(np.float64)
-    return np.add.reduce(whole.reshape(len(samples), bins, count), axis=2) / count
+    exact = np.ascontiguousarray(samples).astype(np.float64)
+    return np.add.reduce(exact.reshape(len(samples), bins, count), axis=2) / count
 
 
 def _rms(samples: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
@@ -96,7 +96,7 @@ def rows_of(records: Records, layout: np.dtype[Any]) -> Rows:
 
 
 class Window(NamedTuple):
-    """Rows with their context; the rows from `first` to before `end` are judged."""
+    """Rows of which those from `first` to before `end` are judged; the others are their context."""
 
     blocks: JudgedBlocks
     trace: Rows
@@ -163,7 +163,7 @@ class WaitingRows:
         """Drop the rows that no later window needs.
 
         Args:
-            window: judged.
+            window: the window that was judged.
             turned: the drive turned at its end.
             stroke: number of the first stroke of the next window.
             block_s: duration of a block.

@@ -13,8 +13,8 @@ from bridge.wire.channels import CHANNELS
 from bridge.wire.messages import Records
 from cockpit.figures.signals import BANDS, PANELS, SIGNALS
 
-# Stretches held back: the unfinished one, and two until the rig's and the controller's messages about their blocks have arrived.
-# Fewer: those are missing
+# Stretches held back: the unfinished stretch, and two more until the messages of rig and controller about them have arrived.
+# Fewer: these messages are missing.
 _BEHIND = 3
 _MOST = 12_000  # buckets kept for newly opened pages: 60 s
 _CURVES = [signal for panel in PANELS for signal in panel.signals]
@@ -25,7 +25,7 @@ _RANGES = {
     for which, field in zip(Envelope._fields, fields_of(signal.name), strict=True)
 }
 _VALUES = (*(signal.name for signal in _CURVES if signal.topic != "sensors"), *(band.field for band in BANDS), "slips")
-_FIELDS = _RANGES | {name: name for name in _VALUES}  # of a stretch, by column
+_FIELDS = _RANGES | {name: name for name in _VALUES}  # field of a stretch by column
 COLUMNS = tuple(_FIELDS)
 _STRETCH = np.dtype([("sequence", "u8"), ("t_ns", "i8"), *((field, "f4") for field in _FIELDS.values())])
 
@@ -33,7 +33,7 @@ _STRETCH = np.dtype([("sequence", "u8"), ("t_ns", "i8"), *((field, "f4") for fie
 class Buckets(NamedTuple):
     """Consecutive buckets."""
 
-    first: int  # number of the first; bucket n ends (n + 1) bucket lengths after the start of the run
+    first: int  # number of the first bucket; bucket n ends (n + 1) bucket lengths after the start of the run
     values: npt.NDArray[np.float32]  # [columns, buckets], SI units; nan: not known, or lost
 
     @property
@@ -53,7 +53,7 @@ class Bucketing:
     def __init__(self, block_ns: int) -> None:
         self._period_ns = max(PERIOD_NS, block_ns)
         self.step_s = self._period_ns * 1e-9
-        self.blocks = self._period_ns // block_ns  # per bucket
+        self.blocks = self._period_ns // block_ns  # blocks per bucket
         self._stretches = Stretches(lambda count: np.zeros(count, _STRETCH), self._period_ns, _BEHIND, self._period_ns)
         self._kept: list[Buckets] = []
 

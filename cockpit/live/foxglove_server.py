@@ -29,7 +29,7 @@ class Foxglove:
     """A server on the loopback address only; a context manager.
 
     Args:
-        port: 0: any free port.
+        port: port to listen on; 0: any free port.
 
     Raises Fault ENDPOINT_BUSY, ModuleNotFoundError without the extra.
 
@@ -68,7 +68,7 @@ class Foxglove:
         self._server.stop()
 
     def send(self, step: ViewUpdate) -> None:
-        """Send the news of a step."""
+        """Send the new blocks and events of a step."""
         if step.new_run:
             self._stretches = Stretches()
             self._began_ns = None

@@ -14,12 +14,12 @@ _NEXT = {
     "FAULT": "no vibration until `stickslip reset`, then `stickslip arm`",
     "DISARMED": "no vibration until `stickslip arm`",
     "NO_GUARD": "no guard limits the vibration on the rig's side",
-}  # by state of the guard
-_NAMES = 9  # letters of a name in a frame without a screen
+}  # next command by state of the guard
+_NAMES = 9  # width of the names in `status`
 
 
 def frame_lines(now: Mapping[str, Any], events: Sequence[EventRow]) -> list[str]:
-    """The frame without a screen: the answer, a line for each row, the events, and the next commands."""
+    """The lines of `status`: the answer, a line for each row, the events, and the next commands."""
     named = [("answer", now["answer"]["text"]), *rows(now), *(("event", event_line(event)) for event in events)]
     named += [("next", text) for state, text in _NEXT.items() if state == now.get("guard_state")]
     return [f"{name:<{_NAMES}}{words}" for name, words in named]
@@ -89,5 +89,5 @@ def _lost(lost: Mapping[str, int] | None) -> str:
         return _UNKNOWN
     return (
         f"{counted(lost['controller'], 'block')} to the controller, {counted(lost['viewer'], 'block')} to this screen; "
-        f"{counted(lost['dropped'], 'message')} dropped here"
+        f"{counted(lost['dropped'], 'message')} dropped by it"
     )

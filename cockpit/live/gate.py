@@ -25,10 +25,10 @@ def refusal(path: str, hosts: Sequence[str], origins: Sequence[str], port: int, 
     """Reason for which a request is refused; None if it is accepted.
 
     Args:
-        path: of the request, unchanged.
+        path: path of the request, unchanged.
         hosts: every value of the header `Host`.
         origins: every value of the header `Origin`.
-        port: of the server.
+        port: port of the server.
         upgrades: whether the request wants a web socket.
 
     """

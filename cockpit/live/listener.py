@@ -1,4 +1,4 @@
-"""Viewer session on the bus: reconnects whenever the rig was away, and delays no other process."""
+"""Viewer session on the bus: reconnects after an absence of the rig, and delays no other process."""
 
 import contextlib
 import json
@@ -16,22 +16,20 @@ from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, is_frozen
 
 EVENTS = (PLANT_EVENT, CONTROLLER_EVENT, RECORDER_EVENT)
 ROLES = ("plant", "controller", "recorder")
-LIMIT = (
-    6000  # queued messages: 2 s of a run. Larger: a stalled viewer shows older data. Smaller: it drops messages sooner
-)
-_DIAL_S = 0.5  # timeout of one attempt; Ctrl-C is delayed by up to as much
+# Queued messages: 2 s of a run. Larger: a stalled viewer shows older data. Smaller: it drops messages sooner.
+LIMIT = 6000
+_DIAL_S = 0.5  # timeout of one attempt to connect; Ctrl-C is delayed by up to this time
 _AGAIN_S = 0.2  # pause between two attempts
-_LOOK_S = 0.05
-# without a link before the session is reopened with the current password; Zenoh itself reconnects shorter cuts
-_UNLINKED_S = 1.0
-_HEADER_S = 0.5
+_LOOK_S = 0.05  # interval of the checks of the link
+_UNLINKED_S = 1.0  # after this time without a link the session is reopened; Zenoh itself bridges shorter cuts
+_HEADER_S = 0.5  # timeout for the headers of rig and controller
 
 
 class Presence(NamedTuple):
     """Participants on the bus at one instant."""
 
     linked: bool  # the link to the rig is up
-    roles: frozenset[str]  # while the link is down: the last known, until it is given up
+    roles: frozenset[str]  # while the link is down: the last known roles, until the session is closed
     trouble: str  # why no session can be opened; empty if merely no peer answers
 
 
@@ -48,10 +46,10 @@ def connected(config: BusConfig, role: str, patience_s: float, frozen: str, abse
     """A session with a running rig.
 
     Args:
-        role: of the session; an operator's command must not be lost.
+        role: role of the session; messages of an `operator` wait for a slow link instead of being dropped.
         frozen: remedy for a rig that accepts connections but does not answer.
         absent: remedy if no rig answers.
-        about: begin of the message of the fault.
+        about: begin of the fault's message.
 
     Raises Fault NO_PEER.
 

@@ -121,7 +121,7 @@ function receive(buffer) {
     hello = told;
     helps = new Map(told.words.map((one) => [`${one.column} ${one.word}`, one.help]));
     scope = new ScopeView(told);
-    element("events").replaceChildren(table(["time [s]", "local time", "source", "event", "NE 107", "text", "meaning and remedy"], []));
+    element("events").replaceChildren(table(["time [s]", "local time", "source", "event", "severity", "text", "meaning and remedy"], []));
     begin(told.step_s);
   } else if (told.kind === "new-run") {
     begin(told.step_s);

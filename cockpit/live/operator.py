@@ -24,9 +24,9 @@ _DIAL_S = 2.0
 # amplifier comes later.
 _ANSWER_S = 5.0
 _POLL_S = 0.05  # longest wait for a message, after which timeouts are checked
-_AGAIN_S = 0.5  # interval of repetitions: with twice as many busy processes as cores 1 command in 300 did not arrive
+_AGAIN_S = 0.5  # interval at which an unconfirmed command is repeated: an overloaded computer loses 1 in 300
 _SILENT_S = 1.0  # the last state is outdated after this silence; a rig sends a thousand messages per second
-_NOTHING_M = 1e-12  # rounding at the end of a ramp
+_NOTHING_M = 1e-12  # a smaller amplitude counts as zero: rounding at the end of a ramp
 _KEPT_S = 0.1  # wait after a stop for the rig's event that it cannot keep the stop over a restart
 _REFUSED_S = 1.0  # a rig that is in FAULT for this long after ARM refuses it
 _ARMS = (wire.Operator.ARM, wire.Operator.ACCEPT_GAIN)
@@ -39,13 +39,13 @@ class CommandOutcome(NamedTuple):
     """Effect of an operator command on a rig."""
 
     endpoint: str
-    word: str
+    word: str  # the command
     done: bool
-    state: str  # of the rig's guard
-    cause: str
+    state: str  # state of the rig's guard
+    cause: str  # cause of this state
     help: str  # meaning of the cause
-    amplitude_m: float  # of the exciter
-    seconds: float  # from the first command to the end of the exchange
+    amplitude_m: float  # amplitude of the exciter
+    seconds: float  # time from the first command to the end of the exchange
     not_kept: str  # why a stop does not outlast a restart of the rig; empty if it does, or for another command
     taken: bool  # the rig confirmed this command
     alone: bool  # armed without a controller on the bus
@@ -129,7 +129,7 @@ def send_command(bus_config: BusConfig, name: str) -> CommandOutcome:
 
 
 class _Exchange:
-    """One command and the rig's messages until it is carried out.
+    """One command, and the rig's messages until the command is carried out.
 
     The rig confirms a command by an event that repeats its sender. Only `applied` messages after that event show the effect:
     before it, the rig may be in the wanted state because of another client's command.
@@ -137,15 +137,15 @@ class _Exchange:
 
     def __init__(self, name: str) -> None:
         self.inbox = Inbox(256)
-        self.applied: wire.Applied | None = None  # the newest
+        self.applied: wire.Applied | None = None  # the newest `applied` message
         self.taken = False
         self.not_kept = ""
         self.seconds = 0.0
         self.silent_s = 0.0  # time since the last `applied` message, at the end
         self._action = wire.Operator.Action.Value(name)
         # unique, so that the confirmation of each command is recognised, also of two commands from one process
-        who = f"{os.environ.get('USER') or 'somebody'} (process {os.getpid()}, word {uuid.uuid4().hex[:8]})"
-        self._word = wire.Operator(action=name, who=who).SerializeToString()
+        who = f"{os.environ.get('USER') or 'unknown user'} (process {os.getpid()}, command {uuid.uuid4().hex[:8]})"
+        self._message = wire.Operator(action=name, who=who).SerializeToString()
         self._answer = f"{name} by {who}"
         self._after = False  # whether `applied` is newer than the confirmation
         self._checked = False  # whether a loop check has run since the confirmation
@@ -158,7 +158,7 @@ class _Exchange:
         if applied is None:
             return False
         state, at_rest = applied.guard_state, applied.amplitude_m == 0.0
-        if self._action == wire.Operator.STOP:  # another client's stop is as good
+        if self._action == wire.Operator.STOP:  # a stop by another client counts as well
             # a rig without a guard only follows its controller, which receives the command too
             return at_rest and (state == wire.NO_GUARD or applied.cause == wire.STOP_BY_PERSON)
         if not (self._after or state == wire.NO_GUARD):
@@ -167,7 +167,7 @@ class _Exchange:
             return state != wire.FAULT
         if self._action == wire.Operator.DISARM:
             return state == wire.DISARMED and at_rest
-        if state == wire.NO_GUARD:  # nothing to arm
+        if state == wire.NO_GUARD:  # such a rig needs no arming
             return True
         return state in (wire.ARMED, wire.ACTIVE) and applied.cause != wire.ARMED_BY_SCENARIO
 
@@ -177,15 +177,14 @@ class _Exchange:
         self._until_s = began_s + _ANSWER_S
         while True:
             now_s = time.monotonic()
-            if realtime.was_paused(
-                polled_s, polled_s + _POLL_S
-            ):  # this computer stalled; messages of the rig wait unread
+            # this computer stalled, so messages of the rig wait unread
+            if realtime.was_paused(polled_s, polled_s + _POLL_S):
                 self._until_s = now_s + _ANSWER_S
             if now_s >= self._until_s:
                 break
             polled_s = now_s
             if now_s >= again_s and not self._after:
-                send(self._word)
+                send(self._message)
                 again_s = now_s + _AGAIN_S
             self._receive(_POLL_S)
             refused = self._after and self._action in _ARMS and self._is_in(wire.FAULT)

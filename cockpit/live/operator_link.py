@@ -13,9 +13,9 @@ from cockpit.live.operator import send_command
 
 STOP, SCOPE = "STOP", "SCOPE"
 _WITH_TOKEN = ("ARM", "DISARM", "RESET")
-_WRONG_S = 1.0  # for which a wrong token blocks further attempts, against guessing
-_STOP_S = 3.0  # in which an undelivered STOP is sent again; the last attempt takes 2 s more
-_STOP_AGAIN_S = 0.2
+_WRONG_S = 1.0  # time for which a wrong token blocks further attempts, against guessing
+_STOP_S = 3.0  # time for which an undelivered STOP is repeated; the last attempt takes 2 s more
+_STOP_AGAIN_S = 0.2  # pause before a repetition
 
 
 class Wish(NamedTuple):
@@ -43,8 +43,8 @@ class Words:
     """Sends commands to the rig as the role operator, one at a time. STOP never waits for another command.
 
     Args:
-        bus: of the rig.
-        token: expected from the page.
+        bus: bus of the rig.
+        token: token that the page must send.
 
     """
 
@@ -54,7 +54,7 @@ class Words:
         self._busy = False
 
     async def deliver(self, wish: Wish) -> dict[str, Any]:
-        """Send a command; its outcome as `word`, `done` and readable `lines`."""
+        """Send a command; returns its outcome as `word`, `done` and readable `lines`."""
         if wish.word == STOP:
             if self._stopping is None or self._stopping.done():
                 self._stopping = asyncio.create_task(self._send(STOP))
@@ -72,18 +72,18 @@ class Words:
         finally:
             self._busy = False
 
-    async def _send(self, word: str) -> dict[str, Any]:
-        until_s = time.monotonic() + (_STOP_S if word == STOP else 0.0)
+    async def _send(self, command: str) -> dict[str, Any]:
+        until_s = time.monotonic() + (_STOP_S if command == STOP else 0.0)
         while True:
             try:
-                outcome = await asyncio.to_thread(send_command, self._bus, word)
+                outcome = await asyncio.to_thread(send_command, self._bus, command)
             except Fault as fault:
                 if fault.kind.code != "NO_PEER" or time.monotonic() > until_s:
-                    return _answer(word, False, [fault.line])
+                    return _answer(command, False, [fault.line])
                 await asyncio.sleep(_STOP_AGAIN_S)
             else:
-                return _answer(word, outcome.done, outcome.in_words())
+                return _answer(command, outcome.done, outcome.in_words())
 
 
-def _answer(word: str, done: bool, lines: list[str]) -> dict[str, Any]:
-    return {"word": word, "done": done, "lines": [plain(line) for line in lines]}
+def _answer(command: str, done: bool, lines: list[str]) -> dict[str, Any]:
+    return {"word": command, "done": done, "lines": [plain(line) for line in lines]}

@@ -10,14 +10,14 @@ from cockpit.review.page import page_of_curves, text_of
 
 _FOLDER = Path(__file__).parent
 _SCRIPTS = ("store.js", "state.js", "scope.js", "command.js", "live.js")
-_NO_ICON = '<link rel="icon" href="data:,">\n'  # the browser asks for none
+_NO_ICON = '<link rel="icon" href="data:,">\n'  # an empty icon, so that the browser requests none
 
 
 class Page:
     """The page as bytes, with its content security policy.
 
     Args:
-        port: of the server.
+        port: port of the server.
 
     """
 

@@ -23,7 +23,7 @@ from cockpit.live.view import LIVE, EventRow, View
 
 _PERIOD_S = 0.1
 _STYLES = {GOOD: "bold green", LOOK: "bold yellow", BAD: "bold red", OFF: "bold"}
-_HEAD_LINES = 20  # on the screen above the events
+_HEAD_LINES = 20  # lines of the screen above the events
 _FEWEST_EVENTS = 3
 
 
@@ -79,9 +79,7 @@ def screen_of(now: Mapping[str, Any], events: collections.deque[EventRow], heigh
     table = Table.grid(padding=(0, 2))
     for name, words in rows(now):
         table.add_row(Text(name, style="dim"), Text(words, style="" if now["phase"] == LIVE else "dim"))
-    few = max(_FEWEST_EVENTS, height - _HEAD_LINES)
-    event_lines = [
-        Text(event_line(event), style=_STYLES[BAD] if event.letter == FAILURE else "") for event in [*events][:few]
-    ]
+    shown = [*events][: max(_FEWEST_EVENTS, height - _HEAD_LINES)]
+    event_lines = [Text(event_line(event), style=_STYLES[BAD] if event.letter == FAILURE else "") for event in shown]
     head = Text(answer["text"], style=_STYLES[answer["level"]])
     return Group(head, Text(""), table, Text(""), *(event_lines or [Text("no events yet", style="dim")]))

@@ -31,10 +31,10 @@ from cockpit.live.view import View, ViewUpdate
 from cockpit.live.viewers import MOST_VIEWERS, Viewers
 
 HOST = "127.0.0.1"
-PERIOD_S = 0.05  # between two frames
-_LATENCY_S = 1.0  # between two histograms
+PERIOD_S = 0.05  # time between two frames
+_LATENCY_S = 1.0  # time between two histograms of the latency
 _MOST_CONNECTIONS = 48  # beyond them the oldest connection without a request is closed; if all are pages, the newest
-_OPEN_S = 5.0
+_OPEN_S = 5.0  # timeout for the handshake of a connection
 _MOST_BYTES = 1024  # largest message of a page; the longest contains a command and a token
 _MOST_WISHES = 4  # unanswered commands of one page
 _HEADERS = {
@@ -62,10 +62,10 @@ class Server:
     """The page of one rig.
 
     Args:
-        bus: of the rig.
+        bus: bus of the rig.
         token: permits arming from the page.
-        port: of `sock` in `run`.
-        also: called with each step, for a second server.
+        port: port of the socket passed to `run`.
+        also: called with each update of the view, for a second server.
 
     """
 
@@ -102,9 +102,9 @@ class Server:
                 outer._silent[self] = None
                 super().connection_made(transport)
                 if outer._connections > _MOST_CONNECTIONS:
-                    gives_way = next(iter(outer._silent))
-                    del outer._silent[gives_way]
-                    gives_way.transport.abort()
+                    oldest = next(iter(outer._silent))
+                    del outer._silent[oldest]
+                    oldest.transport.abort()
 
             def connection_lost(self, exc: Exception | None) -> None:
                 outer._connections -= 1
@@ -138,11 +138,11 @@ class Server:
         headers = request.headers
         upgrades = "websocket" in headers.get("Upgrade", "").lower()
         names = headers.get_all("Host"), headers.get_all("Origin")
-        no = NO_METHOD if request.method != "GET" else refusal(request.path, *names, self._port, upgrades)
-        if no is not None:
-            body = f"{no.line}\n".encode()
+        refused = NO_METHOD if request.method != "GET" else refusal(request.path, *names, self._port, upgrades)
+        if refused is not None:
+            body = f"{refused.line}\n".encode()
             fields = _HEADERS | {"Content-Type": "text/plain; charset=utf-8", "Content-Length": str(len(body))}
-            return Response(no.status, http.HTTPStatus(no.status).phrase, Headers(fields), body)
+            return Response(refused.status, http.HTTPStatus(refused.status).phrase, Headers(fields), body)
         if request.path != PAGE:
             return None
         fields = _HEADERS | {"Content-Security-Policy": self._page.policy, "Content-Length": str(len(self._page.body))}
@@ -165,7 +165,7 @@ class Server:
         return {"step_s": run.buckets.step_s if run is not None else None}
 
     def _now(self, step: ViewUpdate) -> bytes:
-        """Frame of the news and the current state."""
+        """Frame with the current state, and the new events and buckets."""
         state = self._view.now() | {"events": [event._asdict() for event in step.events]}
         state |= {"viewers": len(self._viewers), "viewers_dropped": self._viewers.dropped, "sent_s": time.monotonic()}
         if time.monotonic() > self._latency_s + _LATENCY_S and self._view.run is not None:
@@ -194,9 +194,9 @@ class Server:
         """Send a page the state of the rig, and execute its commands."""
         self._silent.pop(socket, None)
         tasks: set[asyncio.Task[None]] = set()
-        async with contextlib.AsyncExitStack() as seen:
+        async with contextlib.AsyncExitStack() as viewing:
             if len(self._viewers) < MOST_VIEWERS:
-                await seen.enter_async_context(self._viewers.added(socket, self._first()))
+                await viewing.enter_async_context(self._viewers.added(socket, self._first()))
             else:
                 line = f"{MOST_VIEWERS} pages are already open: close one. STOP works on this page, too"
                 await socket.send(frame("full", {"line": line}))

@@ -60,13 +60,12 @@ function lostWords(now) {
 
 /** The newest event first. */
 function eventRow(event) {
-  const cells = [fixed(event.t_s, 3), event.at, event.source, event.code, event.letter, event.text, event.help];
+  const cells = [fixed(event.t_s, 3), event.at, event.source, event.code, event.weight, event.text, event.help];
   const row = made("tr", cells.map((text, at) => {
     const cell = document.createElement("td");
     cell.textContent = text; // untrusted: any client of the bus may have sent it
     cell.className = at === 0 ? "number" : at < 5 ? "key" : "";
     return cell;
   }), { className: { F: "bad", S: "look", M: "look" }[event.letter] ?? "" });
-  row.cells[4].title = event.weight;
   return row;
 }

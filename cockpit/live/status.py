@@ -9,19 +9,19 @@ from bridge.wire.zenoh_link import BusConfig, Inbox
 from cockpit.live.listener import LIMIT, ROLES, Presence, Source, configurations, connected, listen
 
 _DIAL_S = 0.4  # a rig on this computer answers within milliseconds, in the same network within tens of milliseconds
-_ROLES_S = 0.2  # present roles are known as soon as the link is; only a missing role costs this time
-_HEADER_S = 0.2
+_ROLES_S = 0.2  # wait for the roles on the bus; only a missing role costs this time
+_HEADER_S = 0.2  # timeout for the headers of rig and controller
 _LISTEN_S = 0.3  # three times the delay of a rig that is late by 0.1 s; events within this time are shown
-_BUSY_S = 1.0  # for which a rig on a busy computer may send no block
+_BUSY_S = 1.0  # longest time without a block of a rig on a busy computer
 
 
 class Status(NamedTuple):
     """A rig at one instant; null for a value without a message."""
 
     endpoint: str
-    rig: str | None  # its name; None if its header lacks it
-    roles: list[str]  # on the bus: of plant, controller, recorder
-    t_s: float | None  # of the run
+    rig: str | None  # name of the rig; None if the rig's header lacks it
+    roles: list[str]  # participants on the bus, out of plant, controller, recorder
+    t_s: float | None  # time of the run
     mode: str | None
     reason: str | None
     limit: str | None
@@ -31,11 +31,11 @@ class Status(NamedTuple):
     drive_velocity_mps: float | None
     vibration_velocity_mps: float | None
     velocity_ratio: float | None
-    frequency_Hz: float | None  # at the rig, after its own limits and ramps
+    frequency_Hz: float | None  # frequency at the rig, after the rig's limits and ramps
     amplitude_m: float | None
     fallback: bool | None  # the rig has no fresh command and ramps to zero by itself
-    state: str | None  # of the rig's guard
-    cause: str | None  # of `state`
+    state: str | None  # state of the rig's guard
+    cause: str | None  # cause of `state`
     guard_limit: str | None  # limit of the guard that restricts the command now
     heat_share: float | None  # modelled temperature rise of the exciter, as a share of the largest allowed
     events: list[str]  # received within 0.3 s
@@ -47,11 +47,11 @@ class Status(NamedTuple):
 
 
 def look(bus_config: BusConfig) -> tuple[Status, list[str]]:
-    """Listen for 0.3 s; the state, and its lines for the operator. Raises Fault NO_PEER if no rig answers."""
+    """Listen for 0.3 s; returns the state, and lines for the operator. Raises Fault NO_PEER if no rig answers."""
     where = bus_config.endpoint
     frozen = "check the rig's process, and assume that the exciter vibrates as before"
     with connected(bus_config, "status", _DIAL_S, frozen, "start one, or give its --endpoint") as bus:
-        # imported only where a rig answers, as numpy takes as long as the rest, and before messages queue up
+        # imported once a rig answers, as loading numpy takes as long as the whole rest, and before messages queue up
         from cockpit.live.frame_words import frame_lines
         from cockpit.live.view import LIVE, View
 
@@ -66,8 +66,9 @@ def look(bus_config: BusConfig) -> tuple[Status, list[str]]:
         headers = configurations(bus, [role for role in ROLES[:2] if role in roles], _HEADER_S, threading.Event())
         time.sleep(max(0.0, began_s + _LISTEN_S - time.monotonic()))
         view = View(Source(inbox, Presence(True, frozenset(roles), ""), headers), where)
-        events = view.step().events
-        while view.phase() != LIVE and "plant" in roles and time.monotonic() < began_s + _BUSY_S:
+        events = view.step().events  # the first step loads code, for a second on a busy computer
+        until_s = time.monotonic() + _BUSY_S
+        while view.phase() != LIVE and "plant" in roles and time.monotonic() < until_s:
             time.sleep(_LISTEN_S)
             events += view.step().events
     now = view.now()

@@ -13,7 +13,7 @@ from bridge.wire.messages import Layout, Records, sensor_block
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import SENSORS
 
-_MOST_SAMPLES = 400  # per channel and block
+_MOST_SAMPLES = 400  # most samples per channel and block
 
 
 def table_of(layout: Layout, payloads: Sequence[bytes], topic: str) -> Records:
@@ -47,7 +47,7 @@ class SensorTables:
 
 
 def _samples(payload: bytes) -> int:
-    """Samples per channel in a block; 0 if it is unreadable."""
+    """Number of samples per channel in a block; 0 for an unreadable block."""
     with contextlib.suppress(Fault):
         block: Any = parsed(wire.SensorBlock, payload, SENSORS.name)
         lengths = {len(getattr(block, channel)) for channel in CHANNELS}

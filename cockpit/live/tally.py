@@ -16,8 +16,8 @@ class Lost(NamedTuple):
     viewer: int  # blocks lost before this viewer
     dropped: int  # messages received but dropped by a full inbox
     commands: int  # commands received by the rig
-    late: int  # of these, later than 1 ms
-    refused: int  # of these, from another run, out of order, or not finite
+    late: int  # commands later than 1 ms
+    refused: int  # commands from another run, out of order, or not finite
 
 
 class Tally:

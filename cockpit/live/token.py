@@ -10,7 +10,7 @@ from pathlib import Path
 from bridge.faults import Fault
 from bridge.wire.loopback_users import folders, is_private_folder
 
-_BYTES = 18  # random; 24 letters in base64
+_BYTES = 18  # random bytes; 24 letters in base64
 
 
 @contextlib.contextmanager

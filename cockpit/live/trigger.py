@@ -8,8 +8,8 @@ import numpy.typing as npt
 from bridge.wire.channels import CHANNELS
 from bridge.wire.messages import Records
 
-BEFORE_S, AFTER_S = 0.1, 0.1  # a slip takes a few ms, the stick before it a few 0.1 s
-_AGAIN_S = 0.5  # least distance of two captures; an operator reads no more
+BEFORE_S, AFTER_S = 0.1, 0.1  # captured around the trigger: a slip takes a few ms, the stick before it a few 0.1 s
+_AGAIN_S = 0.5  # least time between two captures; an operator can read no more
 BY_HAND = "by hand"
 BY_SLIP = "a slip"
 
@@ -17,10 +17,10 @@ BY_SLIP = "a slip"
 class Capture(NamedTuple):
     """Samples around one instant."""
 
-    number: int  # of the captures of this run, from 1
+    number: int  # number of this capture in its run, from 1
     cause: str  # BY_SLIP or BY_HAND
     t_s: float  # time of the run at the end of the triggering block
-    before_s: float  # from the first sample to t_s
+    before_s: float  # time from the first sample to `t_s`
     sample_s: float
     samples: npt.NDArray[np.float32]  # [channels, samples], SI units; nan where a block is missing
     missing: int  # missing blocks

@@ -28,11 +28,11 @@ from cockpit.live.tables import SensorTables, table_of
 from cockpit.live.tally import Tally
 from cockpit.live.trigger import Capture, Scope
 
-SILENT_S = 0.5  # without a message before its values are hidden. Longer: old values are shown as current
-_AT_ONCE = 1 << 13  # messages per step; more than the queue holds
+SILENT_S = 0.5  # age of a message from which its values are hidden. Longer: old values are shown as current
+_AT_ONCE = 1 << 13  # most messages taken per step; more than the queue holds
 _FAR = 12_000  # buckets without a block (one minute) after which a new run is assumed
 _EVENTS_KEPT = 200
-_EVENTS_AT_ONCE = 50  # per step; further ones are only counted
+_EVENTS_AT_ONCE = 50  # events listed per step; further events are only counted
 _LONGEST_TEXT = 500
 _SLIPS_S = 10.0  # window for the count of recent slips
 WAITING, LIVE, SILENT, LEFT, ENDED = "waiting", "live", "silent", "left", "ended"
@@ -45,7 +45,7 @@ class EventRow(NamedTuple):
     at: str  # local time of day
     source: str
     code: str
-    letter: str  # NAMUR NE 107; empty for plain news
+    letter: str  # severity by NAMUR NE 107; empty for an event without severity
     weight: str  # meaning of the letter
     text: str
     help: str
@@ -78,8 +78,8 @@ class View:
 
     Args:
         source: delivers the messages.
-        where: its endpoint, for texts.
-        clock: time [s].
+        where: endpoint of the bus, for messages.
+        clock: returns the time [s].
 
     """
 
@@ -91,14 +91,14 @@ class View:
         self.events: collections.deque[EventRow] = collections.deque(maxlen=_EVENTS_KEPT)
         self.capture: Capture | None = None
         self._sensors = SensorTables()
-        self._screen = Screen(Complaints(self._note_strange, clock))
-        self._heard_s: dict[str, float] = {}
+        self._screen = Screen(Complaints(self._count_unreadable, clock))
+        self._heard_s: dict[str, float] = {}  # time of the newest message by topic
         self._newest: dict[str, Records] = {}
-        self._taken: dict[str, Records] = {}  # in this step
+        self._taken: dict[str, Records] = {}  # new messages of this step by topic
         self._ended_at_s: float | None = None  # time of the run at the rig's END
         self._began_s = clock()
 
-    def _note_strange(self, _code: str, _text: str) -> None:
+    def _count_unreadable(self, _code: str, _text: str) -> None:
         self.unreadable += 1
 
     def step(self) -> ViewUpdate:
@@ -218,7 +218,7 @@ class View:
         presence = self._source.presence
         if self._of("sensors") is not None:
             return LIVE
-        if "plant" in presence.roles:  # after an END this is another rig: the first withdrew its token with its END
+        if "plant" in presence.roles:  # after an END this is the next rig: the ended rig has left the bus
             return SILENT if self.run is not None and self._ended_at_s is None else WAITING
         if self.run is None:
             return WAITING
@@ -228,7 +228,7 @@ class View:
         """All current figures and words; None if unknown."""
         presence, run, phase = self._source.presence, self.run, self.phase()
         figures = self._figures() if phase == LIVE else {}
-        late = self._slips_of_late()
+        recent = self._slips_of_late()
         return {
             "endpoint": self._where,
             "phase": phase,
@@ -237,8 +237,8 @@ class View:
             "rig": plain(str(_inside(self._source.headers, "plant", "rig", "name") or "")[:80]),
             "roles": sorted(presence.roles),
             "limits": [{"words": label, "value": value} for label, value in stroke_limits(self._source.headers)],
-            "slips_of_late": late[0] if "slips" in figures else None,
-            "slips_over_s": late[1] if "slips" in figures else None,
+            "slips_of_late": recent[0] if "slips" in figures else None,
+            "slips_over_s": recent[1] if "slips" in figures else None,
             "lost": run.tally.lost(self._source.inbox.dropped)._asdict() if run is not None else None,
             "late_us": {
                 "p50": run.tally.percentile_us(0.5),
@@ -268,7 +268,7 @@ class View:
             figures["fallback"] = bool(applied["fallback"])
         if trace is not None:
             v_a, v_d = figures["vibration_velocity_mps"], figures["drive_velocity_mps"]
-            # otherwise the trace repeats an old value
+            # at standstill or without input the trace repeats an old value
             measured = trace["state"] > wire.STANDSTILL and trace["limit"] not in (wire.STALE_INPUT, wire.NOT_FINITE)
             figures["velocity_ratio"] = v_a / abs(v_d) if v_a is not None and v_d and measured else None
             figures["breakaway_force_N"] = _number(trace["breakaway_force_N"]) or None

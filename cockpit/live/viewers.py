@@ -6,16 +6,15 @@ import contextlib
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
 
-MOST_VIEWERS = 12  # later pages may still send commands to the rig, but receive no data
-_QUEUED = 60  # frames, 3 s. Larger: a slow browser shows older data. Smaller: a browser that draws slowly is dropped
-_TOO_SLOW = 1013  # "try again later"
+MOST_VIEWERS = 12  # most pages that receive data; further pages may still send commands to the rig
+_QUEUED = 60  # queued frames, 3 s. Larger: a slow browser shows older data. Smaller: a slowly drawing one is dropped
 
 
 class Viewers:
     """All connected browsers."""
 
     def __init__(self) -> None:
-        self.dropped = 0  # too slow browsers
+        self.dropped = 0  # number of browsers dropped as too slow
         self._queues: dict[ServerConnection, asyncio.Queue[bytes]] = {}
 
     def __len__(self) -> int:

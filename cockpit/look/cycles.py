@@ -27,7 +27,7 @@ def _is_our_book(path: Path) -> bool:
     try:
         with zipfile.ZipFile(path) as book, book.open("docProps/core.xml") as about:
             return f"<dc:creator>{_AUTHOR}</dc:creator>".encode() in about.read(1 << 16)
-    # raised by `zipfile` for no archive, a damaged or an encrypted one, or an unknown compression
+    # errors of `zipfile` for other files, for damaged or encrypted archives, and for an unknown compression
     except (OSError, zipfile.BadZipFile, KeyError, NotImplementedError, RuntimeError, EOFError, zlib.error):
         return False
 

@@ -13,11 +13,11 @@ from diagnosis.evidence.manifest import RigTable, RunTable
 from diagnosis.evidence.manifest_text import rig_lines
 from diagnosis.look.look import LookResult
 
-_LEAST_TOLERANCE = 0.01  # relative, for numbers with less scatter: sensors are calibrated to 1 %
-_FRICTION_TOLERANCE = 0.05  # of F_s and F_k: friction differs with the load of each slip
-_STRIBECK_TOLERANCE = 0.5  # one drive speed does not determine the Stribeck velocity
+_LEAST_TOLERANCE = 0.01  # least relative tolerance of a number: sensors are calibrated to 1 %
+_FRICTION_TOLERANCE = 0.05  # least relative tolerance of F_s and F_k: friction differs with the load of each slip
+_STRIBECK_TOLERANCE = 0.5  # relative; one drive speed does not determine the Stribeck velocity
 _OF_90 = 1.645  # standard deviations in half a 90 % interval
-_GUESSED_MPS = 5e-4  # Stribeck velocity of the paper's pairs
+_ASSUMED_MPS = 5e-4  # assumed Stribeck velocity, as of the paper's pairs
 
 
 def rig_of(seen: LookResult, file: str) -> tuple[RigTable, list[str]]:
@@ -42,7 +42,7 @@ def rig_of(seen: LookResult, file: str) -> tuple[RigTable, list[str]]:
     table = {
         "drive": "torsion" if seen.known.torsion else "spring",
         "tolerance": {},
-        "stribeck_velocity_mps": _GUESSED_MPS,
+        "stribeck_velocity_mps": _ASSUMED_MPS,
     }
     tolerance: dict[str, float] = {"stribeck_velocity_mps": _STRIBECK_TOLERANCE}
     wanted = (

@@ -21,8 +21,8 @@ def of_values(table: Table, columns: Mapping[str, Floats], findings: Sequence[Fi
 
     Args:
         table: the file.
-        columns: as read, [rows] each, by their names in the table.
-        findings: already reported.
+        columns: columns that were read, [rows] each, by their names in the table.
+        findings: findings that are already reported.
 
     """
     file = table.path.name

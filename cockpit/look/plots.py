@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _INK, _RED, _BLUE, _PALE = "#1f2d3a", "#b5402a", "#2a6fb5", "#9fb3c8"
-_COLUMNS = 2000  # of an envelope: more than the pixels of a screen
-_MOST_LAID = 200  # overlaid cycles
+_COLUMNS = 2000  # columns of an envelope, more than a screen has pixels
+_MOST_LAID = 200  # most cycles that are overlaid
 
 
 def pictures(seen: LookResult) -> list[tuple[str, str, "Figure"]]:
@@ -56,7 +56,7 @@ def whole(seen: LookResult, size_in: tuple[float, float] = (9.0, 3.2)) -> "Figur
 
 
 def laid_over(seen: LookResult) -> "Figure":
-    """Cycles, each from the re-stick before it to its own."""
+    """Overlaid cycles: each stick and slip, and as much time after the slip as it lasted."""
     figure, axes = _figure((9.0, 3.2))
     cycles = seen.cycles[:: max(len(seen.cycles) // _MOST_LAID, 1)]
     for cycle in cycles:
@@ -84,7 +84,7 @@ def histograms(seen: LookResult) -> "Figure":
     for axes, column, label in ((left, tops, of_tops), (right, dwells, "stick time [s]")):
         values = np.array(column)
         mean, middle = float(values.mean()), 0.5 * float(values.min() + values.max())
-        half = max(0.501 * float(np.ptp(values)), 0.01 * abs(mean))  # equal values: bins of a size that can be read
+        half = max(0.501 * float(np.ptp(values)), 0.01 * abs(mean))  # equal values need bins of a readable width
         bins = min(max(int(len(values) ** 0.5) + 1, 5), 40)
         axes.hist(values, bins=bins, range=(middle - half, middle + half), color=_PALE, edgecolor="white")
         axes.axvline(mean, color=_RED, linewidth=1.2)
@@ -132,7 +132,7 @@ def save(figure: "Figure", file: IO[bytes], kind: str, note: str) -> None:
 
 
 def as_svg(figure: "Figure") -> str:
-    """A figure as SVG for a page, on the ground of the page."""
+    """A figure as SVG for a page, with a transparent background."""
     from matplotlib import rc_context
 
     file = io.StringIO()

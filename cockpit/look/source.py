@@ -1,4 +1,4 @@
-"""A measured file with the given facts as one record; the assumptions as findings and as a map to correct."""
+"""Reads a measured file and the given facts into one record; reports its assumptions as findings and as a map to correct."""
 
 import json
 from pathlib import Path
@@ -45,11 +45,11 @@ class MeasuredRecord(NamedTuple):
     path: Path
     t_s: Floats
     force_N: Floats
-    position_m: Floats | None  # of the drive
+    position_m: Floats | None  # position of the drive
     known: RecordFacts
     findings: list[Finding]
     map_text: str  # map that reproduces this reading; empty if a map was given, or for a run log
-    of_load: bool  # the force is a friction coefficient, times the load if known
+    of_load: bool  # the force was read from a friction coefficient, times the load if known
 
 
 def read_record(path: Path, asked: LookOptions) -> MeasuredRecord:
@@ -79,10 +79,10 @@ def read_record(path: Path, asked: LookOptions) -> MeasuredRecord:
         raise Fault("CONFIG", f'{line} Add --time "NAME" or --rate 1kHz; columns here: {known}')
     torsion = bool(guessed.force) and (known_unit(table.unit(guessed.force)) or ("",))[0] == "torque"
     if asked.speed_turns not in (None, torsion):
-        what, example = ("torque", "10mrad/s or 5rpm") if torsion else ("force", "0.5mm/s")
-        raise Fault("CONFIG", f"--speed: {guessed.force!r} is a {what}: must be a speed such as {example}")
+        kind, example = ("torque", "10mrad/s or 5rpm") if torsion else ("force", "0.5mm/s")
+        raise Fault("CONFIG", f"--speed: {guessed.force!r} is a {kind}: must be a speed such as {example}")
     if torsion and guessed.position and (known_unit(table.unit(guessed.position)) or ("",))[0] == "length":
-        del channels["drive_position_m"]  # a displacement along the axis
+        del channels["drive_position_m"]  # on a turning rig a length is a displacement along the axis
         guessed = guessed._replace(position="")
     columns, findings = mapped(table, channels, asked.rate_Hz)
     findings = [Finding("assumed", path.name, "; ".join(guessed.reasons)), *findings, *_unitless(table, channels)]
@@ -136,7 +136,7 @@ def read_record(path: Path, asked: LookOptions) -> MeasuredRecord:
         and asked.speed_mps is None
         and len(table.columns[guessed.speed]) == len(columns["t_s"])
     ):
-        columns["drive_position_m"] = _way(
+        columns["drive_position_m"] = _displacement(
             columns["t_s"], _si(table, guessed.speed, "rad/s" if torsion else "m/s", findings)
         )
     known = RecordFacts(asked.speed_mps, load_N, asked.mass_kg, of_load and load_N is None, torsion)
@@ -216,7 +216,7 @@ def _si(table: Table, column: str, unit: str, findings: list[Finding]) -> Floats
     return table.column(column) * (known[1] if known else 1.0)
 
 
-def _way(t_s: Floats, speed_mps: Floats) -> Floats:
+def _displacement(t_s: Floats, speed_mps: Floats) -> Floats:
     """Displacement from a speed, [samples]."""
     steps = 0.5 * (speed_mps[1:] + speed_mps[:-1]) * np.diff(t_s)
     return np.concatenate([[0.0], np.cumsum(np.where(np.isfinite(steps), steps, 0.0))])
@@ -224,12 +224,12 @@ def _way(t_s: Floats, speed_mps: Floats) -> Floats:
 
 def _unitless(table: Table, channels: dict[str, ChannelMap]) -> list[Finding]:
     """A finding for each channel without a stated unit."""
-    taken = {"t_s": "s", "drive_force_N": "N", "drive_position_m": "m"}
+    assumed = {"t_s": "s", "drive_force_N": "N", "drive_position_m": "m"}
     return [
         Finding(
             "assumed",
             f"{table.path.name}: {channel.column}",
-            f"states no unit: taken as {taken[name]}; set unit = ... in a map if it is not",
+            f"states no unit: taken as {assumed[name]}; set unit = ... in a map if it is not",
         )
         for name, channel in channels.items()
         if channel.scale is None
@@ -245,7 +245,7 @@ def _is_time(table: Table, channel: ChannelMap) -> bool:
 
 def map_text(table: Table, channels: dict[str, ChannelMap], asked: LookOptions) -> str:
     """Map that reproduces the reading of the file, to correct and give to `--map`."""
-    lines = [f"# how {table.path.name} was read; correct mistakes and give this file to --map"]
+    lines = [f"# columns of {table.path.name} as they were read; correct mistakes and give this file to --map"]
     source: dict[str, Any] = dict(table.written)
     source.pop("columns", None)
     if "t_s" not in channels and (rate_Hz := asked.rate_Hz or table.sample_rate_Hz):

@@ -8,11 +8,11 @@ from bridge.log.watches.arrays import noise_of
 
 _FIRST = 20  # samples for the first estimate of the level
 _FEWEST = 50  # fewest samples of a stretch
-# Of the record: a shorter stretch is the foot of a climb, a longer stretch a record at rest.
+# Length of the stretch, as a share of the record: a shorter stretch belongs to a rise, a longer stretch is a record at rest.
 _LEAST_SHARE, _MOST_SHARE = 0.005, 0.5
-_STILL = 0.01  # of the range of the force: a smaller change is not a climb
+_STILL = 0.01  # share of the range of the force; a smaller change is not a rise
 _OF_NOISE = 6.0  # standard deviations: no sample of pure noise in a stretch exceeds them
-_LARGEST = 0.25  # of the force afterwards: a larger force belongs to a slide at rest under load
+_LARGEST = 0.25  # largest zero as a share of the force afterwards; a larger force is a load on a slide at rest
 
 
 def tare_of(force_N: Floats, position_m: Floats | None, where: str) -> tuple[float, list[Finding]]:
@@ -20,7 +20,7 @@ def tare_of(force_N: Floats, position_m: Floats | None, where: str) -> tuple[flo
 
     Args:
         force_N: [samples]; NaN: missing.
-        position_m: of the drive, [samples], if known.
+        position_m: position of the drive, [samples], if known.
         where: file and channel, for the finding.
 
     """
@@ -34,11 +34,11 @@ def tare_of(force_N: Floats, position_m: Floats | None, where: str) -> tuple[flo
     leaves = np.flatnonzero(np.abs(values - level) > allowed)
     if not len(leaves) or not max(_FEWEST, _LEAST_SHARE * len(values)) < leaves[0] < _MOST_SHARE * len(values):
         return 0.0, []
-    # the last tenth is the foot of the climb
+    # the last tenth may belong to the rise
     still = slice(0, int(0.9 * leaves[0]))
     halves = values[still][: len(values[still]) // 2 * 2].reshape(2, -1).mean(axis=1)
-    sure = _OF_NOISE * noise_of(values[still]) / np.sqrt(leaves[0] / 2.0) + 1e-3 * reach
-    if abs(float(halves[1] - halves[0])) > sure:  # it climbs slowly
+    allowed = _OF_NOISE * noise_of(values[still]) / np.sqrt(leaves[0] / 2.0) + 1e-3 * reach
+    if abs(float(halves[1] - halves[0])) > allowed:  # the force rises slowly
         return 0.0, []
     if position_m is not None and not _is_still(position_m[known], still):
         return 0.0, []
@@ -54,6 +54,6 @@ def tare_of(force_N: Floats, position_m: Floats | None, where: str) -> tuple[flo
 
 
 def _is_still(position_m: Floats, still: slice) -> bool:
-    whole = float(np.nanmax(position_m) - np.nanmin(position_m))
-    part = position_m[still]
-    return bool(np.nanmax(part) - np.nanmin(part) < _STILL * whole)
+    range_m = float(np.nanmax(position_m) - np.nanmin(position_m))
+    part_m = position_m[still]
+    return bool(np.nanmax(part_m) - np.nanmin(part_m) < _STILL * range_m)

@@ -1,4 +1,4 @@
-"""Claims of the paper against its model, a row each: claim, our number, criterion, pass or fail."""
+"""Claims of the paper against its model, a row each: claim, simulated number, criterion, pass or fail."""
 
 import math
 from collections.abc import Mapping
@@ -133,7 +133,7 @@ def _falling(values: list[float]) -> bool:
 
 
 def reference_rows(runs: Mapping[Key, PairRun]) -> list[PaperRow]:
-    """All numbers of the independent solution against ours."""
+    """All numbers of the independent solution against the simulated numbers."""
     rows: list[PaperRow] = []
     group = "Numbers against an independent solution"
     for (pair, frequency_Hz), reference in REFERENCE.items():

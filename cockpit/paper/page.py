@@ -38,7 +38,7 @@ class ReproduceResult(NamedTuple):
 
     @in_json
     def verdict(self) -> str:
-        """The line to print."""
+        """How many claims and checks hold, in one line."""
         held = sum(row.passed for row in self.rows)
         claims = [row for row in self.rows if row.group == PAPER_CLAIMS]
         claims_held = sum(row.passed for row in claims)

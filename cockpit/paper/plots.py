@@ -1,4 +1,4 @@
-"""The paper's Figures 2-4 and 6-9 from our runs, as PNG pictures inside the page."""
+"""The paper's Figures 2-4 and 6-9 from the simulated runs, as PNG pictures inside the page."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -55,7 +55,7 @@ def _sweep(runs: Mapping[Key, PairRun], number: str, pair: str) -> PageFigure:
     _labels(axes)
     return PageFigure(
         f"Figure {number}: {pair} N/mm², 0 to 5 kHz",
-        "The four seconds after the vibration comes on at t = 8 s, with the same seconds without it on the "
+        "The four seconds after the vibration starts at t = 8 s, with the same seconds without it on the "
         "left. The swing of F_d and the steps of x shrink from left to right; from 4 kHz on both vanish.",
         _png(figure),
     )
@@ -70,7 +70,7 @@ def _one_and_three_kHz(runs: Mapping[Key, PairRun], number: str, pair: str) -> P
     _labels(axes)
     return PageFigure(
         f"Figure {number}: {pair} N/mm² at 1 and 3 kHz",
-        "The whole course. The vibration comes on at the dotted line.",
+        "The whole run. The vibration starts at the dotted line.",
         _png(figure),
     )
 
@@ -95,7 +95,7 @@ def _against_frequency(runs: Mapping[Key, PairRun], number: str, material: str) 
     return PageFigure(
         f"Figure {number}: {material}, largest and smallest drive force against frequency",
         "Means over the cycles of t = 10.5-20 s. To the right of the dotted line v_a exceeds v_d: the two "
-        "curves meet, and the force falls on.",
+        "curves meet, and the force falls further.",
         _png(figure),
     )
 

@@ -21,13 +21,13 @@ DRIVE_VELOCITY_MPS: Final = 0.0005
 VIBRATION_FROM_S: Final = 8.0
 DURATION_S: Final = 20.0
 CYCLES_FROM_S: Final = 10.5
-# A loaded spring releases one slip (36 ms) when the vibration starts; it is over by this time.
+# When the vibration starts, the loaded spring releases one slip (36 ms), which is over by this time.
 RELEASED_S: Final = 8.1
-# At 5 kHz the force is still climbing by 0.1 N at 10.5 s; from 16 s on it moves by less than 0.03 N.
+# At 5 kHz the force still climbs by 0.1 N from 10.5 s on; from 16 s on it changes by less than 0.03 N.
 SETTLED_FROM_S: Final = 16.0
 
-# Below 2 kHz a run is chaotic: the phase at which the vibration starts decides the next cycles, and the mean period
-# of a run scatters by 0.8 %. 16 starts spread over two seconds bring the mean to 0.2 %.
+# Below 2 kHz a run is chaotic: the phase at which the vibration starts determines the next cycles, and the mean period
+# of a run scatters by 0.8 %. The mean of 16 starts, spread over two seconds, scatters by 0.2 %.
 ENSEMBLE_BELOW_HZ: Final = 2000
 ENSEMBLE_STARTS_S: Final = tuple(VIBRATION_FROM_S + 0.131 * start for start in range(16))
 
@@ -46,8 +46,7 @@ class Course(NamedTuple):
 class Measured(NamedTuple):
     """Measurements of one run: cycle means over t = 10.5-20 s, and the level of the force over t = 16-20 s.
 
-    The first five are nan without slips in that time. `late_slips` counts from the end of the release at
-    switch-on.
+    The first five are nan without slips in that time. `late_slips` counts from RELEASED_S on.
     """
 
     force_max_N: float

@@ -22,9 +22,9 @@ from cockpit.review.differences import differences, parameters_of
 from diagnosis.slips import Cycles
 
 FORMAT = "stickslip-review/1"
-# of all logs together, for longer runs: 11 signals of three values then take 3.5 MB; two runs of 20 s take 4.5 MB
+# Bins of all logs together; longer runs have wider bins. 11 signals of three values then take 3.5 MB, two runs of 20 s 4.5 MB.
 _MOST_BINS = 20_000
-_MOST_EVENTS = 2000  # listed per log
+_MOST_EVENTS = 2000  # events listed per log
 
 
 def review_data(paths: Sequence[Path], made: Provenance) -> tuple[dict[str, Any], list[RunVerdict]]:
@@ -61,9 +61,8 @@ def _grid(runs: Sequence[RunData]) -> Grid:
         return Grid(0.0, 1e-3, 1)
     start_s, end_s = min(float(times.min()) for times in t_s), max(float(times.max()) for times in t_s)
     step_s = min(block_period_ns(run.sensors) for run in runs if len(run.sensors)) * 1e-9
-    most = _MOST_BINS
-    if (end_s - start_s) / step_s > most:
-        step_s = (end_s - start_s) / (most // len(runs))
+    if (end_s - start_s) / step_s > _MOST_BINS:
+        step_s = (end_s - start_s) / (_MOST_BINS // len(runs))
     return Grid(start_s, step_s, math.floor((end_s - start_s) / step_s + 0.5) + 1)
 
 
@@ -96,8 +95,8 @@ def _figures(verdicts: Sequence[RunVerdict]) -> list[dict[str, Any]]:
     for verdict in verdicts:
         lines: dict[str, list[str]] = {}
         for line in in_words(verdict, verbose=True)[1:]:
-            what, _, words = line.partition(" ")
-            lines.setdefault(what, []).append(words.strip())
+            title, _, words = line.partition(" ")
+            lines.setdefault(title, []).append(words.strip())
         tables.append(lines)
     names = list(dict.fromkeys(name for lines in tables for name in lines if name != "log"))
     return [{"what": name, "logs": [lines.get(name, []) for lines in tables]} for name in names]
@@ -158,7 +157,7 @@ def _packed(values: Floats) -> str:
 
 
 def _events(run: RunData) -> list[dict[str, Any]]:
-    # stalls of the computer may be many: they must not crowd out other events
+    # stalls of the computer may be many, so they are left out first
     first = sorted(run.events, key=lambda event: (event.code.endswith("PAUSE"), event.t_ns))[:_MOST_EVENTS]
     events = sorted(first, key=lambda event: event.t_ns)
     return [

@@ -1,4 +1,4 @@
-"""One log, or two overlaid, as one HTML file that loads nothing."""
+"""One log, or two overlaid, as one HTML file that works offline."""
 
 import json
 from collections.abc import Sequence

@@ -18,9 +18,9 @@ from bridge.wire.loopback_users import ROLES
 from cockpit.run.writable import writing
 
 _AUTHORITY_DAYS = 3650
-_ROLE_DAYS = (
-    825  # the longest that browsers accept. Longer: a lost key stays valid longer. Shorter: renewed more often.
-)
+# Validity of a role's certificate, the longest that browsers accept. Longer: a lost key stays valid longer. Shorter: certificates
+# are renewed more often.
+_ROLE_DAYS = 825
 _EARLIER = datetime.timedelta(minutes=5)  # certificates are valid from this time before now: clocks of computers differ
 
 
@@ -37,7 +37,7 @@ def make_certificates(folder: Path, hosts: list[str]) -> Made:
     """Make the certificates of all roles, signed by the authority in the folder, or by a new one.
 
     Args:
-        folder: for the certificates; created if missing. Keys have mode 0600.
+        folder: folder for the certificates; created if missing. Keys have mode 0600.
         hosts: further names and addresses of the rig's computer.
 
     Raises Fault CONFIG for an invalid host name, LOG_WRITE if the folder is not writable, NOT_SECURE if a certificate exists

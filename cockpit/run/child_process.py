@@ -18,13 +18,13 @@ from bridge.faults import Fault
 from bridge.plain import print_line
 from bridge.wire import realtime
 
-_PARENT_CHECK_S = 0.25
+_PARENT_CHECK_S = 0.25  # interval at which the death of the parent is noticed
 # Work that takes longer prints a line. Larger: the operator waits without a message. Smaller: on a busy computer short runs
 # print it too.
 _LONG_S = 2.0
 # full disk, size limit, quota, closed terminal, closed file
 _STDOUT_REFUSED = frozenset({errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO, errno.EBADF})
-_LONGEST_NAME = 255  # characters of a file name; a longer text only contains the name
+_LONGEST_NAME = 255  # characters of the longest file name; a longer text merely contains a name
 # modules of `stickslip[all]` that a plain installation lacks
 EXTRA_MODULES = frozenset(
     {
@@ -240,12 +240,12 @@ def _status(work: Callable[[], int | None], as_json: bool) -> int:
     except KeyboardInterrupt as ended:
         return report(Fault("INTERRUPTED", f"stopped by {str(ended) or 'Ctrl-C'}"), as_json)
     except MemoryError:
-        files = ", ".join(word for word in sys.argv[1:] if os.access(word, os.F_OK)) or "the command"
+        files = ", ".join(argument for argument in sys.argv[1:] if os.access(argument, os.F_OK)) or "the command"
         line = (
             f"{files}: needs more memory than is free; end other programs, or use a larger computer or a smaller file"
         )
         return report(Fault("NO_MEMORY", line), as_json)
-    except UnicodeEncodeError as error:  # from a library that accepts only UTF-8 names; stdout itself escapes them
+    except UnicodeEncodeError as error:  # raised by a library that accepts only UTF-8 names; stdout escapes such names
         name = error.object if len(error.object) <= _LONGEST_NAME else error.object[error.start : error.end]
         shown = name.encode(errors="backslashreplace").decode()
         line = f"{shown}: must be UTF-8; rename it"

@@ -29,7 +29,7 @@ Pair = tuple[npt.NDArray[Any], npt.NDArray[Any]]  # parameters and memory, one r
 
 
 class Stretch(NamedTuple):
-    """Messages and truth of one stretch of a run, [blocks] each but the announcements."""
+    """Messages and truth of one stretch of a run; each has [blocks], except the announcements."""
 
     sensors: Records
     applied: Records
@@ -37,13 +37,13 @@ class Stretch(NamedTuple):
     trace: Records
     announce: Records  # [announcements]
     truth: Floats  # [blocks, 6, samples], rows as `plant.records.TRUTH`
-    v_a_mps: Floats  # of the base at the end of each block
-    frequency_Hz: Floats  # of the exciter
+    v_a_mps: Floats  # v_a of the base at the end of each block
+    frequency_Hz: Floats  # frequency of the exciter
     gain: Floats  # v_a for one metre of commanded amplitude at that frequency
 
 
 def advancing(answer: Callable[..., None]) -> Callable[..., int]:
-    """The kernel that advances a rig and its subject, which answers each sensor block by the kernel `answer`.
+    """The kernel that advances a rig and a subject; the subject answers each sensor block by the kernel `answer`.
 
     Args:
         answer: fills row `i` of `made.command` and `made.trace`; its arguments are subject, i, announce, events, made.
@@ -63,13 +63,13 @@ def advancing(answer: Callable[..., None]) -> Callable[..., int]:
         """Advance by many blocks, in place; return the number of blocks done.
 
         Args:
-            plant, guard: their memory is advanced.
+            plant, guard: parameters and memory of each; the memory is advanced.
             subject: passed to `answer`.
-            inputs: of the rig.
+            inputs: inputs of the rig.
             operator_events: bits STOP and RESET of `bridge.wire.messages`, for the first block.
             command: the answer to the block before the first, [1]; [0] at the start of a run.
             analogue: [5, samples], overwritten by every block.
-            made: filled.
+            made: receives messages and truth.
 
         Stops early, before a block in which the slide's velocity becomes NaN or infinite.
 
@@ -118,7 +118,7 @@ class ClosedLoop:
 
     Args:
         rig: the rig file.
-        seed: of the sensor noise.
+        seed: seed of the sensor noise.
         config: the controller's configuration, with the `block_s` and `samples_per_block` of the rig.
         arm: whether the rig starts ARMED.
 
@@ -148,9 +148,9 @@ class ClosedLoop:
         """Continue with another configuration of the controller and its present memory."""
         self._controller = controller_records(config)[0], self.controller_state
 
-    def apply_order(self, word: int) -> None:
-        """The rig receives an operator command, a `wire.Operator.Action`, before its next block."""
-        apply_order(self._guard[1][0], word)
+    def apply_order(self, action: int) -> None:
+        """Give the rig an operator command, a `wire.Operator.Action`, before its next block."""
+        apply_order(self._guard[1][0], action)
 
     def advance(self, blocks: int, operator_events: int = 0) -> Stretch:
         """Advance by `blocks`; the controller receives `operator_events` in the first block.

@@ -133,7 +133,7 @@ def _first_step(loop: ClosedLoop, t_ns: int) -> int:
 
 
 class _Events:
-    """Writes the events of rig and controller as their processes publish them."""
+    """Writes the events of rig and controller to the log, as separate processes would publish them."""
 
     def __init__(self, log: RunLog, judge: "RunJudge | None") -> None:
         self._log, self.judge = log, judge
@@ -149,7 +149,7 @@ class _Events:
         self._sequence[source] += 1
 
     def of(self, made: Stretch) -> dict[int, list[tuple[str, str, str]]]:
-        """Events of guard and controller in a stretch: source, code and text, by the number of the block before."""
+        """Events of guard and controller in a stretch: source, code and text, by the number of the block that each follows."""
         events: dict[int, list[tuple[str, str, str]]] = {}
         for row in changes(made.applied):
             block = int(made.applied["sequence"][row])
@@ -169,8 +169,8 @@ def _write(log: RunLog, publish: _Events, end: int, block_ns: int, made: Stretch
     news = publish.of(made)
     tables = {SENSORS: made.sensors, APPLIED: made.applied, COMMAND: made.command, TRACE: made.trace}
     # a stretch that was cut short begins or ends with an incomplete period of the state message
-    whole = min(begin + -begin % STATE_EVERY, end), max(end - end % STATE_EVERY, begin)
-    cuts = {begin, *whole, end}
+    periods = min(begin + -begin % STATE_EVERY, end), max(end - end % STATE_EVERY, begin)
+    cuts = {begin, *periods, end}
     for block in news:  # an event is written after its block; the parts around it hold whole periods or none
         period = block - block % STATE_EVERY
         cuts |= {max(period, begin), block + 1, min(period + STATE_EVERY, end)}

@@ -15,7 +15,7 @@ def step_reports(quiet: bool) -> Generator[StepReport]:
     """A function that prints a line on stderr, e.g. `waiting  for a rig`, in a thread: Ctrl-S must not stall a control loop.
 
     Args:
-        quiet: for a child of `stickslip run`: print only once, at the first line, that everything is loaded.
+        quiet: print only once, at the first line, that everything is loaded, as a child of `stickslip run` does.
 
     """
     if quiet:
@@ -23,12 +23,12 @@ def step_reports(quiet: bool) -> Generator[StepReport]:
         return
     lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
 
-    def print_them() -> None:
+    def print_lines() -> None:
         while (line := lines.get()) is not None:
             print_line(line)
 
-    # Started before the process claims its priority, which a thread inherits. This thread may hold Python's lock.
-    thread = threading.Thread(target=print_them, name="telling", daemon=True)
+    # Started before the process claims its priority for all its threads, this one too: the loop may wait for its Python lock.
+    thread = threading.Thread(target=print_lines, name="step lines", daemon=True)
     thread.start()
     try:
         yield lambda label, text: lines.put(f"{label:<8} {text}")

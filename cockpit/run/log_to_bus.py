@@ -24,12 +24,12 @@ from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, PLANT_EVENT, SENSORS,
 from bridge.wire.zenoh_link import Bus, BusConfig
 from plant.app import wait_for_peers
 
-_GOODBYE_S = 1.0
-_KEY_LOOK_S = 0.05
+_GOODBYE_S = 1.0  # longest wait at the end until the other processes have left the bus
+_KEY_LOOK_S = 0.05  # interval at which keys are read
 
 
 class _Pause:
-    """Switched by a key or a signal. No Event: a signal within its `set` would wait for its lock for ever."""
+    """Pause of a replay, switched by a key or a signal. Not an Event, whose `set` would hang if a signal interrupted it."""
 
     on = False
 

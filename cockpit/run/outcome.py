@@ -9,13 +9,13 @@ from cockpit.judge.verdict_words import in_words
 
 
 class RunOutcome(NamedTuple):
-    """Verdict of a run, and its rig."""
+    """Verdict on a run, name and effects of its rig."""
 
     verdict: RunVerdict
     rig: str
-    effects: list[str]  # of the rig
-    loop: Margins | None  # only for a rig with effects, for which the loop was not designed
-    without: Phase | None  # the stretch `after`, simulated without the controller, with `--without`
+    effects: list[str]  # effects of the rig
+    loop: Margins | None  # None for a rig without effects, as the loop was designed for it
+    without: Phase | None  # the stretch `after`, simulated without the controller; None without the option `--without`
     JSON_MERGED = "verdict"
     JSON_OPTIONAL = "effects", "loop", "without"
 

@@ -19,13 +19,13 @@ from cockpit.run.child_process import endings_handled
 from cockpit.run.writable import stamp_of
 
 _GRACE_S = 6.0  # time for a child to fade out, leave the bus and close the log, before it is killed
-_LOOK_S = 0.05
-_REPORT_S = 30.0  # between two lines about a run that has not begun
-_FOREVER_S = 1e6  # for a child: its parent supervises the others, and ends it
+_LOOK_S = 0.05  # interval of the checks of the children
+_REPORT_S = 30.0  # time between two lines about a run that has not begun
+_FOREVER_S = 1e6  # time for which a child waits for the others: the parent supervises them, and ends the child
 _WARNING = "stickslip: warning: "  # prefix of a child's line that is passed on to the operator at once
 # progress of a child, as printed
 STARTS, COMPILES, READY = "starts", "compiles", ""
-# in this order they are asked to stop: the plant fades the vibration out and sends END to the others
+# order in which the processes are asked to stop: the plant first fades the vibration out and sends END to the others
 _ROLES = ("plant", "controller", "recorder")
 
 
@@ -34,7 +34,7 @@ class Child:
 
     def __init__(self, role: str, arguments: list[str]) -> None:
         self.role = role
-        # in a new session: Ctrl-C reaches only the parent, which ends the children in order
+        # started in a new session: Ctrl-C reaches only the parent, which ends the children in order
         self.process = subprocess.Popen(
             # -P: otherwise Python would import a plant.py from the current folder first
             [sys.executable, "-P", "-m", "cockpit", role, *arguments, "--child", str(os.getpid())],
@@ -46,7 +46,7 @@ class Child:
         )
         self._lines: list[str] = []
         self.still = STARTS
-        self.left = (0, 0)  # kernels to compile, of how many
+        self.left = (0, 0)  # number of kernels left to compile, and of all that need compilation
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
@@ -146,7 +146,7 @@ def _ctrl_c_afterwards() -> Generator[None]:
 
 
 class StartWatch:
-    """Until the log begins: reports every 30 s which processes still start or compile.
+    """Reports every 30 s, until the log begins, which processes still start or compile.
 
     A first start compiles for up to a minute, on a busy or small computer for several minutes. So no time limit is set.
     """
@@ -188,7 +188,7 @@ class StartWatch:
 
 
 def _until_the_end(children: list[Child], beginning: StartWatch) -> None:
-    """Wait until all have ended with status 0; raise the fault of the first that has not."""
+    """Wait until all children have ended with status 0. Raises the Fault of the child that failed first."""
     while True:
         beginning.look()
         ended = [child for child in children if child.process.poll() is not None]
@@ -220,7 +220,7 @@ def _fault(failed: list[Child]) -> Fault:
 
 
 def _stop(children: list[Child]) -> None:
-    """Ask all to stop, in order, and kill those that do not."""
+    """Ask all children to stop, in order, and kill each that has not ended in time."""
     for child in children:
         if child.process.poll() is None:
             child.process.terminate()

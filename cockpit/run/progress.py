@@ -21,8 +21,8 @@ from bridge.wire.topics import APPLIED, COMMAND, CONTROLLER_EVENT, PLANT_EVENT, 
 from bridge.wire.words import word_of
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
 
-_LOOK_S = 0.1
-_SHOWN_S = 3.0  # of an event that is no failure
+_LOOK_S = 0.1  # interval of the updates of the line
+_SHOWN_S = 3.0  # time for which an event is shown; a failure is shown to the end of the run
 _ROLES = ("controller", "recorder")
 _EVENTS = (PLANT_EVENT, CONTROLLER_EVENT, RECORDER_EVENT)
 
@@ -32,7 +32,7 @@ def progress_line(
 ) -> str:
     """The state of the run in one line, with the number and total length of the computer's stalls."""
     t_s = state.t_ns * 1e-9
-    # none for a run without an end
+    # a run without an end has no bar
     bar = f"[{'#' * round(20 * min(t_s / duration_s, 1.0)):<20}] " if duration_s else ""
     ratio = f"v_a/v_d {state.velocity_ratio:4.2f}" if state.velocity_ratio > 0.01 else "no vibration"
     paused = f"  computer stalled {pauses} x, {paused_ms:.0f} ms" if pauses else ""
@@ -64,7 +64,7 @@ class _EventWatch:
 
     def __init__(self) -> None:
         self.pauses, self.paused_ms = 0, 0.0
-        self._shown_until_s: dict[str, float] = {}  # by code; a failure is shown to the end of the run
+        self._shown_until_s: dict[str, float] = {}  # by code
 
     def note(self, received: Received) -> None:
         """Take an event. Raises Fault BAD_MESSAGE."""
@@ -80,7 +80,7 @@ class _EventWatch:
 
 
 def _warnings(roles: Iterable[str], newest: Mapping[str, bytes]) -> list[str]:
-    """Missing roles, no fresh command, a weak or doubted sensor or exciter. Raises Fault BAD_MESSAGE."""
+    """Warnings of missing roles, of no fresh command, of a weak or doubted sensor or exciter. Raises Fault BAD_MESSAGE."""
     lines = [f"no {role}" for role in _ROLES if role not in roles]
     if APPLIED.name in newest and parsed(wire.Applied, newest[APPLIED.name], APPLIED.name).fallback:
         lines.append("FALLBACK: no fresh command")

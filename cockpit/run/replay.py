@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 Headers = dict[str, dict[str, str]]
 
-_REPLAYED = frozenset({"sensors", "command", "trace", "announce", "snapshot"})  # topics
+_REPLAYED = frozenset({"sensors", "command", "trace", "announce", "snapshot"})  # topics that a replay needs
 _LATEST_S = 1e9  # 32 years; a log counts nanoseconds in 64 bits, 1.8e10 s
 
 
@@ -47,12 +47,12 @@ def changes_of(run: RunData, settings: list[str]) -> list[Change]:
 
 
 def _changes_of(headers: Headers, path: Path, settings: list[str], end_ns: int | None) -> list[Change]:
-    """`changes_of` for a log that ends at `end_ns`; None if the end is not known yet."""
+    """Changes as by `changes_of`, for a log that ends at `end_ns`; None if the end is not known yet."""
     recorded = table = configuration_of(headers, "controller", path)
-    validate(ControllerConfig, recorded, path.name)  # without settings, so that a fault names the log
+    validate(ControllerConfig, recorded, path.name)  # checked before the settings, so that a fault names the log
     source = f"{path.name} with --set" if settings else path.name
     timed: dict[int, list[str]] = {0: []}
-    for setting in [*_timed_then(headers, path), *settings]:
+    for setting in [*_recorded_changes(headers, path), *settings]:
         plain, _, time = setting.rpartition("@")
         t_ns = 0
         if plain:
@@ -72,12 +72,12 @@ def _changes_of(headers: Headers, path: Path, settings: list[str], end_ns: int |
     return changes
 
 
-def _timed_then(headers: Headers, path: Path) -> list[str]:
+def _recorded_changes(headers: Headers, path: Path) -> list[str]:
     """Settings `key=value@TIME` of the `--closed-loop` run that wrote this log; settings from the start are in the header."""
     return [setting for setting in texts_of(headers, "run", "settings", path) if "@" in setting]
 
 
-def _words_of(run: RunData) -> "list[TimedAction]":
+def _commands_of(run: RunData) -> "list[TimedAction]":
     """Operator commands to controller and rig, with their times."""
     from cockpit.run.in_process import TimedAction
 
@@ -102,11 +102,11 @@ class Replayed(NamedTuple):
     log: str
     identical: bool
     compared_steps: int
-    skipped_steps: int  # could not be rebuilt
+    skipped_steps: int  # steps that could not be rebuilt from the log
     difference: ReplayDifference | None
     likely_reason: str
-    changed: bool  # by a setting
-    damage: list[str]  # of the log; the damaged part was not replayed
+    changed: bool  # a setting changed the controller
+    damage: list[str]  # damage of the log; the damaged part was not replayed
 
     def in_words(self) -> list[str]:
         """Lines for the operator."""
@@ -128,7 +128,7 @@ class Replayed(NamedTuple):
         ]
         if self.changed:
             lines.append(
-                "  the recorded plant received the old commands; with the new ones it would have moved differently from then on: "
+                "  the recorded plant received the recorded commands; with the new commands it would have moved differently: "
                 "--closed-loop simulates this"
             )
         return lines
@@ -172,7 +172,7 @@ def _one_pass(
     """
     steps = end_ns = 0
     changes, replayer = None, None
-    waiting: list[Piece] = []  # for the configuration
+    waiting: list[Piece] = []  # pieces read before the configuration
     out_of_order = False
     for piece in iter_pieces(reader, _REPLAYED):
         if piece.topic == "trace" and len(piece.records):
@@ -258,7 +258,7 @@ class Compared(NamedTuple):
 
     was: RunFigures
     now: RunFigures
-    log: str  # of the new run
+    log: str  # log of the new run
 
     def in_words(self) -> list[str]:
         """A table for the operator."""
@@ -294,7 +294,7 @@ def closed_loop(path: Path, settings: list[str], log: Path) -> Compared:
     scenario = validate(Scenario, table, path.name)
     about = about_run(scenario, lockstep=True) | {
         "closed_loop_of": str(path),
-        "settings": [*_timed_then(run.headers, path), *settings],
+        "settings": [*_recorded_changes(run.headers, path), *settings],
     }
-    run_onboard(scenario, log, about, changes=changes[1:], words=_words_of(run))
+    run_onboard(scenario, log, about, changes=changes[1:], words=_commands_of(run))
     return Compared(outcome(run), outcome(read_run(log)), str(log))

@@ -97,9 +97,9 @@ def run_scenario(
     if lockstep or not in_process:
         refuse_faults(scenario, lockstep)
     if not in_process:
-        rig_security(scenario.bus)  # its warning is visible here, and its fault is raised before anything starts
+        rig_security(scenario.bus)  # called here so that its warning is visible and its fault precedes every start
     if endless and in_process:
-        _refuse_little_room(path)
+        _refuse_full_disk(path)
     if endless:
         print_line(f"{'simulating' if in_process else 'running'} until Ctrl-C; log {path}")
     interrupted, by, made = False, "Ctrl-C", _InProcessRun(None, [], stopped=False)
@@ -118,7 +118,7 @@ def run_scenario(
         interrupted, by = True, str(ended) or by
     except Fault:
         if in_process and stamp_of(path) != before:
-            _say_verdict(path)
+            _print_verdict(path)
         raise
     if interrupted and stamp_of(path) == before:
         raise Fault("INTERRUPTED", f"stopped by {by} before anything was recorded")
@@ -133,11 +133,11 @@ class _InProcessRun(NamedTuple):
     """Results of a run in one process, in addition to its log."""
 
     judge: "RunJudge | None"  # has received every message; None if the log must be read
-    events: list[str]  # not in the log
-    stopped: bool  # by Ctrl-C or a signal
+    events: list[str]  # events that the log lacks
+    stopped: bool  # the run was stopped by Ctrl-C or a signal
 
 
-def _say_verdict(path: Path) -> None:
+def _print_verdict(path: Path) -> None:
     """Write the verdict on the recorded part to stderr; nothing if the log holds no block."""
     from cockpit.judge.judged import judge
     from cockpit.judge.verdict_words import in_words
@@ -162,7 +162,7 @@ def _judged(scenario: Scenario, path: Path, interrupted: str, without: bool, mad
     from cockpit.run.outcome import RunOutcome
 
     if interrupted and scenario.duration_s:
-        _say_verdict(path)
+        _print_verdict(path)
         raise Fault("INTERRUPTED", interrupted)
     effects = list(scenario.rig.effects)
     if made.judge is not None:
@@ -194,7 +194,7 @@ def _free_bytes(path: Path) -> int:
     return shutil.disk_usage(next(parent for parent in path.absolute().parents if parent.exists())).free
 
 
-def _refuse_little_room(path: Path) -> None:
+def _refuse_full_disk(path: Path) -> None:
     """Raise Fault LOG_WRITE if a run without an end would end at once for lack of space."""
     if (free := _free_bytes(path)) < _LEAST_FREE_BYTES:
         line = f"{path}: {free / 1e6:.0f} MB are free: a run without an end in one process writes some 2 GB per minute"

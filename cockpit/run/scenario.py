@@ -23,7 +23,7 @@ from plant.config_limits import refuse_what_no_rig_does
 from plant.faults.kinds import PROCESS
 from plant.faults.table import FaultTable
 
-# Shorter: the command for a block arrives after the next block is due.
+# Shortest block in real time. Shorter: the command for a block arrives after the next block is due.
 _SHORTEST_IN_REAL_TIME_S = 1e-3
 
 
@@ -42,7 +42,7 @@ class LogTable(Strict):
 
     @property
     def rotation(self) -> Rotation:
-        """These limits for the writer of the log."""
+        """The limits in the units of the log writer."""
         return Rotation(round(self.file_MB * 1e6), self.file_s)
 
 
@@ -68,9 +68,9 @@ class Scenario(Strict):
         refuse_what_no_rig_does(self.rig)
         solver, controller = self.rig.solver, self.controller
         for name in ("block_s", "samples_per_block"):
-            theirs, ours = getattr(solver, name), getattr(controller, name)
-            if theirs != ours:
-                raise ValueError(f"controller.{name} = {ours}: must equal rig.solver.{name} = {theirs}")
+            of_rig, of_controller = getattr(solver, name), getattr(controller, name)
+            if of_rig != of_controller:
+                raise ValueError(f"controller.{name} = {of_controller}: must equal rig.solver.{name} = {of_rig}")
         # beyond its limits the rig would vibrate at another frequency than the controller commands and measures v_a at
         candidates_Hz, piezo = candidate_frequencies_Hz(controller), self.rig.piezo
         lowest_Hz, highest_Hz = candidates_Hz[0], candidates_Hz[-1]
@@ -78,11 +78,11 @@ class Scenario(Strict):
             ("frequency_min_Hz", lowest_Hz, lowest_Hz < piezo.frequency_min_Hz),
             ("frequency_max_Hz", highest_Hz, highest_Hz > piezo.frequency_max_Hz),
         ):
-            theirs_Hz, ours_Hz = getattr(piezo, name), getattr(controller.limits, name)
+            rig_Hz, limit_Hz = getattr(piezo, name), getattr(controller.limits, name)
             if beyond:
                 raise ValueError(
-                    f"controller.limits.{name} = {ours_Hz:g}: the controller would command {commanded_Hz:g} Hz, beyond "
-                    f"rig.piezo.{name} = {theirs_Hz:g}; set it to {theirs_Hz:g} as well"
+                    f"controller.limits.{name} = {limit_Hz:g}: the controller would command {commanded_Hz:g} Hz, beyond "
+                    f"rig.piezo.{name} = {rig_Hz:g}; set it to {rig_Hz:g} as well"
                 )
         for low_Hz, high_Hz in self.rig.guard.forbidden_Hz:
             for candidate_Hz in candidates_Hz:
@@ -120,9 +120,9 @@ def refuse_short_blocks(scenario: Scenario) -> None:
 
 
 def refuse_faults(scenario: Scenario, lockstep: bool) -> None:
-    """Raise Fault CONFIG for faults that several processes cannot have.
+    """Raise Fault CONFIG for faults that a run of several processes cannot have.
 
-    In lockstep faults of bus and processes; in real time faults of processes, which only the operator may end.
+    In lockstep these are faults of bus and processes; in real time faults of processes, which only the operator may end.
     """
     for number, table in enumerate(scenario.fault):
         if lockstep and table.needs_time:

@@ -1,8 +1,8 @@
-"""The sensors of a scenario against its description: range, noise, resolution and band that the motion needs.
+"""Checks before a run that its sensors have the range, noise, resolution and bandwidth to show the described motion.
 
-Before a run, so that no verdict rests on a sensor that cannot show the motion. The number to use in a refusal has room: 1.25
-times the largest force or travel, twice the largest acceleration or the frequency, half of a limit of noise, a quarter of a limit
-of steps. Faults (`[[fault]]`) do not belong to the description. Figures below: shipped and drawn axes, docs/method/sensors.md.
+So no verdict rests on a sensor that cannot show the motion. A refusal recommends a value with a margin: 1.25 times the largest
+force or travel, twice the largest acceleration or the frequency, half of a limit of noise, a quarter of a limit of resolution.
+Faults (`[[fault]]`) do not belong to the description. Figures below: shipped and drawn axes, docs/method/sensors.md.
 """
 
 import math
@@ -15,21 +15,23 @@ from plant.config import RigConfig, SensorsConfig
 from plant.drive_motion import DriveMotion, lowest_mps, reach_m
 from plant.records import build
 
-_ROOM = 1.25  # of a range over the largest value. Smaller: noise and overshoot reach its end; larger: coarser sensors are advised
-# A slip over the noise of a sample, of force and positions. Larger: forces with 9 are refused, which show each slip; smaller:
-# with 4.5 the controller doubts the force, with 2.2 the judge counts no slip.
+# Recommended range over the largest value. Smaller: noise and overshoot reach its end. Larger: coarser sensors are advised.
+_MARGIN = 1.25
+# Least size of a slip in rms noises of a sample, for force and positions. Larger: force sensors with 9 are refused, which show
+# each slip. Smaller: with 4.5 the controller doubts the force, with 2.2 the judge counts no slip.
 _NOISES_A_SLIP = 5.0
-# The amplitude of the base over the noise of a sample. Larger: 44 is refused, which holds v_a; smaller: with 22 the controller
-# goes to open loop, and the axis slips.
+# Least acceleration of the base in rms noises of a sample. Larger: 44 is refused, with which v_a is held. Smaller: with 22 the
+# controller goes to open loop, and the axis slips.
 _NOISES_AN_AMPLITUDE = 32.0
-# A slip, or the amplitude of the base, over the resolution. Larger: 99 is refused, which shows each slip; smaller: with 81 a
-# channel counts as frozen, clipped or of a wrong scale. Noise hides steps up to twice its size, as on drawn stiff axes with steps
-# of a slip.
+# Least size of a slip, or acceleration of the base, in steps of the resolution. Larger: 99 is refused, which shows each slip.
+# Smaller: with 81 a channel counts as frozen, clipped or of a wrong scale. Noise hides steps up to twice its size, even where a
+# slip is as small as a step.
 _STEPS, _HIDDEN = 96.0, 2.0
-# Time in which the drive's travel counts like a slip for the noise of its position. Larger: noise of 10 um passes on a ball
-# screw, and hides slips; smaller: a feed of 0.02 mm/s without slips is refused, which the controller follows.
-_WAY_S = 0.125
-# Band over the frequency of the slide on its spring. Larger: 0.5 is refused, which shows each slip; smaller: 0.46 passes.
+# Time in which the travel of the drive counts like a slip for the noise of its position. Larger: noise of 10 um passes on a ball
+# screw, and hides slips. Smaller: a feed of 0.02 mm/s without slips is refused, which the controller follows.
+_TRAVEL_S = 0.125
+# Least bandwidth over the frequency of the slide on its spring. Larger: 0.5 is refused, which shows each slip. Smaller: 0.46
+# passes.
 _LEAST_BAND = 0.5
 
 
@@ -63,11 +65,11 @@ def refuse_out_of_travel(rig: RigConfig, duration_s: float) -> None:
     reached_m = highest_m if is_beyond else lowest_m
     why = f"the drive goes to {reached_m * 1e3:.6g} mm within duration_s = {duration_s:g}, {ends}"
     name, rounded = ("range", _above) if is_beyond else ("lowest", _below)
-    _refuse(f"sensors.position_{name}_m", end_m, why, f"{rounded(_ROOM * reached_m):g}, or shorten the run")
+    _refuse(f"sensors.position_{name}_m", end_m, why, f"{rounded(_MARGIN * reached_m):g}, or shorten the run")
 
 
 def _until_s(rig: RigConfig, motion: DriveMotion, duration_s: float) -> float:
-    """End of the motion that is checked: of a run without an end one cycle, or until its last velocity has left every range."""
+    """End of the checked motion; without an end of the run one cycle, or the time until its last velocity left every range."""
     if duration_s or math.isfinite(motion.period_s):
         return duration_s or motion.period_s
     last_mps, span_m = abs(float(motion.velocity_mps[-1])), rig.sensors.position_range_m - rig.sensors.position_lowest_m
@@ -76,22 +78,22 @@ def _until_s(rig: RigConfig, motion: DriveMotion, duration_s: float) -> float:
 
 
 class _Needs(NamedTuple):
-    """Needs of the description, along the drive."""
+    """Sizes of the described motion that the sensors must show, along the drive."""
 
-    most_N: float  # of the drive force, forwards, as the sensor shows it
-    least_N: float  # backwards; 0 where the drive does not go back and the slide does not overshoot
-    fall_N: float  # of the force in a slip, 2 (F_s - F_c), as the sensor shows it; 0 where no slip is to be expected
-    slip_m: float  # way of a slip, 2 (F_s - F_c) / k_d; 0 as well
-    slip_mps2: float  # acceleration of a slip; 0 as well
-    natural_Hz: float  # of the slide on its spring
+    most_N: float  # largest drive force forwards, as the sensor shows it
+    least_N: float  # largest drive force backwards; 0 if the drive does not go back and the slide does not overshoot
+    fall_N: float  # fall of the force in a slip, 2 (F_s - F_c), as the sensor shows it; 0 if no slip is expected
+    slip_m: float  # length of a slip, 2 (F_s - F_c) / k_d; 0 if no slip is expected
+    slip_mps2: float  # acceleration of a slip; 0 if no slip is expected
+    natural_Hz: float  # frequency of the slide on its spring
 
 
 def refuse_blind_sensors(rig: RigConfig, controller: ControllerConfig, duration_s: float) -> None:
     """Raise ValueError for a sensor that cannot show the motion that the description implies, with the number to use."""
     needs = _needs(rig, duration_s)
-    _force(rig, needs)  # a controller may do without it; the verdict counts slips in it
+    _force(rig, needs)  # checked even if the controller does not use it: the verdict counts slips in it
     if speeds_mps := rig.drive.speeds_mps():
-        _positions(rig.sensors, needs.slip_m, _WAY_S * speeds_mps[0], needs.natural_Hz)
+        _positions(rig.sensors, needs.slip_m, _TRAVEL_S * speeds_mps[0], needs.natural_Hz)
         _base(rig, controller, needs.slip_mps2, speeds_mps[0], speeds_mps[-1])
 
 
@@ -102,22 +104,22 @@ def _needs(rig: RigConfig, duration_s: float) -> _Needs:
     lowest_m, highest_m = reach_m(motion, until_s)
     speeds_mps = rig.drive.speeds_mps() or [0.0]
     k_d, mass_kg, fastest_mps = float(p.k_d), float(p.m), speeds_mps[-1]
-    rooted = math.sqrt(k_d * mass_kg)
+    impedance_Ns_per_m = math.sqrt(k_d * mass_kg)
     drift = max(float(p.drift_per_s) * until_s, float(p.drift_ratio) if p.drift_settling_s > 0.0 else 0.0, 0.0)
     ratios = drift, max(p.forward_ratio, p.backward_ratio, 0.0), p.position_ratio, p.load_ratio, p.roughness_ratio
     level = math.prod(1.0 + abs(float(ratio)) for ratio in ratios)
-    # the spring gives way to a fast start: at most the force of a step of the velocity
-    begins_N = min(mass_kg * float(np.abs(motion.acceleration_mps2).max()), rooted * fastest_mps)
+    # force of a start: the spring limits it to the force of a step of the velocity
+    begins_N = min(mass_kg * float(np.abs(motion.acceleration_mps2).max()), impedance_Ns_per_m * fastest_mps)
     viscous_N = (float(p.h_v) + float(p.quadratic_Ns2_per_m2) * fastest_mps) * fastest_mps
     friction_N = max(level * float(p.F_s), level * float(p.F_c) + viscous_N + begins_N)
-    # no more than the spring can be wound up by the way of the drive, which begins without a force
+    # the travel of the drive limits the force, as the spring begins unloaded
     stiffest_N_per_m = k_d * (1.0 + max(float(p.knee_ratio), 0.0)) + float(p.h_d) * fastest_mps
     gain, bias_N = rig.sensors.force_gain * (1.0 + float(p.force_ratio)), float(p.force_bias_N)
     back_N = min(friction_N, stiffest_N_per_m * (highest_m - lowest_m)) if lowest_mps(motion, until_s) < 0.0 else 0.0
-    # a slide that does not become half of v_d faster than its drive does not slip
+    # a slide slips if it becomes faster than its drive by more than half of v_d
     drop_N = float(p.F_s) - float(p.F_c)
-    drop_N = drop_N if drop_N / rooted > 0.5 * speeds_mps[0] > 0.0 else 0.0
-    # without damping a slip ends as far below F_c as it began above it: the drive pushes where F_s is more than 2 F_c
+    drop_N = drop_N if drop_N / impedance_Ns_per_m > 0.5 * speeds_mps[0] > 0.0 else 0.0
+    # without damping a slip ends as far below F_c as it began above it: the drive pushes if F_s exceeds 2 F_c
     back_N = max(back_N, float(p.F_s) - 2.0 * float(p.F_c) if drop_N > 0.0 else 0.0)
     return _Needs(
         most_N=gain * min(friction_N, stiffest_N_per_m * highest_m) + max(bias_N, 0.0),
@@ -137,10 +139,10 @@ def _force(rig: RigConfig, needs: _Needs) -> None:
     sensors, lowest_N, highest_N = rig.sensors, rig.sensors.force_lowest_N, rig.sensors.force_range_N
     if needs.most_N > highest_N:
         why = f"the drive pulls with {needs.most_N:.4g} N, this sensor ends at {highest_N:g} N"
-        _refuse("sensors.force_range_N", highest_N, why, f"{_above(_ROOM * needs.most_N):g}")
+        _refuse("sensors.force_range_N", highest_N, why, f"{_above(_MARGIN * needs.most_N):g}")
     if needs.least_N > -lowest_N:
         why = f"the drive pushes with {needs.least_N:.4g} N as it goes back or after a slip, this sensor ends at {lowest_N:g} N"
-        _refuse("sensors.force_lowest_N", lowest_N, why, f"{-max(_above(_ROOM * needs.least_N), highest_N):g}")
+        _refuse("sensors.force_lowest_N", lowest_N, why, f"{-max(_above(_MARGIN * needs.least_N), highest_N):g}")
     if needs.fall_N == 0.0:
         return
     fall = f"the force falls by {needs.fall_N:.3g} N in a slip"
@@ -148,21 +150,21 @@ def _force(rig: RigConfig, needs: _Needs) -> None:
     _band(sensors, "force_bandwidth_Hz", needs.natural_Hz)
     most_s = 1.0 / (2.0 * math.pi * needs.natural_Hz)
     if (lag_s := float(rig.effects.get("force-sensor-lag", {}).get("lag_s", 0.0))) > most_s:
-        why = f"the slide slips at {needs.natural_Hz:.3g} Hz, to which this sensor is too late"
+        why = f"the slide slips at {needs.natural_Hz:.3g} Hz, and this sensor lags too much to show it"
         _refuse("effects.force-sensor-lag.lag_s", lag_s, why, f"{_below(0.5 * most_s):g}")
 
 
 def _resolves(sensors: SensorsConfig, channel: str, unit: str, most_noise: float, size: float, signal: str) -> None:
     """Noise and resolution of a channel, against a signal of this size."""
-    noise, step = (getattr(sensors, f"{channel}_{word}_{unit}") for word in ("noise", "resolution"))
-    for word, value, most, harm, share in (
+    noise, step = (getattr(sensors, f"{channel}_{quantity}_{unit}") for quantity in ("noise", "resolution"))
+    for quantity, value, most, harm, share in (
         ("noise", noise, most_noise, "noise above {} hides it", 0.5),
         ("resolution", step, max(size / _STEPS, _HIDDEN * noise), "steps above {} distort it", 0.25),
     ):
         if value > most:
             limit = f"{most:.3g} {unit.replace('mps2', 'm/s2')}"
             why = f"{signal}; {harm.format(limit)}"
-            _refuse(f"sensors.{channel}_{word}_{unit}", value, why, f"{_below(share * most):g}")
+            _refuse(f"sensors.{channel}_{quantity}_{unit}", value, why, f"{_below(share * most):g}")
 
 
 def _band(sensors: SensorsConfig, name: str, natural_Hz: float) -> None:
@@ -173,7 +175,7 @@ def _band(sensors: SensorsConfig, name: str, natural_Hz: float) -> None:
 
 def _positions(sensors: SensorsConfig, slip_m: float, way_m: float, natural_Hz: float) -> None:
     slip = f"a slip is {slip_m:.3g} m long, " if slip_m else ""
-    ways = f"{slip}the drive goes {way_m:.3g} m in {_WAY_S:g} s"
+    ways = f"{slip}the drive goes {way_m:.3g} m in {_TRAVEL_S:g} s"
     _resolves(sensors, "position", "m", max(slip_m, way_m) / _NOISES_A_SLIP, slip_m or way_m, ways)
     if slip_m > 0.0:
         _band(sensors, "position_bandwidth_Hz", natural_Hz)
@@ -187,7 +189,7 @@ def _base(
     candidates_Hz = np.array(candidate_frequencies_Hz(controller))
 
     def accel_mps2(v_d_mps: float) -> tuple[float, float]:
-        """Largest acceleration of the base at this feed, and its frequency: the cheapest one, as in `controller.frequency`."""
+        """Acceleration of the base at this feed, and the vibration frequency that `controller.frequency` would choose."""
         v_a_mps = min(limits.v_ratio * v_d_mps, limits.velocity_max_mps)
         omega = 2.0 * math.pi * candidates_Hz
         needed_mps2 = omega * v_a_mps / controller.amplitude.accel_range_mps2

@@ -33,11 +33,11 @@ from cockpit.judge.watches import LatencyWatch
 from cockpit.run.processes import run_processes
 
 ROLES = ("plant", "controller", "recorder")
-_LOOK_S = 0.5
+_LOOK_S = 0.5  # time between two samples of the memory
 _MOST_PERIODS = 60  # rows of the report; fewer if periods would be shorter than 10 s
 _SHORTEST_PERIOD_S = 10.0
-_WARM_SHARE, _WARM_MOST_S = 0.2, 60.0  # share and longest time of the soak in which memory may grow
-_NICE = 10  # of the thread that judges, so that the loop has the processors first
+_WARM_SHARE, _WARM_MOST_S = 0.2, 60.0  # warm-up in which memory may grow: share of the soak, and longest time
+_NICE = 10  # niceness of the judging thread, so that the loop has the processors first
 
 
 class Period(NamedTuple):
@@ -75,12 +75,12 @@ class Soaked(NamedTuple):
 
     @in_json
     def good(self) -> bool:
-        """Whether it ran to its end and its log is complete."""
+        """Whether the soak ran to its end and its log is complete."""
         v = self.verdict
         return not self.interrupted and v.blocks > 0 and v.lost_messages == 0 and v.all_losses_known
 
     def in_words(self) -> list[str]:
-        """Lines for an operator."""
+        """Lines for the operator."""
         short = " (interrupted)" if self.interrupted else ""
         lines = [f"soak     {self.scenario}: {self.verdict.seconds:.0f} of {self.wanted_s:.0f} s{short}"]
         lines += in_words(self.verdict, verbose=False)
@@ -123,11 +123,11 @@ def soak(
     """Run plant, controller and recorder, watch their memory and judge their log.
 
     Args:
-        scenario: its name.
+        scenario: name of the scenario.
         arguments: command line of a child that gives the scenario, without its duration.
         bus: the bus of the processes.
         seconds: duration.
-        log: kept at this path; None: in a temporary folder, where all files after the first are deleted once judged.
+        log: path of the log; None: in a temporary folder, where all files after the first are deleted once judged.
         progress: called with the share done.
 
     Raises Fault ENDPOINT_BUSY, INTERRUPTED before anything was recorded, or the fault that ended a process.
@@ -155,11 +155,11 @@ class _Watch:
         self._memory: dict[str, list[tuple[float, float]]] = {role: [] for role in ROLES}
         self._periods: dict[int, LatencyWatch] = {}
         self._judge = RunJudge(path, {})
-        self._readers: dict[Path, LogReader] = {}  # of the judged files
+        self._readers: dict[Path, LogReader] = {}  # by judged file
         self._judging = threading.Lock()
 
     def __call__(self, over: threading.Event) -> None:
-        os.nice(_NICE)  # on Linux for this thread only
+        os.nice(_NICE)  # Linux applies it to this thread only
         with contextlib.suppress(Fault), Bus(self._config, "cockpit", lockstep=False, stop=over) as bus:
             pids = {role: pid_here(role, header.process) for role, header in bus.headers(ROLES, 5.0, over).items()}
             began_s = time.monotonic()
@@ -219,7 +219,7 @@ class _Watch:
 
 
 def _resident(t_s: float, pid: int) -> list[tuple[float, float]]:
-    """Time and resident memory [MB]; an empty list for a process that has ended, also if it is still a zombie."""
+    """Time and resident memory [MB] of a process; empty if the process has ended, also if it is still a zombie."""
     try:
         pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
     except (OSError, IndexError, ValueError):

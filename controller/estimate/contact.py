@@ -3,7 +3,7 @@
 The slide's velocity v_s comes from two sources: the slide's position, and the drive's spring, v_d - F' / k_d. Each is weighted
 by its measured noise, so that either may be missing. A stick is v_s near 0 while the drive moves; a slip is v_s beyond 1.5 v_d.
 
-The window is the shortest in which a stick exceeds the noise. If there is no such window, or none shorter than the expected
+The window is the shortest in which a stick exceeds the noise. If no window is long enough, or the window exceeds the expected
 stick, the controller is blind and reports BLIND.
 """
 
@@ -14,25 +14,25 @@ from bridge.layouts import ControllerMemory, ControllerParams
 from bridge.wire.stickslip_pb2 import CHECKING, SLIP, SMOOTH, STANDSTILL, STICK, UNKNOWN
 from controller.estimate.windows import BINS, DRIVE, FORCE, OF_STEP, SLIDE, WELL_KNOWN
 
-_SIGMAS = 6.0  # 1e-9 a window: less than one false announcement in 100 hours of windows of 1 ms
-_HALF = 0.5  # of v_d: the distance between stick and sliding that a window must resolve
-_FINE = 0.06  # of v_d: resolution of the longer window that separates a swing of v_s from noise
-# Share of v_d below which the slide sticks. Larger: a slide that lags behind a step of the drive is called stuck. Smaller: less
-# noise is needed to miss a stick: 0.35 is 4.2 sigma from a stick, and 7.8 sigma from sliding, in the noisiest window that counts.
+_SIGMAS = 6.0  # detection limit: error rate of 1e-9 a window, less than one in 100 hours of windows of 1 ms
+_HALF = 0.5  # difference of stick and sliding that a window must resolve, over v_d
+_FINE = 0.06  # resolution of the longer window that separates a swing of v_s from noise, over v_d
+# v_s / v_d below which the slide sticks. Larger: a slide that lags behind a step of the drive counts as stuck. Smaller: less
+# noise is needed to miss a stick: 0.35 is 4.2 sigma from a stick, and 7.8 sigma from sliding, in the noisiest used window.
 _STICK = 0.35
-_STICK_ENDS = 0.65  # as far from sliding as _STICK is from a stick
-_SLIP = 1.5  # share of v_d from which the slide runs ahead
-_SLIP_ENDS = 1.2
-_UNSEEN_MPS = 1e-5  # slip velocity of a slide whose drive seems to be at rest
-_STANDS_S = 0.1  # of a standstill at the beginning, until a slide that moves alone slips
-_AFTER_STOP_S = 0.01  # shortest of the longest windows after a stop
+_STICK_ENDS = 0.65  # v_s / v_d at which a stick ends: as far from sliding as _STICK is from a stick
+_SLIP = 1.5  # v_s / v_d at which a slip begins
+_SLIP_ENDS = 1.2  # v_s / v_d at which a slip ends
+_UNSEEN_MPS = 1e-5  # smallest slip velocity while the drive seems to be at rest
+_STANDS_S = 0.1  # standstill at the start of the run after which a slide that moves alone counts as a slip
+_AFTER_STOP_S = 0.01  # least upper limit of the window length after a stop
 _SCORE_S = 0.005  # time constant of the score
-_LONGEST_WINDOW_S = 1.0  # a stick that needs a longer window is seen too late to prevent the slip
-_EXPECTED_SWING = 0.2  # of the force, until a slip was seen: the swing at F_s = 1.1 F_c
-# Time without a window that sees a stick until the controller calls itself blind. Shorter: every start of a move is, while the
-# windows fill. Longer: unseen slips.
+_LONGEST_WINDOW_S = 1.0  # longest window: with a longer one a stick is detected too late to prevent the slip
+_EXPECTED_SWING = 0.2  # expected swing over the force until the first slip: the swing at F_s = 1.1 F_c
+# Time without a window that resolves a stick until the controller is blind. Shorter: it is blind at every start of a move, while
+# the windows fill. Longer: slips are missed without a report.
 _BLIND_S = 0.3
-_EXCITER_PERIODS = 2.0  # least length of a window while vibrating
+_EXCITER_PERIODS = 2.0  # least length of a window during vibration, in periods of the exciter
 
 
 @kernel
@@ -53,7 +53,7 @@ def contact(p: ControllerParams, s: ControllerMemory, force_N: float, tick_s: fl
         if length_s < least_s:
             continue
         if s.moving == 0 and s.held_mps > 0.0 and length_s * (1.0 + 1.0 / BINS) > max(s.stood_s, _AFTER_STOP_S):
-            break  # it reaches back into the move
+            break  # the window reaches back into the move
         weight_x, weight_F, place_mps, force_mps = 0.0, 0.0, 0.0, 0.0
         if p.use_slide_position == 1 and noise_mps > 0.0:
             weight_x = 1.0 / (noise_mps * noise_mps)
@@ -82,7 +82,7 @@ def contact(p: ControllerParams, s: ControllerMemory, force_N: float, tick_s: fl
             s.fine_mps, s.fine_sigma_mps = both_mps, sigma_mps
             fine = _SIGMAS * sigma_mps <= _FINE * speed_mps or s.moving == 0
     if s.stiffness_learnt == 0 and level_F >= 0 and level_x >= 0:
-        s.sliding_mps = min(by_force_mps, by_place_mps)  # a wrong stiffness hides a stick from one of them
+        s.sliding_mps = min(by_force_mps, by_place_mps)  # a wrong stiffness may hide a stick in one of the two
     s.level = level_both
     _follow(s, tick_s, slipping, speed_mps)
     if s.moving == 1 and level_both >= 0:
@@ -96,7 +96,7 @@ def contact(p: ControllerParams, s: ControllerMemory, force_N: float, tick_s: fl
 
 @kernel
 def _follow(s: ControllerMemory, tick_s: float, slipping: bool, speed_mps: float) -> None:
-    """Go from one state of the contact to the next, and count."""
+    """Set the state of the contact, and count slips and surges."""
     vibrated = s.allowed_m > 0.0
     before = s.contact
     s.slip_began, s.stick_began = 0, 0
@@ -104,7 +104,7 @@ def _follow(s: ControllerMemory, tick_s: float, slipping: bool, speed_mps: float
         s.slipping = 0
     if slipping and s.slipping == 0:
         s.slipping = 1
-        loosened = s.moving == 0 and s.guard_state == CHECKING  # the tones of the rig's check let the spring relax
+        loosened = s.moving == 0 and s.guard_state == CHECKING  # the spring relaxes under the tones of the rig's check
         s.slip_began = 0 if loosened else 1
         if s.since_stick_s <= 2.0 * s.window_s or not vibrated:
             s.slips += s.slip_began
@@ -145,7 +145,7 @@ def _stood(s: ControllerMemory, before: int, tick_s: float) -> bool:
 
 @kernel
 def _expect(p: ControllerParams, s: ControllerMemory, force_N: float, tick_s: float, speed_mps: float) -> None:
-    """Estimate the length of a stick and the time to the slip, and whether a stick can be seen in time."""
+    """Estimate the length of a stick and the time to the slip, and whether a stick can be detected in time."""
     way = 0 if s.direction > 0 else 1
     along_N = s.direction * force_N
     climbing_N_per_s = s.stiffness_N_per_m * speed_mps
@@ -167,9 +167,9 @@ def _expect(p: ControllerParams, s: ControllerMemory, force_N: float, tick_s: fl
 
 @kernel
 def _feeds_unseen(p: ControllerParams, s: ControllerMemory) -> bool:
-    """Whether the noise of the drive's position hides the least feed that counts as motion, even within a second.
+    """Whether the noise of the drive's position over one second exceeds the least feed that counts as motion.
 
-    The noise is extrapolated from the best windows to one second as white noise, as a stop disturbs the long windows for seconds.
+    The noise of the best windows is extrapolated to one second as white noise, as a stop disturbs the long windows for seconds.
     """
     least_mps = math.inf
     for level in range(p.levels):

@@ -7,41 +7,41 @@ from bridge.layouts import ControllerMemory, ControllerParams
 from bridge.wire.stickslip_pb2 import SMOOTH, STICK
 from controller.estimate.windows import BINS, DRIVE, FEWEST, FORCE, SLIDE
 
-# Elongation rate over its noise from which a window teaches. Smaller: the noise of the positions makes k_d too small, by
-# 1 / 6^2 = 3 % at most here.
+# Least elongation rate over its noise in a window from which k_d is learnt. Smaller: the noise of the positions makes k_d too
+# small; at 6 by 1 / 6^2 = 3 % at most.
 _SIGMAS = 6.0
-_KEPT = 0.9983  # weight of earlier windows at each new one: half after 400 windows
-_FEWEST = 5.0  # windows until the learnt stiffness replaces the configured one
+_KEPT = 0.9983  # factor of the weight of earlier windows at each new window: a half after 400 windows
+_FEWEST = 5.0  # fewest windows until the learnt stiffness replaces the configured stiffness
 _TOLD_SIGMA = 0.5  # relative sigma of a configured stiffness
-_STEADY_S = 0.05  # of constant v_d until a climbing force bounds the stiffness
-_MOST_OFF = 100.0  # largest factor between configured and learnt stiffness: a larger one means wrong channels
-_SLIP_SHARE = 0.3  # of one more slip in the learnt breakaway and swing
+_STEADY_S = 0.05  # duration of constant v_d until a climbing force bounds the stiffness
+_MOST_OFF = 100.0  # largest factor between configured and learnt stiffness: a larger factor means wrong channels
+_SLIP_SHARE = 0.3  # weight of a new slip in the learnt breakaway and swing
 _SLIDING_S = 0.3  # time constant of the learnt sliding force
 
 
 @kernel
 def stiffness(p: ControllerParams, s: ControllerMemory) -> None:
-    """Learn k_d, the force over the elongation of the drive: from rates, so that no offset matters.
+    """Learn k_d, the force over the elongation of the drive: from rates, so that offsets cancel.
 
-    Learnt from the window with the best signal of the elongation. Without such a window, a climbing force bounds the configured
-    stiffness from below: no force climbs faster than k_d v_d.
+    The window with the highest signal-to-noise ratio of the elongation is used. Without such a window, a climbing force bounds
+    the configured stiffness from below: no force climbs faster than k_d v_d.
     """
     if p.use_force == 0:
         return
     best, best_level = _SIGMAS * _SIGMAS, -1
     for level in range(p.levels if p.use_slide_position == 1 else 0):
-        # in seconds the positions drift: a noise that is carried on as white noise takes that for a stick
+        # over seconds the positions drift, which exceeds an extrapolated white noise and looks like a stick
         if s.pushed[level] < 2 * BINS or (s.stiffness_learnt == 1 and s.differences[level] < FEWEST):
             break
         variance = s.noise[SLIDE, level] * s.noise[SLIDE, level] + s.noise[DRIVE, level] * s.noise[DRIVE, level]
         rate_mps = s.slope[DRIVE, level] - s.slope[SLIDE, level]
-        # a slide whose position never changes by a step is not measured: it would make every spring soft
+        # a slide position that never changes by a step is not connected, and would make every spring soft
         if rate_mps * rate_mps > best * variance and s.noise[SLIDE, level] > 0.0:
             best, best_level = rate_mps * rate_mps / variance, level
     if best_level >= 0:
         rate_mps = s.slope[DRIVE, best_level] - s.slope[SLIDE, best_level]
         s.taught = _KEPT * s.taught + 1.0
-        # each window by its own scale, so that one fast slip does not outweigh a hundred sticks
+        # the mean of ratios, so that a fast slip does not outweigh a hundred sticks
         s.taught_ratio = _KEPT * s.taught_ratio + s.slope[FORCE, best_level] / rate_mps
         s.taught_square = _KEPT * s.taught_square + (s.slope[FORCE, best_level] / rate_mps) ** 2
         mean = s.taught_ratio / s.taught
@@ -60,8 +60,8 @@ def stiffness(p: ControllerParams, s: ControllerMemory) -> None:
 
 @kernel
 def _bounded(p: ControllerParams, stiffness_N_per_m: float) -> float:
-    told_N_per_m = p.drive_stiffness_N_per_m
-    return min(max(stiffness_N_per_m, told_N_per_m / _MOST_OFF), told_N_per_m * _MOST_OFF)
+    configured_N_per_m = p.drive_stiffness_N_per_m
+    return min(max(stiffness_N_per_m, configured_N_per_m / _MOST_OFF), configured_N_per_m * _MOST_OFF)
 
 
 @kernel
@@ -76,8 +76,8 @@ def begin(p: ControllerParams, s: ControllerMemory) -> None:
 def spring(s: ControllerMemory, elongation_m: float) -> float:
     """Force of the drive's spring from both positions [N], for a rig without a force sensor.
 
-    The spring is taken to be relaxed at the start; once the slide was dragged both ways, half-way between the farthest
-    elongations, as friction pulls as much one way as the other.
+    The spring is assumed to be relaxed at the start; once the slide was dragged both ways, half-way between the largest
+    elongations of both directions, as friction is alike in both.
     """
     if s.stretched == 0:
         s.shortest_m, s.longest_m, s.stretched = elongation_m, elongation_m, 1

@@ -6,36 +6,38 @@ from bridge.kernel import kernel
 from bridge.layouts import ControllerMemory, ControllerParams
 from controller.estimate.windows import BINS, DRIVE, FORCE, SLIDE, WELL_KNOWN
 
-_SIGMAS = 6.0  # 1e-9 a window that a standing drive is called moving
-_UNSURE_SIGMAS = 9.0  # the same while the noise of the window is known from fewer differences
-_AGREE_SIGMAS = 5.0  # of the shorter of two neighbours, within which their slopes are of one velocity
-_AFTER_STOP_S = 0.01  # shortest of the longest windows after a stop
-_EXACT = 0.005  # of v_d: noise at which no longer window is asked
-_SURE = 0.03  # noise of v_d, over it, up to which it is held: the first windows of a move are off by a third
-_STEADY = 0.04  # change of v_d, over it, from which the drive is not steady
-# Standstill after which the slide counts as at rest. Shorter: a slide that still slides is called stuck when the drive only
-# became too slow to be seen at once.
+_SIGMAS = 6.0  # least slope of a moving drive, in sigmas: error rate of 1e-9 a window at rest
+_UNSURE_SIGMAS = 9.0  # same limit while the noise of the window is known from few differences
+_AGREE_SIGMAS = 5.0  # largest difference of neighbouring windows of the same velocity, in sigmas of the shorter window
+_AFTER_STOP_S = 0.01  # least upper limit of the window length after a stop
+_EXACT = 0.005  # noise over v_d at which no longer window is needed
+_SURE = 0.03  # largest noise over v_d at which v_d is held: the first windows of a move are wrong by a third
+_STEADY = 0.04  # smallest relative change of v_d at which the drive is not steady
+# Standstill after which the slide counts as at rest. Shorter: a slide that still slides counts as stuck when the drive only
+# became too slow to be detected at once.
 _RESTED_S = 0.2
-_SURELY_SIGMAS = 3.3
-_ROUGHLY = 0.1  # noise of a window, over its velocity, up to which it may show that the drive speeds up
-_MOST_AHEAD = 1.3  # of a window's velocity: limit of the extrapolation, which overshoots at the end of an acceleration
+_SURELY_SIGMAS = 3.3  # sigmas of v_d that are added to the v_d that vibration must exceed
+_ROUGHLY = 0.1  # largest noise over velocity of a window that may show an acceleration of the drive
+_MOST_AHEAD = 1.3  # largest extrapolation over a window's velocity: it overshoots at the end of an acceleration
 _OF_TWO = 1.8  # sigma of (twice a slope minus the slope of the window twice as long), over the sigma of the slope
-_RISE_SIGMAS = 5.0  # by which it counts for less; at 3 v_a leaps once a second, and the slide runs ahead
-_HUM_S = 0.1  # five periods of mains hum, in which its noise becomes known
-_EXCITER_PERIODS = 2.0  # in a window of the force, at least
-_LONGEST_RISE = 3  # levels above the level of v_d that are searched for a rise
+_RISE_SIGMAS = (
+    5.0  # sigmas that are subtracted for a lower bound; with 3, v_a jumps once a second and the slide runs ahead
+)
+_HUM_S = 0.1  # five periods of mains hum, after which its noise is known
+_EXCITER_PERIODS = 2.0  # least length of a window of the force, in periods of the exciter
+_LONGEST_RISE = 3  # number of levels above the level of v_d that are searched for an acceleration
 # First part of a move, and longest window, in which a climbing force shows motion: at 50 N/um breakaway follows after 6 ms.
 _BY_FORCE_S = 0.02
-_FORCE_SETTLES_S = 0.05  # after a vibration: the friction that it took off comes back, and the force climbs with it
-_HOLD_S = 0.1  # in which the held velocity falls to a third, as a slide still moves after a step of the drive
+_FORCE_SETTLES_S = 0.05  # time after a vibration in which the friction returns, and the force climbs with it
+_HOLD_S = 0.1  # time constant of the held velocity, as a slide still moves after a step of the drive
 
 
 @kernel
 def drive_velocity(p: ControllerParams, s: ControllerMemory, tick_s: float) -> None:
     """Measure v_d [m/s], positive and negative, and whether the drive moves.
 
-    It moves if a window shows motion and no shorter window with enough resolution contradicts, as after a stop. From there on,
-    longer windows are used while each agrees with the one before (Lepski's rule), until the noise is small.
+    The drive moves if a window shows motion and no shorter window with enough resolution contradicts, as after a stop. From that
+    window on, longer windows are used while each agrees with the window before (Lepski's rule), until the noise is small.
     """
     velocity_mps, sigma_mps = 0.0, 0.0
     first, taken = -1, 0
@@ -89,7 +91,7 @@ def drive_velocity(p: ControllerParams, s: ControllerMemory, tick_s: float) -> N
     else:
         s.moved_s = 0.0
         s.stood_s = s.stood_s + tick_s if not unsure else 0.0
-    # so much that v_a at the least ratio is above v_d for all but 5e-4 of its noise
+    # v_a at the least ratio is then above v_d except with a probability of 5e-4
     surely_mps = (speed_mps + _SURELY_SIGMAS * sigma_mps) / p.least_ratio
     s.rising_mps = max(_rising(p, s, speed_mps, taken), surely_mps) if moving else 0.0
     s.held_mps *= 1.0 - min(tick_s / _HOLD_S, 1.0)
@@ -101,8 +103,8 @@ def drive_velocity(p: ControllerParams, s: ControllerMemory, tick_s: float) -> N
 def _rising(p: ControllerParams, s: ControllerMemory, speed_mps: float, taken: int) -> float:
     """Lower bound of |v_d| at the end of the windows [m/s]; `speed_mps` holds for the middle of level `taken`.
 
-    At a constant acceleration v_d now = 2 slope - slope of the window twice as long. Short windows are noisy, long ones late: the
-    highest lower bound counts, up to the upper bounds of the shorter windows.
+    At a constant acceleration v_d now = 2 slope - slope of the window twice as long. Short windows are noisy, long windows lag:
+    the highest lower bound counts, up to the upper bounds of the shorter windows.
     """
     rising_mps, most_mps = speed_mps, math.inf
     for level in range(min(taken + _LONGEST_RISE, p.levels - 1)):
@@ -120,9 +122,9 @@ def _rising(p: ControllerParams, s: ControllerMemory, speed_mps: float, taken: i
 
 @kernel
 def _pulling(p: ControllerParams, s: ControllerMemory) -> float:
-    """|v_d| at least, by the spring [m/s]: v_s of a longer window and F' / k_d of a shorter one, while the spring pulls.
+    """Lower bound of |v_d| by the spring [m/s]: v_s of a longer window plus F' / k_d of a shorter window, while it pulls.
 
-    A slide that the vibration holds goes on at its v_s when the drive speeds up, and the spring winds up by the difference.
+    A slide under vibration continues at its v_s when the drive speeds up, and the spring winds up by the difference.
     """
     least_mps = 0.0
     if p.use_force == 0 or s.stiffness_learnt == 0 or s.slipping == 1 or s.direction * s.bins[FORCE, 0, 0] <= 0.0:
@@ -138,7 +140,7 @@ def _pulling(p: ControllerParams, s: ControllerMemory) -> float:
 
 @kernel
 def _stopped(s: ControllerMemory, level: int) -> bool:
-    """Whether a window shorter than `level` should have seen the velocity and did not: it is the tail of a stop."""
+    """Whether a window shorter than `level` resolves the velocity and does not show it: the drive has stopped."""
     for i in range(level):
         sigma = s.noise[DRIVE, i]
         slope = s.slope[DRIVE, level]
@@ -155,7 +157,7 @@ def _stopped(s: ControllerMemory, level: int) -> bool:
 def _winds_up(s: ControllerMemory, level: int) -> bool:
     """Whether the drive moves relative to the slide: true at a start, false for hum on both positions.
 
-    Used only at the begin of the run, until some periods of the hum are in the measured noise.
+    Used only at the start of the run, until some periods of the hum are in the measured noise.
     """
     slope = s.slope[DRIVE, level]
     return (slope - s.slope[SLIDE, level]) * slope > 0.5 * slope * slope
@@ -163,9 +165,9 @@ def _winds_up(s: ControllerMemory, level: int) -> bool:
 
 @kernel
 def _stands(p: ControllerParams, s: ControllerMemory) -> bool:
-    """Whether some window since the start of the move would have seen half of the last velocity, and does not.
+    """Whether a window since the start of the move resolves half of the last velocity, and does not show it.
 
-    A drive that starts is seen and lost in turns, as each window that reaches back before the start disagrees with the next.
+    Without this test a drive that starts is detected and lost in turns, as windows that reach back before the start disagree.
     """
     half_mps = 0.5 * s.drive_velocity_mps
     for level in range(p.levels):
@@ -179,7 +181,7 @@ def _stands(p: ControllerParams, s: ControllerMemory) -> bool:
 
 @kernel
 def _climbing(p: ControllerParams, s: ControllerMemory) -> float:
-    """Velocity of a drive that winds up its spring against a slide that sticks [m/s]; 0 where the positions exclude it."""
+    """Velocity of a drive that winds up its spring against a stuck slide [m/s]; 0 where the positions exclude it."""
     for level in range(p.levels):
         if s.pushed[level] < BINS or p.window_s[level] > _BY_FORCE_S:
             break

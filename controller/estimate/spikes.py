@@ -1,9 +1,9 @@
 """Spikes: single samples far from both neighbours, which agree with each other.
 
-No slide, drive or spring goes away and comes back within one sample, so such a sample carries no information, and the mean
-of its neighbours takes its place (Hampel's rule, with the noise in the place of the median of deviations). One a channel, and
-not in two blocks in a row: more of them are noise, or a fault. The last sample of a block has no neighbour on its right, so a
-leap there counts from the next block on.
+No slide, drive or spring moves away and back within one sample, so such a sample carries no information, and the mean of its
+neighbours replaces it (Hampel's rule, with the noise in place of the median of deviations). At most one spike is replaced in a
+channel of a block, and none in the next block: more of them are noise or a fault. The last sample of a block has no neighbour
+after it, so a jump there counts from the next block on.
 """
 
 import math
@@ -14,23 +14,25 @@ from bridge.kernel import Record, kernel
 from bridge.layouts import ControllerMemory, ControllerParams, SensorRow
 from controller.estimate.windows import DRIVE, FORCE, ROWS, SLIDE
 
-# Of the mean bend of white noise, times the root of the samples in a bin: the spike is then 6 sigma of the slope of four bins,
-# and a smaller one is not taken for a slip.
+# A bend is the second difference of samples. Least bend of a spike, over (mean bend of the noise times the root of the samples in
+# a bin): the spike is then 6 sigma of the slope of four bins, and a smaller spike is not detected as a slip.
 BENDS = 9.0
-_STEPS = 4.0  # of the resolution: a step up and down again bends by two
-_ROUNDED = 2e-7  # of a value, by which the wire's float32 rounds
+_STEPS = 4.0  # least bend of a spike, over the resolution: a step up and down again bends by two
+_ROUNDED = 2e-7  # relative rounding of a float32 in a message
 _LEFT = 0.25  # share of the bend that may remain next to a replaced spike; after a step or a kink half remains
-_NEAR = 0.25  # of the bend of a spike: where no sample is farther from the one before the block, none is a spike
-_LARGEST = 3e38  # of a bend that a float32 holds
-_LEARN = 0.125  # share of one look
-_GROWS = 2.0  # most by which the noise grows in one block
+_NEAR = (
+    0.25  # if no sample is farther from the sample before the block than this share of a spike's bend, none is a spike
+)
+_LARGEST = 3e38  # largest bend that a float32 holds
+_LEARN = 0.125  # weight of a new measurement of the noise
+_GROWS = 2.0  # largest factor by which the noise grows in a block
 
 
 @kernel
 def find_spikes(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> bool:
     """Find the spikes of a block; false if a sample is NaN or infinite, which would stay in the filters for ever.
 
-    Channels that the configuration leaves out are skipped.
+    Channels that are not configured are skipped.
     """
     if s.missing_blocks > 0:
         s.tail[:, :] = math.nan
@@ -46,7 +48,7 @@ def find_spikes(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> b
 
 @kernel
 def sum_without(s: ControllerMemory, row: int, samples: Record, first: int, count: int) -> float:
-    """Sum of some samples, in which the mean of its neighbours takes the place of a spike."""
+    """Sum of some samples, with the mean of its neighbours in place of a spike."""
     total = 0.0
     for i in range(first, first + count):
         total += s.spike[row] if i == s.spike_at[row] else float(samples[i])
@@ -55,7 +57,7 @@ def sum_without(s: ControllerMemory, row: int, samples: Record, first: int, coun
 
 @kernel
 def learn_bends(p: ControllerParams, s: ControllerMemory, look: int, block: SensorRow) -> None:
-    """Follow the noise of one channel in turn; `look` counts."""
+    """Update the noise of one channel, in turn; `look` counts the calls."""
     if look % ROWS == FORCE:
         _learn(p, s, FORCE, block.drive_force_N)
     elif look % ROWS == SLIDE:
@@ -66,7 +68,7 @@ def learn_bends(p: ControllerParams, s: ControllerMemory, look: int, block: Sens
 
 @kernel
 def _learn(p: ControllerParams, s: ControllerMemory, row: int, samples: Record) -> None:
-    """Follow the noise of a channel: its mean bend from sample to sample."""
+    """Update the noise of a channel: the mean bend of its samples."""
     bend = 0.0
     for i in range(2, samples.shape[0]):
         bend += math.fabs(float(samples[i]) - 2.0 * float(samples[i - 1]) + float(samples[i - 2]))
@@ -100,7 +102,7 @@ def _look_closer(p: ControllerParams, s: ControllerMemory, row: int, samples: Re
 
 @kernel
 def _count_far(last: float, samples: Record, most: float) -> int:
-    """Number of samples farther away, or not numbers; counted without a branch, so that eight run at once."""
+    """Number of samples farther than `most` from `last`, or NaN; counted without a branch, so that eight run at once."""
     near, limit, far = np.float32(last), np.float32(most), 0
     for i in range(samples.shape[0]):
         far += 0 if abs(samples[i] - near) <= limit else 1
@@ -109,7 +111,7 @@ def _count_far(last: float, samples: Record, most: float) -> int:
 
 @kernel
 def _count_bent(before: float, last: float, samples: Record, most: float) -> int:
-    """Number of samples with a larger bend, or not numbers; counted without a branch."""
+    """Number of samples with a bend above `most`, or NaN; counted without a branch."""
     first, second, bent = float(samples[0]), float(samples[1]), 0
     bent += 0 if math.fabs(before - 2.0 * last + first) <= most else 1
     bent += 0 if math.fabs(last - 2.0 * first + second) <= most else 1
@@ -122,7 +124,7 @@ def _count_bent(before: float, last: float, samples: Record, most: float) -> int
 
 @kernel
 def _not_finite(samples: Record) -> int:
-    """Number of samples that are not numbers; counted without a branch, so that eight run at once."""
+    """Number of NaN or infinite samples; counted without a branch, so that eight run at once."""
     bad = 0
     for i in range(samples.shape[0]):
         value = float(samples[i])
@@ -132,7 +134,7 @@ def _not_finite(samples: Record) -> int:
 
 @kernel
 def _search(p: ControllerParams, s: ControllerMemory, row: int, samples: Record) -> None:
-    """Note the largest spike; without one, raise the noise."""
+    """Store the largest spike; without a spike, raise the noise."""
     count, largest, total = samples.shape[0], s.most_bend[row], 0.0
     steep = 0.0  # bend just before the bend of the last three samples
     for i in range(count - 1):
@@ -170,7 +172,7 @@ def _know(p: ControllerParams, s: ControllerMemory, row: int, bend: float, value
 
 @kernel
 def _at(s: ControllerMemory, row: int, samples: Record, i: int) -> float:
-    """A sample of this block, or one of the two before it; no number where it is not known."""
+    """A sample of this block, or one of the two samples before it; NaN if it is not known."""
     if i >= samples.shape[0]:
         return math.nan
     return float(samples[i]) if i >= 0 else float(s.tail[row, 2 + i])

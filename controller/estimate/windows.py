@@ -1,11 +1,11 @@
 """Slopes of the signals in windows from four bins to seconds, and the noise of each slope.
 
-Level j has windows twice as long as level j - 1, of four bins each. A stiff axis needs a window of 0.4 ms and a creep feed one
-of a second, so all of them run at once and `contact` takes the shortest whose signal exceeds its noise.
+Level j has windows twice as long as level j - 1, of four bins each. A stiff axis needs a window of 0.4 ms, and a creep feed a
+window of a second, so all levels run in parallel and `contact` takes the shortest window whose signal exceeds its noise.
 
-The noise of a level is measured, not assumed: the slopes of three successive windows lie on a line except for noise (the idea of
-the Hadamard deviation), so it contains hum, drift and quantisation as well as white noise, but not a swing that is slow against
-the window. The scale is the lower quartile of the deviations: slips and re-sticks must disturb most of them to move it much.
+The noise of a level is measured: the slopes of three successive windows lie on a line except for noise (the idea of the Hadamard
+deviation), so it contains hum, drift and quantisation as well as white noise, but not a swing that is slow against the window.
+The scale is the lower quartile of the deviations, which a minority of disturbances by slips and re-sticks changes little.
 
 A slide that swings with about the period of the windows bends their slopes as noise does, but in force and position alike, by
 the spring's law x_d' - x_s' = F' / k_d. So the deviation from this law and the drive's noise together bound the noise from above.
@@ -18,23 +18,23 @@ import numpy as np
 from bridge.kernel import Record, kernel
 from bridge.layouts import ControllerMemory, ControllerParams
 
-BINS = 4  # in a window; a power of 2
-MOST_FRESH = 16  # bins added at once, at most
-LEVELS = 16  # at most; `levels` of the parameters is the number in use
+BINS = 4  # bins in a window; a power of 2
+MOST_FRESH = 16  # most bins that are added in a call
+LEVELS = 16  # most levels; `levels` of the parameters is the number in use
 FORCE, SLIDE, DRIVE = 0, 1, 2  # rows: drive force [N], slide position [m], drive position [m]
 ROWS = 3
 _OF_BEND = 6.0**-0.5  # sigma of a slope over the sigma of a - 2 b + c
-_QUARTILE = 0.3186  # of |d| of a normal distribution, over its sigma
+_QUARTILE = 0.3186  # lower quartile of |d| of a normal distribution, over its sigma
 _WHITE = 2.0**-1.5  # noise of a slope over the noise at half the window, for white noise
 # Differences until the level's measured noise is used; before, the noise of shorter windows is extrapolated as white noise.
 FEWEST = 10
-WELL_KNOWN = 40  # differences from which a level's noise is off by some per cent only
-_CARRIED = 1.3  # factor for a noise that is carried on: ten differences are 20 % off, and no noise is quite white
-_FIRST_SHARE, _LEAST_SHARE = 4.0, 0.005  # of the logarithm of sigma that one difference moves; 6 % of scatter at 0.005
+WELL_KNOWN = 40  # differences after which the error of a level's noise is only some per cent
+_CARRIED = 1.3  # factor of extrapolated noise: ten differences have an error of 20 %, and no noise is quite white
+_FIRST_SHARE, _LEAST_SHARE = 4.0, 0.005  # change of log sigma by a difference, first and least; 0.005 scatters by 6 %
 _LEAST_SHARE_OF_LAW = (
-    0.02  # the same for the deviation from the spring's law, which follows a stiffness that is still being learnt
+    0.02  # least change of log sigma of the deviation from the spring's law, whose stiffness is still being learnt
 )
-# The factors of sigma at the least shares, and the differences from which on they hold.
+# Factors of sigma at the least changes, and the number of differences after which they apply.
 _UP, _MANY = math.exp(0.25 * _LEAST_SHARE), round(_FIRST_SHARE / _LEAST_SHARE)
 _UP_OF_LAW, _MANY_OF_LAW = math.exp(0.25 * _LEAST_SHARE_OF_LAW), round(_FIRST_SHARE / _LEAST_SHARE_OF_LAW)
 # Largest error of a slope by a quantisation step q over a window is q / W; uniform in a step it is 0.29 of that.
@@ -43,7 +43,7 @@ OF_STEP = 0.29
 
 @kernel
 def push(p: ControllerParams, s: ControllerMemory, count: int, learn: bool) -> None:
-    """Add `count` bins, whose means are in `fresh`, level by level; `learn`: their noise counts, as they are measured."""
+    """Add `count` bins, whose means are in `fresh`, to all levels; `learn`: they are measured, so their noise counts."""
     fresh, bins, slope = s.fresh, s.bins, s.slope
     per_s = 0.1 / p.bin_s
     for level in range(p.levels):
@@ -79,7 +79,7 @@ def push(p: ControllerParams, s: ControllerMemory, count: int, learn: bool) -> N
 
 @kernel
 def _note_window(p: ControllerParams, s: ControllerMemory, level: int, learn: bool) -> None:
-    """Take the slopes of a window that begins where the last one ended: their differences give the noise."""
+    """Use the slopes of a window that begins at the end of the last window: their differences give the noise."""
     slope, before, sigma = s.slope, s.slope_before, s.sigma
     if learn:
         both = p.use_force == 1 and p.use_slide_position == 1 and s.stiffness_learnt == 1
@@ -104,8 +104,8 @@ def _note_window(p: ControllerParams, s: ControllerMemory, level: int, learn: bo
 
 @kernel
 def _moved(sigma: float, apart: float, up: float, count: int) -> float:
-    """The scale of the differences after one more of them: `up` three times for each time down by its cube, in the end."""
-    if count <= 4 or sigma == 0.0:  # the mean of the first
+    """The scale after a further difference `apart`: a step `up`, or three steps down; balanced at the lower quartile."""
+    if count <= 4 or sigma == 0.0:  # the mean of the first four
         return sigma + (1.25 * apart - sigma) / min(count, 4)
     return sigma / (up * up * up) if apart < _QUARTILE * sigma else sigma * up
 
@@ -119,7 +119,7 @@ def clear_windows(s: ControllerMemory) -> None:
 
 @kernel
 def _note_noise(p: ControllerParams, s: ControllerMemory, level: int, both: bool) -> None:
-    """Set the noise of the slopes of a level, and of those longer windows whose own is not known yet."""
+    """Set the noise of the slopes of a level, and of longer windows whose noise is not measured yet."""
     for row in range(ROWS):
         for i in range(level, p.levels):
             if s.differences[i] >= FEWEST:
@@ -146,7 +146,7 @@ def note_steps(s: ControllerMemory, row: int, samples: Record) -> None:
     for i in range(1, samples.shape[0]):
         value = np.float64(samples[i])
         change = math.fabs(value - last)
-        # a float32 of the wire rounds the steps themselves, by 1e-7 of the value
+        # float32 in a message rounds each value by 1e-7, so smaller changes are not steps
         if change > 2e-7 * math.fabs(value) and (s.resolution[row] == 0.0 or change < s.resolution[row]):
             s.resolution[row] = change
         last = value

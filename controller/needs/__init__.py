@@ -1,7 +1,7 @@
-"""What an axis needs: how much vibration at which speed, whether any at all, and when none helps.
+"""The vibration that an axis needs: how much at which speed, whether it is needed at all, and when it does not help.
 
-need      what is remembered for each direction and speed; the ratio that the swing of friction asks for
+need      the learnt need for each direction and speed; the ratio that the swing of friction requires
 probe     whether the vibration is needed
-wobble    whether friction falls with speed, asked by a small wobble of v_a
-failures  slips that no more vibration could have prevented
+wobble    a test by a small wobble of v_a whether friction falls with speed
+failures  slips that more vibration could not have prevented
 """

@@ -1,22 +1,22 @@
-"""Slips that no more vibration can prevent: after some of them CANNOT_HELP is reported, and the vibration continues.
+"""Slips that more vibration cannot prevent: after some of them CANNOT_HELP is reported, and the vibration continues.
 
-Fewer slips may be the best result, as on a track whose friction falls by more than any v_a makes up for, or where v_d changes
-faster than v_a can follow. Only if the vibration gains nothing `policy` ends it.
+Fewer slips may be the best result, as on a track whose friction falls by more than any v_a can compensate, or if v_d changes
+faster than v_a can follow. `policy` ends the vibration only if it does not help at all.
 
-A first slip or surge under vibration raises the learnt need. A repeated one shows that the raised need is too small.
+A first slip or surge under vibration raises the learnt need. A repeated slip or surge shows that the raised need is too small.
 """
 
 from bridge.kernel import kernel
 from bridge.layouts import ControllerMemory
 from bridge.wire.stickslip_pb2 import CANNOT_HELP, HELD
 
-_FEWEST = 2  # slips until it is reported: one may be chance
-_REMEMBERED_S = 30.0  # since the last of them
+_FEWEST = 2  # fewest slips until CANNOT_HELP is reported: a single slip may be chance
+_REMEMBERED_S = 30.0  # time after the last slip until the count restarts
 
 
 @kernel
 def note_failure(s: ControllerMemory) -> None:
-    """Count a slip that no more vibration could have prevented."""
+    """Count a slip that more vibration could not have prevented."""
     s.failed = s.failed + 1 if s.failed_left_s > 0.0 else 1
     s.failed_left_s = _REMEMBERED_S
     if s.failed >= _FEWEST:
@@ -25,7 +25,7 @@ def note_failure(s: ControllerMemory) -> None:
 
 @kernel
 def note_lesson(s: ControllerMemory) -> None:
-    """Count a slip or surge after which the ratio rises: the first is a lesson, a repeated one a failure."""
+    """Count a slip or surge after which the ratio rises: only a repeated slip or surge counts as a failure."""
     if s.failed_left_s > 0.0:
         note_failure(s)
     else:

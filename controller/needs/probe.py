@@ -1,9 +1,8 @@
 """The probe: whether the vibration is needed at all.
 
-First a wobble of v_a asks whether friction falls with speed (`controller.needs.wobble`). Only where it does not is
-the vibration faded out, no faster than the slide follows. Where the spring takes up the friction too quickly for the
-question, the fade itself is the question: a slide that sticks, runs ahead or begins to swing on the way needs the
-vibration, one that follows down to nothing does not.
+First a wobble of v_a tests whether friction falls with speed (`controller.needs.wobble`). Only if it does not, the vibration is
+faded out, no faster than the slide follows. If the spring takes up the friction too quickly for the wobble, the fade is the test:
+a slide that sticks, runs ahead or begins to swing during the fade needs the vibration; a slide that follows to the end does not.
 """
 
 import math
@@ -27,27 +26,29 @@ from controller.needs.wobble import (
 )
 from controller.needs.wobble import wobble as ask
 
-STEADY_S = 0.2  # of constant v_d before and during a probe
+STEADY_S = 0.2  # duration of constant v_d before and during a probe
 _LAST = 1.02  # ratio of a fading vibration down to which the mean friction grows
 _CAUGHT_UP = 0.04  # share of v_d by which the slide may lag when the last part of a fade begins
-_BEHIND = 0.1  # the same when a question begins: before, the spring still takes up the friction
+_BEHIND = (
+    0.1  # share of v_d by which the slide may lag when a wobble begins: before, the spring still takes up the friction
+)
 # Share of v_d by which the slide may lag in the last part, while the spring takes up the rest. More: it surges from lower down.
 _LAST_LAG = 0.12
 _LAG, _SWING = 0.5, 0.2  # shares of v_d by which the slide may lag in the first part of a fade, and be off in the last
-# Settling time up to which a probe is made: it takes some ten of them, and at feeds far below the speed at which friction falls
-# the fall is too small to be seen.
+# Longest settling time for a probe, which takes about ten settling times; at feeds far below the speed at which friction falls,
+# the fall is too small to be detected.
 _SLOWEST_S = 5.0
-_NEARLY = 0.98  # of the ratio at which it is asked
-# A slide swings about its mean, more and more, before it sticks or runs ahead. The swing is v_s of short windows minus v_s of
+_NEARLY = 0.98  # share of the least ratio of a wobble from which a wobble may begin
+# A slide swings increasingly about its mean before it sticks or runs ahead. The swing is v_s of short windows minus v_s of
 # windows 2^4 times as long, averaged over two of the long windows.
 _LONGER, _MEMORY = 4, 2.0
-_GROWN, _FELT = 2.0, 0.1  # times the least since the fade began, and share of v_d, both rms, from which it is a swing
+_GROWN, _FELT = 2.0, 0.1  # smallest swing (rms): over its least value since the fade began, and over v_d
 _ASKED_FASTER = 2.0  # speed of a fade after a wobble without a fall of friction, over the speed of a trial fade
 
 
 @kernel
 def begin_probe(p: ControllerParams, s: ControllerMemory, way: int, force_N: float, speed_mps: float) -> None:
-    """Ask where a probe is due and the slide slides evenly; begin the fade after an answer that allows it."""
+    """Begin a wobble if a probe is due and the slide slides evenly; begin the fade if its result allows it."""
     s.unasked_s += p.block_s
     _note_swing(p, s, speed_mps)
     follows = s.contact == SMOOTH and s.slip_began == 0 and s.steady_s > STEADY_S and s.mode == EXCITE
@@ -60,7 +61,7 @@ def begin_probe(p: ControllerParams, s: ControllerMemory, way: int, force_N: flo
                 s.wobbles = 0
             if verdict == FALLS:
                 _still_needed(p, s, way, speed_mps)
-                s.probe_s[way] = p.probe_every_max_s  # an answer, and no trial that may have failed by chance
+                s.probe_s[way] = p.probe_every_max_s  # a wobble, unlike a fade, does not fail by chance
                 s.reason = STILL_NEEDED
             elif verdict == EVEN:
                 _fade(p, s, force_N, _ASKED_FASTER)
@@ -73,7 +74,7 @@ def begin_probe(p: ControllerParams, s: ControllerMemory, way: int, force_N: flo
     if not can_ask(p, longest_s):
         _fade(p, s, force_N, 1.0)
     elif s.ratio[way] < _NEARLY * LEAST_ASKED:
-        s.swing = max(s.swing, swing_held(LEAST_ASKED))  # the ratio rises to where it can be asked
+        s.swing = max(s.swing, swing_held(LEAST_ASKED))  # the ratio rises to the least ratio of a wobble
     elif s.ratio[way] < MOST_ASKED and longest_s < _SLOWEST_S:
         begin_wobble(p, s, speed_mps, longest_s)
 
@@ -82,14 +83,14 @@ def begin_probe(p: ControllerParams, s: ControllerMemory, way: int, force_N: flo
 def _fade(p: ControllerParams, s: ControllerMemory, force_N: float, faster: float) -> None:
     s.fade, s.fade_from_N = s.ratio_now, math.fabs(force_N)
     s.fade_per_s = faster * 0.5 / p.probe_fade_s
-    # after an answer the slide may lag; this lag does not count as a swing
+    # after a wobble the slide may lag; this lag does not count as a swing
     s.swung_least = s.swung if faster == 1.0 else math.inf
     enter(s, PROBE, HELD)
 
 
 @kernel
 def _note_swing(p: ControllerParams, s: ControllerMemory, speed_mps: float) -> None:
-    """Follow the mean square of the swing of v_s, over v_d."""
+    """Update the mean square of the swing of v_s over v_d."""
     longer = s.level + _LONGER
     if s.level < 0 or longer >= p.levels or s.pushed[longer] < BINS:
         return
@@ -106,7 +107,7 @@ def _still_needed(p: ControllerParams, s: ControllerMemory, way: int, speed_mps:
 
 @kernel
 def probe(p: ControllerParams, s: ControllerMemory, way: int, speed_mps: float, block_s: float) -> None:
-    """Fade out while the slide follows."""
+    """Fade the vibration out while the slide follows."""
     if s.steady_s < STEADY_S:
         enter(s, EXCITE, HELD)
         return
@@ -132,11 +133,11 @@ def probe(p: ControllerParams, s: ControllerMemory, way: int, speed_mps: float, 
 
 @kernel
 def _faded(s: ControllerMemory, speed_mps: float, block_s: float) -> float:
-    """The next ratio to v_d of a vibration that fades.
+    """The next v_a / v_d of a vibration that fades.
 
-    Down to 1 the mean friction grows as 1 / <|v_r|>, the mean relative speed between slide and base, so the ratio falls as the
-    spring takes up the force with the slide at half of its velocity or more: a slide that needs no vibration follows. Below 1
-    the friction of such a slide hardly grows any more, but one that needs vibration sticks, or swings.
+    Down to 1 the mean friction grows as 1 / <|v_r|>, the mean relative speed between slide and base. So the ratio falls as the
+    spring takes up the force while the slide has half of its velocity or more: a slide that needs no vibration follows. Below 1
+    the friction of such a slide grows little, but a slide that needs vibration sticks or swings.
     """
     step = s.fade_per_s * block_s
     if s.fade < _LAST:
@@ -147,6 +148,6 @@ def _faded(s: ControllerMemory, speed_mps: float, block_s: float) -> float:
     if s.fade == _LAST:
         return s.fade if math.fabs(s.fine_mps - speed_mps) > _CAUGHT_UP * speed_mps else _LAST - 1e-9
     above = math.sqrt(s.fade * s.fade - 1.0)
-    per_ratio = above / s.fade / (math.asin(1.0 / s.fade) + above)  # of <|v_r|>, over itself
+    per_ratio = above / s.fade / (math.asin(1.0 / s.fade) + above)  # relative change of <|v_r|> per change of the ratio
     share = _LAG * s.stiffness_N_per_m * speed_mps / s.fade_from_N * block_s * min(follows / _LAG, 1.0)
     return max(s.fade - min(share / per_ratio, step), _LAST)

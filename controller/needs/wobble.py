@@ -1,12 +1,12 @@
-"""Whether friction falls with speed, asked by a small wobble of v_a while the vibration holds the slide.
+"""Test whether friction falls with speed, by a small wobble of v_a while the vibration holds the slide.
 
-Friction under vibration is a mean over speeds from v_a - v_s to v_a + v_s. Where friction is the same at every speed, that mean
-depends on v_a / v_s alone, as nothing else has the unit of a velocity. So at a given force of the spring v_s follows v_a by
-the same share. Where friction falls with speed, more v_a takes off more than that, and v_s follows by more. It is there that the
-slide sticks or runs ahead when the vibration goes, and no vibration has to be taken away to find it out.
+Friction under vibration is a mean over speeds from v_a - v_s to v_a + v_s. If friction is the same at every speed, this mean
+depends on v_a / v_s alone, as no other quantity is a velocity. So at a given force of the spring v_s changes by the same share as
+v_a. If friction falls with speed, more v_a reduces friction further, and v_s changes by more. Such a slide sticks or runs ahead
+when the vibration ends, and the wobble shows this without ending it.
 
-The force must be constant: the wobble must be faster than the spring takes up the change of friction. Both answers are taken at
-the frequency of the wobble alone, under a Hann window, so that a slow trend of v_s does not count.
+The force must be constant: the wobble must be faster than the spring takes up the change of friction. v_a and v_s are measured
+at the frequency of the wobble, under a Hann window, so that a slow trend of v_s does not count.
 """
 
 import math
@@ -16,32 +16,32 @@ from bridge.layouts import ControllerMemory, ControllerParams
 from controller.estimate.windows import BINS, FORCE, SLIDE
 
 TWO_PI = 2.0 * math.pi
-DEPTH = 0.08  # of v_a: from a ratio of 1.2 it goes down to 1.10
-# Ratios about which v_a wobbles. Lower: v_a comes near v_s, which follows by more. Higher: the friction that falls is less felt.
+DEPTH = 0.08  # amplitude of the wobble over v_a: a ratio of 1.2 falls to 1.10
+# Ratios about which v_a wobbles. Lower: v_a is near v_s, which then changes by more. Higher: falling friction has less effect.
 LEAST_ASKED, MOST_ASKED = 1.2, 1.3
-PERIODS = 4.0
-_NOISE = 0.02  # of v_d: noise of v_s in the windows that are compared, a quarter of the wobble
-_WINDOWS, _BLOCKS = 6.0, 8.0  # in a period, at least: a window then makes the wobble smaller by 3 %
-_EXCITER_PERIODS = 2.0  # in a window, at least
+PERIODS = 4.0  # periods of a round
+_NOISE = 0.02  # largest noise of v_s over v_d in the used windows: a quarter of the wobble
+_WINDOWS, _BLOCKS = 6.0, 8.0  # fewest windows and blocks in a period: a window then reduces the wobble by 3 %
+_EXCITER_PERIODS = 2.0  # fewest periods of the exciter in a window
 _SMOOTHED = 0.973  # share of a wobble that passes windows of a sixth of its period
-# Relative change of v_s over relative change of v_a. At the first or above: friction falls with speed. At the second or below:
-# it does not. Values between them are judged by the third after some rounds. Measured on the bank: one answer of PTFE 0.98 to
-# 1.03, of steel 1.03 at 1.5 mm/s to 1.5 at 0.3 mm/s on a soft drive.
+# Limits of (relative change of v_s) / (relative change of v_a). Above the first, friction falls with speed; below the second, it
+# does not. Values between them are judged by the third after some rounds. Measured on the test bank: PTFE 0.98 to 1.03, steel
+# from 1.03 at 1.5 mm/s to 1.5 at 0.3 mm/s on a soft drive.
 _FALLS, _EVEN, _LAST = 1.035, 1.01, 1.02
-_MOST_ROUNDS = 3.5  # of `PERIODS`
+_MOST_ROUNDS = 3.5  # number of rounds after which the third limit decides
 EVEN, UNSURE, FALLS = range(3)
-_ASIDE = 0.25  # of v_s / v_a: largest answer a quarter period out of phase; above, v_s follows something else
+_ASIDE = 0.25  # largest response a quarter period out of phase, over v_s / v_a; above, v_s has another cause
 
 
 @kernel
 def can_ask(p: ControllerParams, longest_s: float) -> bool:
-    """Whether a period of at most `longest_s` is long enough, however little the noise."""
+    """Whether a period of at most `longest_s` is long enough for the least noise."""
     return max(_WINDOWS * p.window_s[0], _BLOCKS * p.block_s) <= longest_s
 
 
 @kernel
 def windows_for(p: ControllerParams, s: ControllerMemory, speed_mps: float) -> int:
-    """The shortest windows that show v_s well enough; -1 for none."""
+    """The level of the shortest windows with a small enough noise of v_s; -1: no level."""
     for level in range(p.levels):
         if s.pushed[level] < BINS:
             return -1
@@ -52,7 +52,7 @@ def windows_for(p: ControllerParams, s: ControllerMemory, speed_mps: float) -> i
 
 @kernel
 def begin_wobble(p: ControllerParams, s: ControllerMemory, speed_mps: float, longest_s: float) -> bool:
-    """Begin to ask, if a period of at most `longest_s` holds windows that show v_s well enough."""
+    """Begin a wobble if windows with a small enough noise of v_s fit into a period of at most `longest_s`."""
     level = windows_for(p, s, speed_mps)
     if level < 0:
         return False
@@ -67,15 +67,17 @@ def begin_wobble(p: ControllerParams, s: ControllerMemory, speed_mps: float, lon
 
 @kernel
 def wobble_factor(s: ControllerMemory) -> float:
-    """Of v_a, now."""
+    """Present factor of the wobble on v_a."""
     return 1.0 + DEPTH * math.cos(TWO_PI * s.wobble_s / s.wobble_period_s) if s.wobbles == 1 else 1.0
 
 
 @kernel
 def wobble(p: ControllerParams, s: ControllerMemory, speed_mps: float) -> bool:
-    """Add a block's v_a and v_s; return whether an answer is complete: after each `PERIODS`."""
+    """Add a block's v_a and v_s; return whether a round is complete: after each `PERIODS`."""
     turn_rad = TWO_PI * s.wobble_s / s.wobble_period_s
-    late_rad = math.pi * (p.window_s[s.wobble_level] - p.block_s) / s.wobble_period_s  # between the middles of both
+    late_rad = (
+        math.pi * (p.window_s[s.wobble_level] - p.block_s) / s.wobble_period_s
+    )  # from the middle of the window to the middle of the block
     weight = 1.0 - math.cos(turn_rad / PERIODS)
     v_s = weight * slide_mps(p, s, s.wobble_level, speed_mps)
     s.wobble_a[0] += weight * s.fast_mps * math.cos(turn_rad)
@@ -91,10 +93,10 @@ def wobble(p: ControllerParams, s: ControllerMemory, speed_mps: float) -> bool:
 
 @kernel
 def answer(s: ControllerMemory) -> int:
-    """Result of the wobble: FALLS if v_s follows by more than its share or follows something else; EVEN; or UNSURE: continue.
+    """Result of the wobble: FALLS if v_s changes by more than v_a or has another cause; EVEN; or UNSURE: continue.
 
-    The mass of the slide delays the answer by 1 / (1 + j x). Without mass the answer would be its squared size over its in-phase
-    part.
+    The mass of the slide delays the response by 1 / (1 + j x). The response without mass is the squared magnitude over the
+    in-phase part.
     """
     a, v = s.wobble_a, s.wobble_v
     asked = a[0] * a[0] + a[1] * a[1]
@@ -115,14 +117,14 @@ def answer(s: ControllerMemory) -> int:
 
 @kernel
 def slide_noise_mps(p: ControllerParams, s: ControllerMemory, level: int) -> float:
-    """Noise of v_s in a window."""
+    """Noise of v_s in a window [m/s]."""
     weight = _weight_by_place(p, s, level) + _weight_by_force(p, s, level)
     return 1.0 / math.sqrt(weight) if weight > 0.0 else math.inf
 
 
 @kernel
 def slide_mps(p: ControllerParams, s: ControllerMemory, level: int, speed_mps: float) -> float:
-    """v_s in a window, by position and force, each by its noise."""
+    """v_s in a window [m/s], from position and force, weighted by their noise."""
     by_place, by_force = _weight_by_place(p, s, level), _weight_by_force(p, s, level)
     place_mps = s.direction * s.slope[SLIDE, level]
     force_mps = speed_mps - s.direction * s.slope[FORCE, level] / s.stiffness_N_per_m

@@ -1,18 +1,18 @@
-"""How old the blocks are when they are answered, against the youngest ever: a computer, a link or a rig that became slow.
+"""Age of the blocks when they are answered, over the least age: it grows if the computer, the link or the rig became slow.
 
-Rig and controller have two clocks: their drift is forgotten, and with it a delay that lasts for minutes.
+Rig and controller have two clocks. Their drift is removed, and with it a delay that lasts for minutes.
 """
 
-MARGIN_NS = 15_000_000  # by which the loop may be late: v_a then stays within 4 %
-HOLD_NS = 200_000_000  # for which blocks are older until LATE is published; after a single stall it is less
-_DRIFT = 2e-4  # of two clocks
+MARGIN_NS = 15_000_000  # largest additional delay of the loop: v_a then stays within 4 %
+HOLD_NS = 200_000_000  # time for which blocks are older until LATE is published; a single stall is shorter
+_DRIFT = 2e-4  # largest relative drift of two clocks
 
 
 class Age:
-    """Follows the age of blocks."""
+    """Tracks the age of blocks."""
 
     def __init__(self) -> None:
-        self.late_ns = 0  # of the last block, against the youngest
+        self.late_ns = 0  # age of the last block minus the least age
         self._youngest_ns = 0.0
         self._last_ns: int | None = None
         self._since_ns: int | None = None
@@ -23,7 +23,7 @@ class Age:
         return self._since_ns is not None and self._last_ns is not None and self._last_ns - self._since_ns >= HOLD_NS
 
     def note(self, answered_ns: int, t_ns: int) -> None:
-        """Take a block: when it is answered by the controller's clock, and its time by the rig's."""
+        """Process a block: the time of the answer by the controller's clock, and the block's time by the rig's clock."""
         if answered_ns <= 0:  # a run in one process has no clock
             return
         age_ns = float(answered_ns - t_ns)

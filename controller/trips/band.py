@@ -1,9 +1,9 @@
 """The exciter's known gain, and the stroke that it allows.
 
-The known gain is the one that the rig's loop check measured at the tones next to a frequency, else the configured one, else the
-mean over the first tenth of a second of even vibration at the frequency, within the range of the check. It does not follow the
-gain learnt later: an accelerometer that loses its gain looks like an exciter that does, and the loop would raise the stroke for
-ever. So the stroke never exceeds the stroke for the wanted v_a at the known gain, times the band.
+The known gain of a frequency comes from the rig's loop check at the neighbouring tones, else from the configuration, else from
+the mean over the first tenth of a second of even vibration, within the range of the check. It does not follow the gain learnt
+later: an accelerometer that loses gain looks like an exciter that loses gain, and the loop would raise the stroke without end. So
+the stroke never exceeds the stroke for the wanted v_a at the known gain, times the band.
 """
 
 import math
@@ -11,7 +11,7 @@ import math
 from bridge.kernel import kernel
 from bridge.layouts import ControllerMemory, ControllerParams
 
-# Of even vibration that the known gain is a mean of; shorter: the noise of one fit; longer: later bounded
+# Time of even vibration over which the known gain is averaged; shorter: noise of a single fit; longer: later bounded
 KNOWN_S = 0.1
 
 CHECK_BLOCKS = 16  # after a check, in which its tones come; there are 8 at most
@@ -28,9 +28,9 @@ def begin_known(p: ControllerParams, s: ControllerMemory) -> None:
 
 @kernel
 def note_check(p: ControllerParams, s: ControllerMemory, tone_Hz: float, gain: float) -> None:
-    """Take a tone of the rig's loop check; from the tones beside a candidate its known gain is bounded.
+    """Store a tone of the rig's loop check; the tones next to a candidate bound its known gain.
 
-    Between two tones a mount may resonate, so the gain there counts as known where the two are alike.
+    Between two tones a mount may resonate, so the gain between them counts as known only if their gains are alike.
     """
     if gain <= 0.0 or s.checked_blocks >= CHECK_BLOCKS:
         return
@@ -61,15 +61,15 @@ def _use_check(p: ControllerParams, s: ControllerMemory) -> None:
 
 @kernel
 def _checked(p: ControllerParams, s: ControllerMemory, i: int) -> tuple[float, float]:
-    """The lowest and the highest gain that the check allows at a candidate: those at the tones beside it.
+    """The lowest and the highest gain that the check allows at a candidate: the gains at the tones next to it.
 
-    Beyond the last tone the gain may go on to change by as much as between the last two.
+    Beyond the last tone the gain may change by as much as between the last two tones.
     """
     way = 1 if s.tone_gain[i, 1] == 0.0 else -1
     j = i
     while s.tone_gain[j, 0] == 0.0 or s.tone_gain[j, 1] == 0.0:
         j -= way
-        if j < 0 or j >= p.candidates:  # one tone alone
+        if j < 0 or j >= p.candidates:  # there is a single tone
             only = max(s.tone_gain[i, 0], s.tone_gain[i, 1])
             return only, only
     low, high = min(s.tone_gain[j, 0], s.tone_gain[j, 1]), max(s.tone_gain[j, 0], s.tone_gain[j, 1])
@@ -79,14 +79,14 @@ def _checked(p: ControllerParams, s: ControllerMemory, i: int) -> tuple[float, f
 
 @kernel
 def forget_check(s: ControllerMemory) -> None:
-    """Another loop check begins."""
+    """Drop the result of the last loop check, as another begins."""
     s.checked_blocks, s.gain_other_s = 0, 0.0
     s.tone_Hz[:, :], s.tone_gain[:, :] = 0.0, 0.0
 
 
 @kernel
 def note_known(p: ControllerParams, s: ControllerMemory, i: int, gain: float) -> None:
-    """Learn the known gain of a candidate frequency, from the first even vibration alone."""
+    """Learn the known gain of a candidate frequency, only from its first even vibration."""
     if s.known_steps[i] < p.known_steps:
         s.known_steps[i] += 1
         s.known_gain[i] += (gain - s.known_gain[i]) / s.known_steps[i]
@@ -97,18 +97,18 @@ def note_known(p: ControllerParams, s: ControllerMemory, i: int, gain: float) ->
 
 @kernel
 def is_known(p: ControllerParams, s: ControllerMemory, i: int) -> bool:
-    """Whether the gain of a candidate is known well enough to judge by it."""
+    """Whether the gain of a candidate is known well enough to detect faults by it."""
     return s.known_steps[i] >= p.known_steps
 
 
 @kernel
 def banded(p: ControllerParams, s: ControllerMemory, wanted_m: float, model_m: float) -> float:
-    """The amplitude that the band allows [m]; sets whether it holds the amplitude back.
+    """The amplitude that the band allows [m]; sets `banded` if the band limits it.
 
     Args:
         p, s: records of `controller.records`.
-        wanted_m: by the learnt gain.
-        model_m: of a rigid mount, for the same v_a.
+        wanted_m: amplitude by the learnt gain.
+        model_m: amplitude on a rigid mount, for the same v_a.
 
     """
     i = s.candidate

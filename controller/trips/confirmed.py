@@ -1,9 +1,9 @@
 """Cross-check of v_d: the drive position alone must not raise the vibration.
 
-While it vibrates, the slide moves at v_d minus the rate of the spring's elongation: v_s + F' / k_d = v_d. If the drive position
+Under vibration the slide moves at v_d minus the rate of the spring's elongation: v_s + F' / k_d = v_d. If the drive position
 is faster than slide and force together, v_a follows these two. The law does not show which of its three signals is wrong: if only
-one changed, that one is doubted (DRIVE_DOUBTED, SLIDE_DOUBTED, FORCE_DOUBTED), else POSITIONS_APART names both positions. k_d is
-the largest value learnt, as diverging positions look like an ever softer spring.
+one signal changed, it is doubted (DRIVE_DOUBTED, SLIDE_DOUBTED, FORCE_DOUBTED), else POSITIONS_APART names both positions. k_d is
+the largest learnt value, as diverging positions look like an increasingly soft spring.
 """
 
 import math
@@ -16,33 +16,37 @@ from controller.trips.delivered import SOME
 from controller.trips.doubts import CONTACT, trip
 from controller.trips.doubts import DRIVE as DRIVE_DOUBT
 
-WINDOW_S = 0.05  # shortest; shorter: nothing, as v_a changes no faster by it
-_LONGER = 4  # further, longer levels for feeds below the noise
-_EXACT = 0.05  # noise of both places over v_d, at most
-_APART = 1.2  # by which they are apart; scales are better
-_MARGIN = 1.1  # of v_a over the confirmed velocity, once they differ
-_RISES_S = 1.0  # time constant in which more is confirmed while they are apart: v_a that changes moves slide and force
-_WINDOWS = 5.0 * BINS  # that taught a stiffness: BINS in a row overlap, and in hum five of them agree on a wrong one
-_SURE = 0.03  # of a learnt stiffness, over itself; the first ones are a third too large
+WINDOW_S = 0.05  # shortest window; v_a cannot change faster
+_LONGER = 4  # number of longer levels for feeds below the noise
+_EXACT = 0.05  # largest noise of both positions over v_d
+_APART = 1.2  # ratio of the two velocities from which they disagree; errors of scale are smaller
+_MARGIN = 1.1  # margin on the confirmed velocity while they disagree
+_RISES_S = (
+    1.0  # time constant of a rise of the confirmed share while they disagree, as a change of v_a moves slide and force
+)
+_WINDOWS = (
+    5.0 * BINS
+)  # fewest windows of a learnt stiffness: BINS windows overlap, and under hum five may agree by chance
+_SURE = 0.03  # largest relative sigma of a learnt stiffness; the first values are a third too large
 # Share of v_d below which the slide sticks, and the share that counts as confirmed then: the rest depends on the stiffness.
 _STICKS, _STUCK = 0.25, 0.4
-_SOFTER = 2.0  # times that the spring may be softer here than where it was stiffest
-_TWICE = 2.0  # ratio of the two changes from which only the larger one counts as a change
-_SAME = 0.08  # of v_d: a smaller change of a velocity is none; less than half of the difference at that time
-_NONE = -1  # row of none
-TRIP_S = 0.3  # for which they differ until it trips; longer than a reversing drive needs to cross its backlash
+_SOFTER = 2.0  # largest stiffness of the spring over its present stiffness
+_TWICE = 2.0  # ratio of two changes from which only the larger counts as a change
+_SAME = 0.08  # smallest change of a velocity over v_d: less than half of the difference at a trip
+_NONE = -1  # no row: unknown signal
+TRIP_S = 0.3  # time of disagreement until a trip; longer than a reversing drive needs to cross its backlash
 
 
 @kernel
 def watch_confirmed(p: ControllerParams, s: ControllerMemory) -> None:
-    """Follow the confirmed share of v_d; trip if nothing is confirmed for long. Once in SOME steps."""
+    """Update the confirmed share of v_d; trip if v_d stays unconfirmed. Called every SOME steps."""
     some_s = SOME * p.block_s
     vibrates = s.moving == 1 and (s.allowed_m > 0.0 or s.confirmed < 1.0)
     s.shaken_s = s.shaken_s + some_s if vibrates else 0.0
     if s.stiffness_learnt == 1 and s.stiffness_sigma < _SURE and s.taught >= _WINDOWS:
         s.stiffest_N_per_m = max(s.stiffest_N_per_m, s.stiffness_N_per_m)
     level = _level(p, s)
-    if s.doubted & CONTACT and s.trip != POSITIONS_APART:  # by a force or a slide that is doubted nothing is confirmed
+    if s.doubted & CONTACT and s.trip != POSITIONS_APART:  # a doubted force or slide confirms nothing
         s.apart_s, s.confirmed = 0.0, 1.0
         return
     if s.moving == 0:
@@ -55,7 +59,7 @@ def watch_confirmed(p: ControllerParams, s: ControllerMemory) -> None:
     sticks = slide_mps < _STICKS * drive_mps
     if (_STUCK if sticks else 1.0 / _APART) < share < _APART:
         s.apart_s, s.confirmed = 0.0, 1.0
-        if not sticks:  # a slide that sticks has nothing to say of its gain
+        if not sticks:  # a stuck slide gives no information on the scale of its position
             s.agreed_mps[DRIVE], s.agreed_mps[SLIDE] = drive_mps, slide_mps
         return
     if s.apart_s == 0.0:
@@ -71,14 +75,14 @@ def watch_confirmed(p: ControllerParams, s: ControllerMemory) -> None:
         if s.apart_by == DRIVE:
             trip(s, DRIVE_DOUBTED, DRIVE_DOUBT)
         else:
-            # a slide that became slower may be so: then it is the force that does not follow
+            # a slide may really become slower: then the force is wrong, as it does not follow
             by_change = SLIDE_DOUBTED if share > 1.0 else FORCE_DOUBTED
             trip(s, POSITIONS_APART if s.apart_by == _NONE else by_change, CONTACT)
 
 
 @kernel
 def _changed(s: ControllerMemory, drive_mps: float, slide_mps: float) -> int:
-    """The row of the one signal that changed since all three agreed; _NONE where two did, or they never agreed."""
+    """The row of the signal that alone changed since all three agreed; _NONE if two changed, or they never agreed."""
     if s.agreed_mps[DRIVE] == 0.0:
         return _NONE
     drive_by_mps = math.fabs(drive_mps - s.agreed_mps[DRIVE])
@@ -92,7 +96,7 @@ def _changed(s: ControllerMemory, drive_mps: float, slide_mps: float) -> int:
 
 @kernel
 def _level(p: ControllerParams, s: ControllerMemory) -> int:
-    """The shortest windows under vibration in which both positions move by more than noise; -1 for none."""
+    """Level of the shortest windows under vibration in which the motion exceeds the noise; -1: no level."""
     for level in range(p.confirm_level, min(p.confirm_level + _LONGER, p.levels)):
         window_s = p.window_s[level]
         if s.pushed[level] < 2 * BINS or s.shaken_s < 2.0 * window_s or s.moved_s < 2.0 * window_s:

@@ -1,8 +1,8 @@
 """Measured v_a against the v_a expected from command and known gain, while the command is even.
 
-Less than the band allows: OPEN_LOOP, or a more exact reason from the block's samples. A gain lost within a second, by more than
-the band, trips as well. A slow loss inside the band is normal for an exciter that warms up; beyond it `band` limits the stroke.
-More than the band allows: RESONANCE, and the command is lowered, as a mount may have come loose.
+Less than the band allows: OPEN_LOOP, or a more exact reason from the block's samples. A loss of gain within a second by more than
+the band trips as well. A slow loss inside the band is normal for an exciter that warms up; beyond it `band` limits the stroke.
+More than the band allows: RESONANCE, and the command is lowered, as a mount may have loosened.
 """
 
 import math
@@ -16,31 +16,31 @@ from controller.vibration import velocity_of
 
 _TWO_PI = 2.0 * math.pi
 SOME = 4  # steps between two slow checks
-_EVEN = 0.05  # change of the commanded v_a, over its low-pass, up to which it is even
-HOLD_S = 0.05  # of too little v_a until it trips; until then the band bounds v_a
-LOUD_HOLD_S = 0.1  # of too much, until it is reported; a slip that shakes the base is shorter
-GROWN_HOLD_S = 1.0  # of half as much too much, on a scale of factors: a gain that grows slowly
-PASSED_S = 1.0  # without too much until that is over
-FOLLOW_S = 1.0  # time constant of the gain that a sudden loss is compared with
+_EVEN = 0.05  # largest change of an even commanded v_a, over its low-pass
+HOLD_S = 0.05  # time of too small a v_a until a trip; until then the band bounds v_a
+LOUD_HOLD_S = 0.1  # time of too large a v_a until RESONANCE; a slip that shakes the base is shorter
+GROWN_HOLD_S = 1.0  # time above the square root of the band until RESONANCE: a gain that grows slowly
+PASSED_S = 1.0  # time without too large a v_a until RESONANCE ends
+FOLLOW_S = 1.0  # time constant of the gain with which a sudden loss is compared
 _NO_SINE = 0.25  # mean square of the rest over the mean square of the sine, from which an acceleration is not a sine
-_NOISIER = 16.0  # and over its value before
-_AT_EXTREME = 0.99  # of the largest sample of a block, from which another is as large
-_CLIPPED_SHARE = 0.3  # of samples at the extremes; a sine has 0.09 there
-_MOST_OFF = 1.6  # factor by which the slide's accelerometer may miss the known gain when it is in the base's place
+_NOISIER = 16.0  # smallest growth of the mean square of the rest at a trip
+_AT_EXTREME = 0.99  # share of the largest sample of a block from which a sample is at the extreme
+_CLIPPED_SHARE = 0.3  # share of samples at the extremes from which a block is clipped; a sine has 0.09
+_MOST_OFF = 1.6  # largest deviation from the known gain, as a factor, of a slide accelerometer swapped with the base's
 
 
 @kernel
 def note_command(s: ControllerMemory, expected_mps: float) -> None:
-    """Count for how many steps the commanded v_a that is heard now has been even [m/s]."""
+    """Count the steps for which the expected v_a [m/s] has been even."""
     apart_mps = math.fabs(expected_mps - s.expected_mps)
     s.even_steps = s.even_steps + 1 if expected_mps > 0.0 and apart_mps < _EVEN * expected_mps else 0
 
 
 @kernel
 def is_even(p: ControllerParams, s: ControllerMemory) -> bool:
-    """Whether the measured v_a can be compared with the commanded one, whichever of the delays that were seen holds.
+    """Whether the measured v_a can be compared with the commanded v_a, for any of the measured delays.
 
-    Before the first of a vibration is heard, its delay may be any that the loop is made for.
+    Until a vibration is first detected, its delay may be any delay that the loop is designed for.
     """
     if s.listening == 1 and s.onset_steps <= p.slot_steps * p.slots:
         return False
@@ -49,7 +49,7 @@ def is_even(p: ControllerParams, s: ControllerMemory) -> bool:
 
 @kernel
 def watch_delivered(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> None:
-    """Compare; trip where v_a is too little for its hold time, and count for how long it is too much."""
+    """Compare v_a; trip if it is too small for the hold time, and count the steps for which it is too large."""
     i = s.candidate
     if s.followed != i or not is_known(p, s, i):
         s.followed, s.followed_gain, s.low_steps = i, s.known_gain[i], 0
@@ -79,7 +79,7 @@ def watch_delivered(p: ControllerParams, s: ControllerMemory, block: SensorRow) 
 
 @kernel
 def _cause(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> int:
-    """What a block says of an accelerometer that shows too little: clipped, the slide's instead of the base's, or neither."""
+    """Cause of too small a v_a, from a block: clipped, swapped with the slide's accelerometer, or unknown."""
     if clips(block.base_accel_mps2):
         return CLIPPED
     of_slide_mps = velocity_of(p, s.demodulated_Hz, block.mass_accel_mps2)
@@ -102,9 +102,9 @@ def clips(samples: Record) -> bool:
 
 @kernel
 def watch_rest(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> None:
-    """Trip where the acceleration is no sine any more, though it was: clipped, or drowned in noise. Once in SOME steps.
+    """Trip if the acceleration was a sine and is not any more: clipped or noisy. Called every SOME steps.
 
-    The sine is that of the wanted v_a: noise that is far louder is taken for v_a, and less is commanded.
+    The reference is the sine of the wanted v_a: far stronger noise would look like v_a, and reduce the command.
     """
     if s.wanted_velocity_mps == 0.0 or not is_known(p, s, s.candidate):
         return
@@ -127,5 +127,5 @@ def watch_rest(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> No
 
 @kernel
 def is_loud(s: ControllerMemory) -> bool:
-    """Whether more v_a is measured than the known gain gives, now or a moment ago."""
+    """Whether v_a is, or was within PASSED_S, larger than by the known gain."""
     return s.high_steps < 0

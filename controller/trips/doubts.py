@@ -1,7 +1,7 @@
 """Which signals are doubted, and the response.
 
-Accelerometer doubted: the vibration continues open loop, at the known gain. Force or slide position doubted: it vibrates
-whenever the drive moves, as when blind. Drive position doubted: it fades to zero, as v_a cannot be related to v_d.
+Accelerometer doubted: the vibration continues open loop, at the known gain. Force or slide position doubted: vibration
+whenever the drive moves, as when blind. Drive position doubted: the vibration fades to zero, as v_d is unknown.
 A trip lasts until the operator resets it or runs a new loop check of the rig.
 """
 
@@ -22,9 +22,9 @@ CHANNELS = 4
 
 @kernel
 def trip(s: ControllerMemory, reason: int, doubts: int) -> None:
-    """Doubt signals; the first trip is reported until it ends, unless a later one ends the vibration.
+    """Doubt signals; the first trip is reported until it ends, unless a later trip ends the vibration.
 
-    After a stall of the computer a doubt waits: a signal that is broken is still broken when the wait is over.
+    Soon after a stall of the computer no doubt begins; a broken signal is still broken afterwards.
     """
     if not is_judged(s):
         return

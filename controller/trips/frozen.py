@@ -1,8 +1,8 @@
-"""Channels that repeat their bits: a converter that hangs, a wire that is cut, a range that is at its end.
+"""Channels that repeat their bits: a converter that hangs, a cut wire, a range that is exceeded.
 
 A channel with noise never repeats a number for long. Whether it has noise is learnt from the samples of a block, separately for a
-moving drive and a drive at rest: noise goes up and down within a block, while an encoder without noise steps one way, and repeats
-one number for hours at rest.
+moving drive and a drive at rest: noise goes up and down within a block, while an encoder without noise steps in one direction and
+repeats a number for hours at rest.
 """
 
 import math
@@ -29,23 +29,23 @@ from controller.trips.noise import look_at_noise
 HOLD_S, FEWEST = (
     0.05,
     40,
-)  # of equal samples, and blocks of them, until it trips: at a noise of one step half of all are equal
-# Parts of HOLD_S. If all channels repeat for one part, their reader hangs: treated as a silent rig.
+)  # time and number of blocks with equal first samples until a trip: with a noise of one step, half of all samples are equal
+# If all channels repeat for this part of HOLD_S, their reader hangs: treated as a silent rig.
 _ALL_PARTS = 2
-_FASTEST_MPS = 100.0  # of a drive; a place that goes faster was not gone through
-_LOOK_STEPS = 16  # blocks between looks at the noise of one channel and the next
-_LOOKS = 8  # until a channel counts as one with noise
-_LIVELY = 0.9  # share of the looks that must show it
-_DROPS_S, _MOST_DROPS = 1.0, 3.5  # time constant of the count of dropouts, and how many are too many
-_DEAD_S = 0.3  # of a move in which a force has not changed since the start
-_SAME = 4  # equal samples in a row from which a look gives no information on the noise
+_FASTEST_MPS = 100.0  # largest velocity of a drive; a faster change of position is a wrong unit or channel
+_LOOK_STEPS = 16  # blocks between the checks of the noise of a channel and of the next channel
+_LOOKS = 8  # number of checks until a channel may count as noisy
+_LIVELY = 0.9  # share of the checks that must show noise
+_DROPS_S, _MOST_DROPS = 1.0, 3.5  # time constant of the count of dropouts, and the largest count
+_DEAD_S = 0.3  # time of motion after which a force must have changed since the start of the run
+_SAME = 4  # number of equal successive samples from which a check gives no information on the noise
 
 
 @kernel
 def watch_frozen(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> None:
-    """Count blocks that begin with the same number as the one before; trip where a channel that has noise shows none.
+    """Count blocks that begin with the same number as the block before; trip if a channel with noise shows no noise.
 
-    A drive that is somewhere else from one block to the next has another unit, or another channel's wire.
+    A drive position that changes impossibly fast has another unit, or is another channel.
     """
     if s.steps % _LOOK_STEPS == 0:
         _look_at_one(s, block)
@@ -61,7 +61,7 @@ def watch_frozen(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> 
     if p.use_force == 1 and _repeats(p, s, OF_FORCE, float(block.drive_force_N[0])):
         trip(s, FROZEN, CONTACT)
     if p.use_force == 1 and s.moved_s > _DEAD_S and s.same_steps[OF_FORCE] >= s.steps - 1:
-        trip(s, FROZEN, CONTACT)  # it never changed at all, and a drive that moves winds up its spring
+        trip(s, FROZEN, CONTACT)  # the force never changed, although a moving drive winds up its spring
     if p.use_slide_position == 1 and _repeats(p, s, OF_SLIDE, float(block.mass_position_m[0])):
         trip(s, FROZEN, CONTACT)
     if _repeats(p, s, OF_DRIVE, place_m):
@@ -75,7 +75,7 @@ def watch_frozen(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> 
 
 @kernel
 def _watch_drops(p: ControllerParams, s: ControllerMemory, samples: Record) -> None:
-    """Count the times that a vibration ends in blocks of one number alone; trip where they are too many within a second."""
+    """Count dropouts to blocks of a constant number during a vibration; trip if there are too many within a second."""
     s.drops *= 1.0 - min(p.block_s / _DROPS_S, 1.0)
     dropped = s.allowed_m > 0.0 and _is_one_number(samples)
     if dropped and s.dropped == 0:
@@ -96,7 +96,7 @@ def _is_one_number(samples: Record) -> bool:
 
 @kernel
 def _look_at_one(s: ControllerMemory, block: SensorRow) -> None:
-    """Look at one channel in turn."""
+    """Check the noise of one channel, in turn."""
     channel = s.looked % CHANNELS
     s.looked += 1
     if s.same_steps[channel] >= _SAME:
@@ -116,7 +116,7 @@ def _look_at_one(s: ControllerMemory, block: SensorRow) -> None:
 
 @kernel
 def _state(s: ControllerMemory, channel: int) -> int:
-    """The condition that the noise of a channel depends on: whether the base vibrates, or the drive moves."""
+    """The condition on which the noise of a channel depends: whether the base vibrates, or the drive moves."""
     if channel == OF_BASE:
         return 1 if s.allowed_m > 0.0 else 0
     return s.moving
@@ -148,7 +148,7 @@ def _has_noise(s: ControllerMemory, channel: int) -> bool:
 
 @kernel
 def _all_repeat(p: ControllerParams, s: ControllerMemory) -> bool:
-    """Whether all channels repeat their numbers, and the accelerometer of the base has noise: one without may stand."""
+    """Whether all channels repeat their numbers, and the base accelerometer has noise; without noise it may be constant."""
     fewest = min(s.same_steps[OF_BASE], s.same_steps[OF_DRIVE])
     if p.use_force == 1:
         fewest = min(fewest, s.same_steps[OF_FORCE])

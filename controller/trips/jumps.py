@@ -1,4 +1,4 @@
-"""A place of the drive that jumps: from one block to the next by far more than in the blocks before and after."""
+"""Jumps of the drive position: from one block to the next by far more than in the blocks before and after."""
 
 import math
 
@@ -9,19 +9,19 @@ from controller.estimate.windows import BINS, clear_windows
 from controller.estimate.windows import DRIVE as DRIVE_ROW
 from controller.trips.doubts import DRIVE, OF_DRIVE, trip
 
-_FARTHER = 10.0  # than in the blocks before and after
-_BENDS = 20.0  # of the bend within a block, which is noise: 2 sigma of it
-_ANOTHER = 0.3  # change of v_d, over it, with a jump: a unit that changed
-_SIGMAS = 3.0  # and of its noise
-_STEPS = 4.0  # of the resolution
-HOLD_S = 0.1  # for which v_d keeps its value before the jump, while the windows refill
-_MOST = 2.5  # jumps within FORGET_S, from which the place is doubted
-FORGET_S = 1.0
+_FARTHER = 10.0  # smallest jump over the steps in the blocks before and after
+_BENDS = 20.0  # smallest jump over the mean second difference in a block, the noise
+_ANOTHER = 0.3  # relative change of v_d at a jump from which the unit changed
+_SIGMAS = 3.0  # sigmas of v_d that are added to this limit
+_STEPS = 4.0  # smallest jump over the resolution
+HOLD_S = 0.1  # time for which v_d keeps its value before the jump, while the windows refill
+_MOST = 2.5  # count of jumps from which the position is doubted
+FORGET_S = 1.0  # time constant of this count
 
 
 @kernel
 def watch_jumps(p: ControllerParams, s: ControllerMemory, place_m: float, blocks: int) -> None:
-    """Take the first place of a block, and how many blocks it is after the last; judge the way before this one."""
+    """Process the first position of a block, `blocks` after the last block; judge the step before the present step."""
     if s.jumped_s > 0.0:
         s.jumped_s = max(s.jumped_s - p.block_s, 0.0)
         if s.jumped_s == 0.0 and _is_another_speed(p, s):
@@ -38,14 +38,14 @@ def watch_jumps(p: ControllerParams, s: ControllerMemory, place_m: float, blocks
         return
     s.jumped_s, s.shaken_s = HOLD_S, 0.0
     s.jumps += 1.0
-    clear_windows(s)  # a window that holds a jump teaches noise and a soft spring
+    clear_windows(s)  # a window with a jump would raise the noise and soften the spring
     if s.jumps > _MOST:
         trip(s, DRIVE_DOUBTED, DRIVE)
 
 
 @kernel
 def _is_another_speed(p: ControllerParams, s: ControllerMemory) -> bool:
-    """Whether the drive goes at another speed than before a jump."""
+    """Whether the drive has another speed than before a jump."""
     level = max(s.spring_level, p.spring_level)
     if s.pushed[level] < BINS:
         return False

@@ -1,6 +1,6 @@
-"""Noise that grows many times: the windows learn it again, as with the old value they would take noise for motion.
+"""Noise that grows many times: the windows learn it again, as with the old value noise would look like motion.
 
-And more slips than the spring could wind up for: these are noise.
+More slips than the spring could wind up for count as noise, too.
 """
 
 import math
@@ -11,17 +11,17 @@ from controller.estimate.windows import DRIVE, LEVELS
 from controller.trips.delivered import SOME
 
 _LOUDER = 4.0  # growth of the drive position's second difference that counts as a new noise level
-_LEARN = 1.0 / 16.0  # share of one look
+_LEARN = 1.0 / 16.0  # weight of a new measurement
 _SLIPS_S = 1.0  # time constant of the count of slips
-# Most slips: this number plus this factor times the slips that the spring could wind up for.
+# Slips count as noise above this number, and above this factor times the slips for which the spring could wind up.
 _MOST_SLIPS, _TIMES = 8.0, 3.0
-_UNBELIEVED_S = 2.0  # for which slips are not believed after too many of them
-_TOLD_S = 2.0  # for which grown noise is reported
+_UNBELIEVED_S = 2.0  # time for which slips are ignored after too many of them
+_TOLD_S = 2.0  # time for which grown noise is reported
 
 
 @kernel
 def look_at_noise(s: ControllerMemory, samples: Record) -> None:
-    """Follow the second difference of the drive position within a block; restart the learning of noise after two large ones."""
+    """Update the second difference of the drive position; after two large ones, restart the learning of the noise."""
     bend_m = 0.0
     for i in range(2, samples.shape[0]):
         bend_m += math.fabs(float(samples[i]) - 2.0 * float(samples[i - 1]) + float(samples[i - 2]))
@@ -41,12 +41,12 @@ def look_at_noise(s: ControllerMemory, samples: Record) -> None:
 
 @kernel
 def watch_slips(p: ControllerParams, s: ControllerMemory) -> None:
-    """Do not believe slips for a while where there are too many. Once in SOME steps."""
+    """Ignore slips for a time if there are too many. Called every SOME steps."""
     some_s = SOME * p.block_s
     keep = 1.0 - min(some_s / _SLIPS_S, 1.0)
     s.slip_count *= keep
     s.slips_wound *= keep
-    if s.moving == 1:  # at the speed of then: a drive that slows down has slipped as often as it could
+    if s.moving == 1:  # integrated, as the speed of the drive may change
         s.slips_wound += some_s / max(s.expected_stick_s, some_s)
     s.unbelieved_s = max(s.unbelieved_s - some_s, 0.0)
     s.noise_told_s = max(s.noise_told_s - some_s, 0.0)

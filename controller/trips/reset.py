@@ -49,7 +49,7 @@ def _forget_forces(p: ControllerParams, s: ControllerMemory) -> None:
 
 @kernel
 def forget_needs(p: ControllerParams, s: ControllerMemory) -> None:
-    """Forget where a vibration was needed, was not, or did not help: an exciter that was off taught some of it."""
+    """Forget where a vibration was needed, was not, or did not help: some may have been learnt with the exciter off."""
     for needs in (s.edge_ratio, s.edge_held_s, s.probe_s, s.needed_to_mps, s.needless_from_mps, s.rough_with):
         needs[:] = 0.0
     s.ratio[:] = p.v_ratio

@@ -1,10 +1,10 @@
 """Force and positions against the law of the drive's spring: F' = k_d (v_d - v_s).
 
-The law holds while the slide sticks, slips, slides and vibrates, as the force is the spring's. It breaks where the spring winds
-up and the force is dead, frozen or of another gain or sign, and where a position has another unit. It is checked in the shortest
-window in which half of v_d exceeds the noise, and trips once it is broken for longer than a window remembers a jump. The drive
-position is doubted if v_d changed, the slide position if it is faster than drive and spring explain, else the force. Until then
-v_d keeps its value before the break, and slips do not count.
+The law holds while the slide sticks, slips, slides and vibrates. It is broken if the spring winds up and the force is dead,
+frozen or has another gain or sign, and if a position has another unit. It is checked in the shortest window in which half of v_d
+exceeds the noise, and trips once it is broken for longer than a jump stays in a window. The drive position is doubted if v_d
+changed, the slide position if it is faster than drive and spring explain, else the force. Until the trip v_d keeps its value
+before the break, and slips do not count.
 """
 
 import math
@@ -17,28 +17,28 @@ from controller.trips.delivered import SOME
 from controller.trips.doubts import CONTACT, trip
 from controller.trips.doubts import DRIVE as DRIVE_DOUBT
 
-SHORTEST_S = 0.01  # window; shorter: a force that comes 2 ms late breaks the law in every slip
-HOLD_S, _WINDOWS = 0.05, 2.0  # and windows, in which the law is broken until it trips
+SHORTEST_S = 0.01  # shortest window; in a shorter one a force with a delay of 2 ms breaks the law in every slip
+HOLD_S, _WINDOWS = 0.05, 2.0  # time plus number of windows for which the law is broken until a trip
 FIRST_S = 0.015  # first part of HOLD_S, which decides the doubted signal
-_SIGMAS = 8.0
-# Of the larger of the two sides by which they may differ: a spring is softer or stiffer at places by a factor of 5. Where k_d is
-# configured and not learnt yet, by a factor of 20.
+_SIGMAS = 8.0  # least ratio of half of v_d to the noise in a window
+# Largest difference of the two sides, over the larger side: for a spring that is softer or stiffer by a factor of 5; by a factor
+# of 20 while k_d is configured and not learnt yet.
 _OFF, _TOLD_OFF = 0.8, 0.95
-_SURE = 0.06  # of a learnt stiffness, over itself, up to which it takes the place of the one before
-_HALF = 0.5  # of v_d: a difference that counts
+_SURE = 0.06  # largest relative sigma of a learnt stiffness that replaces the last one
+_HALF = 0.5  # smallest difference that counts, over v_d
 _TWICE = 2.0  # change of v_d over the change of v_s from which the drive is doubted
 
 
 @kernel
 def watch_spring(p: ControllerParams, s: ControllerMemory) -> None:
-    """Look at one window; trip where it has broken the law for too long. Once in SOME steps."""
+    """Check a window; trip if the law is broken for too long. Called every SOME steps."""
     level = _level(p, s)
     if level < 0:
         return
     known = s.kept_N_per_m > 0.0 and s.stiffness_learnt == 1 and s.stiffness_sigma > _SURE
     if (
         s.broken_steps == 0 and not known
-    ):  # a fault teaches another stiffness, and so does noise where no spring winds up
+    ):  # during a fault, or by noise if no spring winds up, a wrong stiffness is learnt
         s.kept_N_per_m = s.stiffness_N_per_m
     by_force_mps = s.slope[FORCE, level] / s.kept_N_per_m
     drive_mps, slide_mps = s.slope[DRIVE, level], s.slope[SLIDE, level]
@@ -56,7 +56,7 @@ def watch_spring(p: ControllerParams, s: ControllerMemory) -> None:
     if s.broken_steps == 0:
         s.broken_drive, s.broken_slide = 0, 0
     s.broken_steps += SOME
-    if s.broken_steps <= p.first_steps:  # later the slide has changed, too, as the vibration follows v_d
+    if s.broken_steps <= p.first_steps:  # later the slide changes, too, as the vibration follows v_d
         s.broken_drive += 1 if drive_by_mps > _TWICE * slide_by_mps else -1
     fastest_mps = max(math.fabs(drive_mps), math.fabs(s.kept_mps[DRIVE]), math.fabs(by_force_mps))
     s.broken_slide += 1 if math.fabs(slide_mps) > _TWICE * fastest_mps else -1  # a slip is over before it trips
@@ -76,7 +76,7 @@ def _largest_mps(p: ControllerParams, s: ControllerMemory) -> float:
 
 @kernel
 def _level(p: ControllerParams, s: ControllerMemory) -> int:
-    """The shortest windows in which half of v_d exceeds the noise; -1 for none. Once broken, the same as before."""
+    """Level of the shortest windows in which half of v_d exceeds the noise; -1: no level. Constant while the law is broken."""
     if s.broken_steps > 0:
         return s.spring_level
     counts_mps = _HALF * _largest_mps(p, s)
@@ -94,5 +94,5 @@ def _level(p: ControllerParams, s: ControllerMemory) -> int:
 
 @kernel
 def is_drive_off(s: ControllerMemory) -> bool:
-    """Whether the law is broken now by a change of the drive position."""
+    """Whether the law is presently broken by a change of the drive position."""
     return s.broken_steps > 0 and s.broken_drive > 0

@@ -1,4 +1,4 @@
-"""Events of the controller's trips and limits: the begin of each, and the end of a trip."""
+"""Events of the controller's trips and limits: the start of each, and the end of a trip."""
 
 from typing import Any
 
@@ -10,13 +10,13 @@ from bridge.wire.event_codes import TRIPS, WEAK_REASONS
 from bridge.wire.words import help_of, word_of
 
 _LIMITS: dict[int, str] = {wire.RANGE: "STROKE_MAX", wire.GAIN_LIMIT: "GAIN_LIMIT"}
-_HELD_S = 0.2  # of a limit until it is reported: every start of a vibration passes some limits
+_HELD_S = 0.2  # duration of a limit until it is reported: every start of a vibration meets some limits
 _STALLED = "; but the computer or the link stalled within the last second: look at that first"
-_AGAIN_S = 1.0  # between two reports of the same code
+_AGAIN_S = 1.0  # least time between two reports of the same code
 
 
 def changes(trace: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
-    """Which rows of a trace may hold news: the first, those that differ from the row before, and the last."""
+    """Rows of a trace that may cause events: the first, rows that differ from the row before, and the last."""
     new = np.zeros(len(trace), bool)
     new[:1] = new[-1:] = True
     for name in ("reason", "limit"):
@@ -32,7 +32,7 @@ class TripEvents:
         self._reasons = {number: (name, help_of("reason", name)) for number, name in names.items()}
         self._limits = {number: (name, help_of("limit", word_of("limit", number))) for number, name in _LIMITS.items()}
         self._reason = self._limit = 0
-        self._open: list[str] = []  # trips since the last step without one; a trip may hide another
+        self._open: list[str] = []  # trips since the last step without a trip, as a trip may hide another
         self._limit_since_ns = 0
         self._limit_reported = True
         self._reported_ns: dict[str, int] = {}

@@ -1,4 +1,4 @@
-"""All trips, once a block: the checks before the policy decides, and the limits of a doubt on the wanted v_a after it."""
+"""All trips, once a block: the checks before the policy, and after it the limits of the wanted v_a by a doubt."""
 
 import math
 
@@ -16,7 +16,7 @@ from controller.trips.spring import is_drive_off, watch_spring
 
 @kernel
 def watch(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> None:
-    """Look for faults in a block after its estimate, and hide doubted signals from the policy."""
+    """Detect faults in a block after its estimate, and hide doubted signals from the policy."""
     watch_frozen(p, s, block)
     watch_delivered(p, s, block)
     s.slip_count += s.slip_began
@@ -39,7 +39,7 @@ def watch(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> None:
         s.slip_began, s.stick_began = 0, 0
     if doubted:
         s.blind = 1
-        for way in range(s.ratio.shape[0]):  # doubtful slips may have raised it
+        for way in range(s.ratio.shape[0]):  # false slips may have raised the ratio
             s.ratio[way] = min(s.ratio[way], p.v_ratio)
 
 
@@ -53,7 +53,7 @@ def _look_at_slide_accel(s: ControllerMemory, samples: Record) -> None:
 
 @kernel
 def restrain(p: ControllerParams, s: ControllerMemory) -> None:
-    """After the policy: no vibration without a v_d or outside of the travel, and no frequency whose gain is not known."""
+    """Restrain the policy: no vibration without v_d or outside of the travel, no frequency without a known gain."""
     if s.doubted & DRIVE or s.outside == 1:
         s.wanted_velocity_mps = 0.0
     elif is_drive_off(s) or s.jumped_s > 0.0:
@@ -66,7 +66,7 @@ def restrain(p: ControllerParams, s: ControllerMemory) -> None:
 
 @kernel
 def reported_reason(s: ControllerMemory) -> int:
-    """The reason that a command carries: first the trip, then passing conditions, then the policy's reason."""
+    """The reason in a command: the trip, else a passing condition, else the policy's reason."""
     if s.trip > 0:
         return s.trip
     if s.outside == 1:

@@ -11,18 +11,18 @@ _POSITIVE: TypeAdapter[float] = TypeAdapter(Positive)
 # Presliding length that is assumed when no contact stiffness is given: the paper's steel pair reaches its static force after
 # 0.22 um, and other metals after a fraction of a micrometre. Too small: a stiff contact, small steps; too large: soft sticks.
 _PRESLIDING_M = 0.22e-6
-_TOLERANCE = 0.3  # relative, of the numbers that follow from it: 3.3 standard deviations reach 0.11 to 2.2 um
+_TOLERANCE = 0.3  # relative tolerance of the contact numbers: 3.3 standard deviations reach 0.11 to 2.2 um
 # Stribeck velocities of dry and boundary-lubricated pairs lie between 0.1 and 10 mm/s.
 _STRIBECK_MPS = 1e-3
 _WIDE = 1.0  # tolerance of an unknown number: it may be a third or three times as large
-_SLIP_S = 0.1  # duration of a slip that gives a mass where the runs do not show one
-WIDE = ("mass_kg", "stribeck_velocity_mps")  # numbers that are assumed so widely that they decide nothing
+_SLIP_S = 0.1  # assumed duration of a slip, for a mass that the runs do not show
+WIDE = ("mass_kg", "stribeck_velocity_mps")  # numbers with so wide a tolerance that they decide nothing
 
 
 def with_assumed(given: dict[str, Any], mass_kg: float | None = None) -> tuple[dict[str, Any], list[str]]:
     """The table `[rig]` with every number that may be left out, with tolerances; and the names of the added numbers.
 
-    `mass_kg` is the mass that the runs show, for a table without a mass.
+    `mass_kg`: the mass estimated from the runs, for a table without a mass.
     """
     table = dict(given)
     turns = table.get("drive") == "torsion"
@@ -33,7 +33,7 @@ def with_assumed(given: dict[str, Any], mass_kg: float | None = None) -> tuple[d
     radius_m = _positive(table.get("radius_m", 1.0)) if turns else 1.0
     if "mass_kg" not in table:
         assumed["mass_kg"] = mass_kg or _mass_kg(table.get("drive_stiffness_N_per_m"), static_N)
-    # on a rig that turns the way in rad is shorter by the radius
+    # on a rotary rig the way in rad is the way in m over the radius
     assumed["stribeck_velocity_mps"] = _STRIBECK_MPS / radius_m
     mass = _positive(table.get("mass_kg", assumed.get("mass_kg")))
     stiffness = _positive(table.get("contact_stiffness_N_per_m", static_N / (_PRESLIDING_M / radius_m)))
@@ -57,7 +57,7 @@ def _mass_kg(stiffness_N_per_m: Any, static_N: float) -> float:
 
 
 def _positive(value: Any) -> float:
-    """The number, or 1 where `validate` will refuse it: one wrong number must not make others seem to be missing."""
+    """The number, or 1 where `validate` will refuse it: a wrong number must not make others seem to be missing."""
     try:
         return _POSITIVE.validate_python(value, strict=True)
     except ValidationError:

@@ -1,4 +1,4 @@
-"""Columns that some rigs measure besides, brought into the standard ones: tare, motor current, velocities, other forces, load."""
+"""Further columns of some rigs, merged into the standard columns: tare, motor current, velocities, other forces, load."""
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -33,15 +33,15 @@ def with_beside(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Colum
             completed["drive_force_N"] = completed["drive_force_N"] + completed["other_force_N"]
             note("other_force_N", "is added to drive_force_N: both act on the mass")
         else:
-            note("other_force_N", "counts in the friction that is measured, not in the fits")
+            note("other_force_N", "counts in the measured friction, not in the fits")
     for velocity, position in (("mass_velocity_mps", "mass_position_m"), ("drive_velocity_mps", "drive_position_m")):
-        # the place of a slide on a spring must be better than an integral is
-        wanted = rig.drive == "force" if position == "mass_position_m" else rig.drive != "force"
-        if wanted and velocity in completed and position not in completed:
+        # an integral is not accurate enough for the position of a slide on a spring
+        usable = rig.drive == "force" if position == "mass_position_m" else rig.drive != "force"
+        if usable and velocity in completed and position not in completed:
             completed[position] = cumulative_trapezoid(
                 np.nan_to_num(completed[velocity]), completed["t_s"], initial=0.0
             )
-            note(position, f"not there: {velocity} is integrated, so positions have an unknown constant")
+            note(position, f"missing: {velocity} is integrated, so positions have an unknown constant")
     if table.normal_load_N is not None and "normal_load_N" not in completed:
         completed["normal_load_N"] = np.full(len(completed["t_s"]), table.normal_load_N)
     return completed, findings

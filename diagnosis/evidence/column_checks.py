@@ -1,4 +1,4 @@
-"""Which samples and columns of a run can be used, and a finding for each that cannot."""
+"""Which samples and columns of a run can be used, and a finding for each unusable column."""
 
 import math
 from collections.abc import Callable
@@ -20,27 +20,27 @@ from diagnosis.evidence.sign_and_unit import apparent_stiffness_N_per_m
 Clipped = dict[str, tuple[float, float]]
 Note = Callable[[str, str, str], None]  # kind, column, text
 
-# Limits of this file: beyond a limit a finding is made or the run is refused. A stricter limit refuses good files; a looser one
-# lets a damaged file or a wrong unit pass for a gap of the rig.
+# Limits of this file: beyond a limit a finding is made or the run is refused. A stricter limit refuses good files; with a looser
+# limit a damaged file or a wrong unit counts as a gap of the rig.
 _FEWEST_ROWS = 16
-_LARGEST_BAD_SHARE = 0.1  # of rows that cannot be used; with more, the file is refused
-_LARGEST_WILD_SHARE = 1e-3  # of samples that no rig can show: a loose contact, or a number that means "no value"
-# Longest gap, and largest share of gaps in a run. In a longer gap the rig slips unseen, and the model goes on slipping.
+_LARGEST_BAD_SHARE = 0.1  # largest share of unusable rows; with more, the file is refused
+_LARGEST_WILD_SHARE = 1e-3  # largest share of impossible values from a loose contact or a number that means "no value"
+# Longest gap, and largest share of gaps in a run. In a longer gap the slips of rig and model drift apart.
 _LONGEST_GAP_S, _LARGEST_GAP_SHARE = 1.0, 0.1
-_VELOCITY_TOLERANCE = 0.1  # relative difference of the stated drive velocity and the drive position's slope
+_VELOCITY_TOLERANCE = 0.1  # largest relative difference of the stated drive velocity and the drive position's slope
 # Factor between the two (or another sign) from which the stated velocity belongs to another run
 _OTHER_RUN_FACTOR = 3.0
-_MOST_TRAVEL = 10.0  # times the way of the drive that a position may travel; mm in place of m are a factor of 1000
-_LEAST_TRAVEL = 0.002  # of the way to the first slip that a drive must move; the noise of a drive at rest is less
-_FASTEST = 300.0  # times the Stribeck velocity; mm/s in place of m/s are a factor of 1000
+_MOST_TRAVEL = 10.0  # largest travel of a position, over the drive's way; mm in place of m are a factor of 1000
+_LEAST_TRAVEL = 0.002  # least travel of a drive, over its way to the first slip; the noise of a drive at rest is less
+_FASTEST = 300.0  # largest speed of a drive, over the Stribeck velocity; mm/s in place of m/s are a factor of 1000
 _OTHER_UNIT_FACTOR = 5.0  # factor from which a unit is wrong: an acceleration in g is off by 9.8, N/mm by 1000
-_STRIDE_S = 0.1  # seconds between the positions whose distances add up to a way; with shorter strides noise adds up
-_FEWEST_IN_A_SLIP = 3.0  # samples
-_SHORTEST_S = 1.0  # of a run
-_QUICKEST_S = 2e-6  # between samples (500 kHz); a shorter step means that time is not in seconds
-_SLOWEST_S = 0.05  # between samples, with a force drive
-_MOST_TURNS = 1e4  # factor of the way of a rig that turns: rad of a spindle add up
-# a force sensor that never shows 1/300 of the static friction, or shows 300 times the static friction, has another unit
+_STRIDE_S = 0.1  # time between the positions whose distances add up to a way [s]; with a shorter stride noise adds up
+_FEWEST_IN_A_SLIP = 3.0  # fewest samples in a slip
+_SHORTEST_S = 1.0  # shortest run
+_QUICKEST_S = 2e-6  # shortest sample time (500 kHz); a shorter one means that time is not in seconds
+_SLOWEST_S = 0.05  # longest sample time with a force drive
+_MOST_TURNS = 1e4  # a rotary rig may travel this factor further: the angle of a spindle adds up
+# A force column has a wrong unit if its largest value is below 1/300 of the static friction or above 300 times.
 _FORCE_FACTOR = 300.0
 
 
@@ -161,7 +161,7 @@ def _check_shape(columns: Columns, file: str) -> None:
 def _good_rows(
     columns: Columns, rig: RigTable, file: str, findings: list[Finding]
 ) -> tuple[Columns, npt.NDArray[np.int64]]:
-    """Rows that are finite, not wild, and later than every row before; and the indices of these rows.
+    """Rows with finite, possible values that are later than every row before; and the indices of these rows.
 
     Adds to `findings`. Raises Fault BAD_EVIDENCE when too few rows are left.
     """
@@ -177,7 +177,7 @@ def _good_rows(
             good[bad] = False
         limit = _FORCE_FACTOR * rig.static_force_N if name == "drive_force_N" else STANDARD[name].largest
         wild = np.flatnonzero(np.isfinite(values) & (np.abs(values) > limit))
-        # a larger share of wild samples means a wrong unit: `_wrong_unit` reports it
+        # a larger share of impossible values means a wrong unit: `_wrong_unit` reports it
         if not name.endswith("position_m") and 0 < len(wild) <= _LARGEST_WILD_SHARE * rows:
             at = int(wild[0])
             many = counted(len(wild), "sample is", "samples are")
@@ -191,7 +191,7 @@ def _good_rows(
     if len(back):
         at = int(back[0])
         text = (
-            f"{counted(len(back), 'row is', 'rows are')} not later than the one before, first row {at + 1}: "
+            f"{counted(len(back), 'row is', 'rows are')} not later than the row before, first row {at + 1}: "
             f"{t_s[at]:.9g} s after {latest_s[at - 1]:.9g} s; not used"
         )
         new_findings.append(Finding("time", f"{file}: t_s", text, len(back)))
@@ -199,16 +199,16 @@ def _good_rows(
     lost = rows - int(good.sum())
     if lost > _LARGEST_BAD_SHARE * rows or rows - lost < _FEWEST_ROWS:
         worst = max(new_findings, key=lambda finding: finding.times)
-        few = f"must be below {100 * _LARGEST_BAD_SHARE:g} %"
+        rule = f"must be below {100 * _LARGEST_BAD_SHARE:g} %"
         if rows - lost < _FEWEST_ROWS:
-            few = f"{_FEWEST_ROWS} rows must be left"
-        remedy = "repair the file, or cut it where the trouble begins"
+            rule = f"{_FEWEST_ROWS} rows must be left"
+        remedy = "repair the file, or cut it before the first bad row"
         if len(back) and worst.kind == "time" and (np.diff(t_s[np.isfinite(t_s)]) >= 0.0).all():
             remedy = (
                 "time repeats but never goes back: write it with more digits, or give `stickslip log import` the "
                 "source.sample_rate_Hz in place of channels.t_s"
             )
-        line = f"{worst.where}: {worst.text}: {lost} of {rows} rows cannot be used: {few}; {remedy}"
+        line = f"{worst.where}: {worst.text}: {lost} of {rows} rows cannot be used: {rule}; {remedy}"
         raise Fault("BAD_EVIDENCE", line)
     findings += new_findings
     return ({name: values[good] for name, values in columns.items()} if lost else columns), np.flatnonzero(good)
@@ -229,8 +229,8 @@ def _wrong_unit(name: str, values: Floats, rig: RigTable) -> str:
     if rig.radius_m is not None and name.endswith("position_m"):
         limit *= _MOST_TURNS
     if size > limit:
-        what = '; an angle? A rig that turns has drive = "torsion"' if name.endswith("position_m") else ""
-        return f"reaches {size:g}: must be below {limit:g}, the unit cannot be right{what}"
+        angle = '; an angle? A rotary rig has drive = "torsion"' if name.endswith("position_m") else ""
+        return f"reaches {size:g}: must be below {limit:g}, the unit cannot be right{angle}"
     return ""
 
 
@@ -274,7 +274,7 @@ def _compare_velocity(columns: Columns, rig: RigTable, table: RunTable, note: No
             if another:
                 raise Fault("BAD_EVIDENCE", f"{table.name}: drive_position_m: {text}")
             if abs(measured_mps - stated_mps) > _VELOCITY_TOLERANCE * abs(stated_mps) > 0.0:
-                note("units", "drive_position_m", f"{text}; the stated one is used")
+                note("units", "drive_position_m", f"{text}; the stated velocity is used")
     where = "drive_position_m" if stated_mps is None else "drive_velocity_mps"
     fastest_mps = moved_mps if stated_mps is None else abs(stated_mps)
     if fastest_mps > _FASTEST * rig.stribeck_velocity_mps:
@@ -283,13 +283,13 @@ def _compare_velocity(columns: Columns, rig: RigTable, table: RunTable, note: No
 
 
 def _way_m(t_s: Floats, position_m: Floats) -> float:
-    """Length of the way of a position [samples], in steps of a tenth of a second, so that noise does not add up."""
+    """Length of the way of a position [samples], measured in strides, so that noise does not add up."""
     at = np.searchsorted(t_s, np.arange(t_s[0], t_s[-1], _STRIDE_S))
     return float(np.abs(np.diff(position_m[[*at, -1]])).sum())
 
 
 def _check_moves(columns: Columns, rig: RigTable, table: RunTable, note: Note) -> None:
-    """Note a drive that does not move: such a run fits nearly every rig."""
+    """Report a drive that does not move: such a run fits nearly every rig."""
     if rig.drive_stiffness_N_per_m is None:
         return
     if "drive_position_m" in columns:
@@ -301,32 +301,30 @@ def _check_moves(columns: Columns, rig: RigTable, table: RunTable, note: Note) -
         return
     share = travel_m * rig.drive_stiffness_N_per_m / rig.static_force_N
     if share < _LEAST_TRAVEL:
-        text = f"{travel_m:.2g} m in all, {share:.2g} of the travel to the first slip: the drive rests in the whole run"
+        text = f"{travel_m:.2g} m in all, {share:.2g} of the travel to the first slip: the drive rests during the run"
         note("still", where, f"{text}: friction and drive are not tested")
 
 
 def _check_bending(columns: Columns, rig: RigTable, note: Note) -> None:
-    """Drop a mass acceleration with the wrong sign; note a drive stiffness in another unit."""
+    """Delete a mass acceleration with the wrong sign; report a drive stiffness in another unit."""
     described = rig.drive_stiffness_N_per_m
     apparent = apparent_stiffness_N_per_m(columns["t_s"], columns) if described else None
     if not described or apparent is None:
         return
     if apparent < 0.0:
-        text = (
-            "points backwards: the mass accelerates as the force that pulls it bends down; not used; change the sign of"
-        )
+        text = "has the wrong sign: the mass seems to accelerate against the force; not used; change the sign of"
         note("sign", "mass_accel_mps2", f"{text} channels.mass_accel_mps2.scale")
         del columns["mass_accel_mps2"]
     elif not 1.0 / _OTHER_UNIT_FACTOR < apparent / described < _OTHER_UNIT_FACTOR:
         text = (
-            f"bends with the acceleration of the mass as a spring of {apparent:.2g} N/m makes it, "
+            f"with mass_accel_mps2 shows a drive stiffness of {apparent:.2g} N/m, "
             f"but rig.drive_stiffness_N_per_m = {described:g}: check the units of these three"
         )
         note("units", "drive_force_N", text)
 
 
 def _pulls_back(columns: Columns, table: RunTable, stiffness_N_per_m: float) -> bool:
-    """Whether the drive gets more work back than a loaded spring can hold. Friction gives none back, so the sign is wrong."""
+    """Whether the drive receives more work than a loaded spring can hold. Friction returns no work, so the sign is wrong."""
     force_N, t_s = columns["drive_force_N"], columns["t_s"]
     if "drive_position_m" in columns:
         work_J = float(force_N[1:] @ np.diff(columns["drive_position_m"]))

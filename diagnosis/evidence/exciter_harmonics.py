@@ -14,21 +14,21 @@ from bridge.units import percent
 from diagnosis.evidence.lock_in import BESIDE_HZ, WINDOW_S, Floats, LockIn
 
 DISTORTED = "distorted"  # kind of the finding
-_MULTIPLES = (0.5, 1.5, 2.0, 3.0)  # of the commanded frequency, at which a line is looked for
-# Smallest line that is reported, as a share of the commanded line's velocity (velocity decides where slips end: v_a / v_d = 1.00
-# fails, 1.05 passes). Too small: the hysteresis of every piezo, some per cent, is reported. Too large: harmonics stay unseen.
-# Counted on 56 synthetic rigs (docs/method/diagnosis.md).
+_MULTIPLES = (0.5, 1.5, 2.0, 3.0)  # multiples of the commanded frequency that are checked
+# Smallest line that is reported, as a share of the commanded line's velocity: velocity decides whether slips end (v_a / v_d =
+# 1.00 fails, 1.05 passes). Too small: the hysteresis of every piezo, some per cent, is reported. Too large: harmonics stay
+# unseen. Counted on 56 synthetic rigs (docs/method/diagnosis.md).
 _SHARE = 0.05
-# Times that a line must exceed the amplitude at the neighbouring frequencies; noise and slips are at both
+# Smallest ratio of a line to the amplitude at its neighbouring frequencies; noise and slips contribute to both
 _TIMES_BESIDE = 4.0
 
 
 class Distortion(NamedTuple):
-    """The strongest line other than the commanded one in the base's acceleration of one run."""
+    """The strongest line besides the commanded line in the base's acceleration of one run."""
 
     commanded_Hz: float
-    multiple: float  # of the commanded frequency
-    share: float  # of the commanded line's velocity
+    multiple: float  # frequency over the commanded frequency
+    share: float  # velocity over the commanded line's velocity
 
     @property
     def limits(self) -> float:
@@ -37,7 +37,7 @@ class Distortion(NamedTuple):
 
     @property
     def band_Hz(self) -> tuple[float, float]:
-        """Lowest and highest frequency of the line, as well as one window resolves it."""
+        """Lowest and highest frequency of the line, to the resolution of a window."""
         centre_Hz = self.multiple * self.commanded_Hz
         return centre_Hz - 1.0 / WINDOW_S, centre_Hz + 1.0 / WINDOW_S
 
@@ -46,7 +46,7 @@ class Distortion(NamedTuple):
         """Text of the finding."""
         return (
             f"commanded to vibrate at {self.commanded_Hz:.0f} Hz, moves at {self.multiple * self.commanded_Hz:.0f} Hz as well, "
-            f"with {percent(self.share)} of that velocity: an exciter driven too hard or loose, or a base that yields to friction"
+            f"with {percent(self.share)} of that velocity: an overdriven or loose exciter, or a base that yields to friction"
         )
 
 
@@ -54,7 +54,7 @@ def distortion(t_s: Floats, columns: Mapping[str, npt.NDArray[np.floating]]) -> 
     """The strongest multiple of the vibration in the base's acceleration; None where it is small or cannot be known.
 
     `columns` needs the base's acceleration and the vibration's frequency and amplitude, [samples] as `t_s`. A multiple above half
-    the sampling rate is found where the sampling folds it to, unless a filter removes it before.
+    the sampling rate is searched at its alias frequency; a filter may remove it before.
     """
     needed = {"base_accel_mps2", "vibration_frequency_Hz", "vibration_amplitude_m"}
     if not needed <= columns.keys():
@@ -69,15 +69,15 @@ def distortion(t_s: Floats, columns: Mapping[str, npt.NDArray[np.floating]]) -> 
             beside = [lock_in.amplitude(accel_mps2, multiple, apart_Hz) for apart_Hz in (-BESIDE_HZ, BESIDE_HZ)]
             for windows in steady:
                 commanded_Hz = float(lock_in.lowest_Hz[windows[0]])
-                size, whole = float(np.median(line[windows])), float(np.median(base[windows]))
+                size, commanded = float(np.median(line[windows])), float(np.median(base[windows]))
                 around = max(float(np.median(each[windows])) for each in beside)
                 if _is_apart(multiple * commanded_Hz, commanded_Hz, lock_in.rate_Hz) and size > _TIMES_BESIDE * around:
-                    lines.append(Distortion(commanded_Hz, multiple, size / (multiple * max(whole, size / 1e3))))
+                    lines.append(Distortion(commanded_Hz, multiple, size / (multiple * max(commanded, size / 1e3))))
     strongest = max(lines, key=lambda line: line.share, default=None)
     return strongest if strongest is not None and strongest.limits > 1.0 else None
 
 
 def _is_apart(line_Hz: float, commanded_Hz: float, rate_Hz: float) -> bool:
-    """Whether a line, folded by the sampling, and its neighbouring frequencies are away from 0 Hz and the commanded line."""
+    """Whether the alias of a line, and its neighbouring frequencies, are away from 0 Hz and from the commanded line."""
     folded_Hz = abs((line_Hz + 0.5 * rate_Hz) % rate_Hz - 0.5 * rate_Hz)
     return folded_Hz > 2.0 * BESIDE_HZ and abs(folded_Hz - commanded_Hz) > 2.0 * BESIDE_HZ

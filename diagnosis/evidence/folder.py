@@ -1,4 +1,4 @@
-"""An evidence folder read into memory: the rig as described, the runs as float64 arrays in SI units, and the findings.
+"""Reading of an evidence folder: the rig as described, the runs as float64 arrays in SI units, and the findings.
 
 Data that cannot be used is left out and reported as a finding. When nothing usable remains, a Fault is raised.
 """
@@ -35,13 +35,15 @@ _NEVER_EXACT = ("coulomb_force_N", "static_force_N", "stribeck_velocity_mps", "d
 # Similarity of two column names (`difflib`) from which one may be a misspelling of the other: one letter, or the case, differs.
 # Too small: unrelated columns are offered. Too large: misspellings stay unseen.
 _SIMILAR = 0.85
-SHAKE_RATE_HZ = 8000.0  # lowest sampling rate at which the rms within 1 ms is compared; slower has too few samples
+SHAKE_RATE_HZ = (
+    8000.0  # lowest sampling rate at which the rms within 1 ms is compared: lower rates have too few samples
+)
 
 
 def load_evidence(folder: Path) -> Evidence:
     """Read and check an evidence folder.
 
-    When the manifest holds no run out, the last of several is, or a part of a long one.
+    When the manifest holds out no run, the last of several runs is held out, or a part of a single long run.
 
     Raises Fault BAD_EVIDENCE: file, key or column, row, expectation, remedy.
     """
@@ -73,20 +75,20 @@ def load_evidence(folder: Path) -> Evidence:
         if share > 0.0 and manifest.rig.values()[name] == 0.0
     ]
     if exact := [name for name in _NEVER_EXACT if manifest.rig.values()[name] and not manifest.rig.tolerance.get(name)]:
-        text = f"none for {', '.join(exact)}: known exactly, so an ordinary difference there will be called an effect"
+        text = f"missing for {', '.join(exact)}: counts as known exactly, so an ordinary deviation will be called an effect"
         findings.append(Finding("tolerance", f"{MANIFEST}: rig.tolerance", text))
     for table, (columns, damaged) in zip(manifest.run, read, strict=True):
         run, noted = examine(columns, manifest.rig, table)
         runs.append(run)
         findings += damaged + noted
     if len(runs) > 1 and not any(run.holdout for run in runs):
-        # the last run is held out, with a finding: a run that is added later moves the choice
+        # with a finding, as the choice changes when a run is added
         runs[-1] = runs[-1]._replace(holdout=True)
         text = "no run is marked holdout: this one is held out; mark one to choose for yourself"
         findings.append(Finding("holdout", runs[-1].file, text))
     elif len(runs) == 1:
-        runs, told_so = split(runs[0])
-        findings += told_so
+        runs, split_findings = split(runs[0])
+        findings += split_findings
     return Evidence(folder, as_sliding(manifest.rig), tuple(runs), tuple(findings), tuple(assumed))
 
 
@@ -104,7 +106,7 @@ def _read_all(folder: Path, manifest: Manifest) -> list[tuple[Columns, list[Find
 
 
 def _stretch(columns: Columns, table: RunTable) -> Columns:
-    """The part of a file that is a run; its times count since the first sample that has one."""
+    """The part of a file that is a run; its limits count from the first sample with a finite time."""
     if table.name == table.file:
         return columns
     t_s = columns["t_s"]
@@ -121,7 +123,7 @@ def _assumed_in_words(name: str, rig: RigTable, mass_is_seen: bool) -> str:
     if name not in WIDE:
         return value
     how = ", as the runs show it" if name == "mass_kg" and mass_is_seen else ""
-    return f"{value}{how}; a third or three times as much would do, so it decides nothing"
+    return f"{value}{how}; a third or three times as much is possible, so it decides nothing"
 
 
 def _refuse_a_way_out(folder: Path, file: str) -> None:
@@ -170,7 +172,7 @@ def examine(columns: Columns, rig: RigTable, table: RunTable) -> tuple[MeasuredR
     for name, channel in SENSOR_CHANNELS.items():
         consequence = channel.without if rig.drive == "spring" else channel.without_force_drive
         if consequence and name not in usable:
-            findings.append(Finding("missing", f"{table.name}: {name}", f"not there: {consequence}"))
+            findings.append(Finding("missing", f"{table.name}: {name}", f"missing: {consequence}"))
     t_s = usable.pop("t_s")
     findings += [Finding(kind, f"{table.name}: {name}", text) for kind, name, text in _vibration(usable, t_s)]
     vibrates = pick_up(rig, t_s, usable)
@@ -188,15 +190,15 @@ def _vibration(columns: Columns, t_s: Floats) -> Iterator[tuple[str, str, str]]:
     """Kind, column and text of each finding about the commanded vibration."""
     given = [name for name in VIBRATION if name in columns]
     if len(given) == 1:
-        text = "is given alone: frequency and amplitude are needed, the run counts as one without vibration"
+        text = "is given alone: frequency and amplitude are needed; the run counts as a run without vibration"
         yield "missing", given[0], text
     for name in given:
         if negative := int((columns[name] < 0.0).sum()):
             many = counted(negative, "sample is", "samples are")
-            yield "sign", name, f"{many} negative: must be 0 where it is off, above it else; not used"
+            yield "sign", name, f"{many} negative: must be positive, or 0 where the vibration is off; not used"
     rate_Hz = (len(t_s) - 1) / float(t_s[-1] - t_s[0])
     if len(given) == 2 and columns["vibration_amplitude_m"].any() and rate_Hz < SHAKE_RATE_HZ:
-        text = f"{rate_Hz:.4g} Hz, below {SHAKE_RATE_HZ:g} Hz: how strongly it vibrates is not compared"
+        text = f"{rate_Hz:.4g} Hz, below {SHAKE_RATE_HZ:g} Hz: the strength of its vibration is not compared"
         yield from (("rate", name, text) for name in ("mass_accel_mps2", "base_accel_mps2") if name in columns)
 
 
@@ -223,7 +225,7 @@ def read_columns(path: Path, channels: dict[str, ChannelMap], rotary: bool = Fal
 
 
 def _wanted(table: Table, channels: dict[str, ChannelMap]) -> tuple[dict[str, ChannelMap], list[Finding]]:
-    """The channels that the map or a standard name gives to a column that is there; and a finding for each that is not."""
+    """The channels whose column, mapped or with a standard name, exists; and a finding for each missing mapped column."""
     wanted: dict[str, ChannelMap] = {}
     lacking: list[Finding] = []
     for name in STANDARD:
@@ -245,9 +247,11 @@ def _misspelt(file: str, columns: Columns, table: Table) -> Iterator[Finding]:
     """A finding for each unused column with nearly the name of a missing standard column."""
     for name in STANDARD:
         near = [] if name in columns else get_close_matches(name, table.columns.keys() - columns.keys(), 1, _SIMILAR)
-        for other in near:
+        for similar in near:
             yield Finding(
-                "missing", f"{file}: {name}", f'not there, but {other} is: set channels.{name}.column = "{other}"'
+                "missing",
+                f"{file}: {name}",
+                f'missing, but {similar} is present: set channels.{name}.column = "{similar}"',
             )
 
 

@@ -1,6 +1,6 @@
 """Whether the force signal holds a vibration that the spring cannot carry: the exciter's voltage in the sensor's cable.
 
-The rest of the diagnosis compares means over 1 ms, in which a vibration is lost, and cannot see it (docs/method/diagnosis.md).
+The rest of the diagnosis compares means over 1 ms, which remove a vibration (docs/method/diagnosis.md).
 """
 
 from collections.abc import Mapping
@@ -17,15 +17,15 @@ from diagnosis.evidence.manifest import RigTable
 PICK_UP = "pick-up"  # kind of the finding
 # A vibration of the force is reported above the largest of these three limits. Lower limits report ordinary rigs; higher limits
 # miss a pick-up.
-_SHARE = 0.005  # of the static friction: the most that the roughness of a surface makes
-_TIMES_SPRING = 3.0  # times the force that the spring carries by the described rig numbers, which are not exact
-_TIMES_BESIDE = 4.0  # times the amplitude at frequencies next to the commanded one, where noise and quick slips are
+_SHARE = 0.005  # over the static friction: the largest vibration by a rough surface
+_TIMES_SPRING = 3.0  # over the force that the spring carries by the described rig numbers, which are not exact
+_TIMES_BESIDE = 4.0  # over the amplitude at neighbouring frequencies, which noise and quick slips cause
 
 
 class PickUp(NamedTuple):
     """A vibration in the force signal of one run."""
 
-    frequency_Hz: float  # as commanded; the median of a sweep
+    frequency_Hz: float  # commanded frequency; the median of a sweep
     force_N: float  # amplitude, median over the windows
     spring_N: float  # amplitude that the spring would carry
     limit_N: float  # amplitude above which the vibration is reported
@@ -37,7 +37,7 @@ class PickUp(NamedTuple):
 
     @property
     def band_Hz(self) -> tuple[float, float]:
-        """Lowest and highest frequency of the vibration, as well as one window resolves it."""
+        """Lowest and highest frequency of the vibration, to the resolution of a window."""
         return self.frequency_Hz - 1.0 / WINDOW_S, self.frequency_Hz + 1.0 / WINDOW_S
 
     @property
@@ -46,7 +46,7 @@ class PickUp(NamedTuple):
         return (
             f"vibrates with {_rounded(self.force_N)} at {self.frequency_Hz:.0f} Hz, where the spring carries "
             f"{_rounded(self.spring_N)}: "
-            "the exciter's voltage in the sensor's cable, or the sensor's own mass; not in the means over 1 ms that are compared"
+            "the exciter's voltage in the sensor's cable, or the sensor's mass; the compared means over 1 ms do not hold it"
         )
 
 
@@ -58,8 +58,8 @@ def pick_up(rig: RigTable, t_s: Floats, columns: Mapping[str, npt.NDArray[np.flo
     """The vibration in the force signal of a run with a spring drive; None where it is small or cannot be known.
 
     `columns` needs force, mass acceleration, and the vibration's frequency and amplitude, [samples] as `t_s`. Each frequency
-    counts with its median window, as few windows hold a slip. Of several frequencies, the farthest above its limit is returned: a
-    pick-up of a voltage grows with the frequency.
+    counts with its median window, as few windows hold a slip. Of several frequencies, the one farthest above its limit is
+    returned: a pick-up of a voltage grows with the frequency.
     """
     stiffness_N_per_m = rig.drive_stiffness_N_per_m
     needed = {"drive_force_N", "mass_accel_mps2", "vibration_frequency_Hz", "vibration_amplitude_m"}

@@ -1,4 +1,4 @@
-"""Import of measured data of other programs, with a channel map, into an evidence folder or a run log of this project."""
+"""Import of data of other programs, by a channel map, into an evidence folder or a run log of this project."""
 
 import json
 from pathlib import Path
@@ -35,33 +35,33 @@ from diagnosis.evidence.manifest_text import manifest_text
 from diagnosis.evidence.mapped import mapped
 from diagnosis.evidence.unknown_mass import shown_mass_kg
 
-_AGAINST = 0.3  # share of all work that the drive would get back; a loaded spring gives back some at the end
+_AGAINST = 0.3  # share of all work that the drive receives, from which the sign is wrong; a loaded spring returns some
 _BLOCK_SAMPLES = 20
-_IRREGULAR_SHARE = 0.01  # of a step, up to which time counts as even: rounding of a printed column of a DAQ
+_IRREGULAR_SHARE = 0.01  # deviation from an even clock, in steps, that counts as even: rounding of printed times
 
 
 class SourceMap(Strict):
     """How the source file is written."""
 
     sample_rate_Hz: Annotated[float, Field(ge=1.0, le=1e7)] | None = Field(
-        default=None, description="Where no column holds the time."
+        default=None, description="Sampling rate, where no column holds the time."
     )
-    format: Kind | None = Field(default=None, description="Of the file, where its first bytes do not show it.")
+    format: Kind | None = Field(default=None, description="Format of the file, where its first bytes do not show it.")
     delimiter: Annotated[str, Field(min_length=1, max_length=1)] | None = Field(
-        default=None, description="Of columns; a blank means any number of blanks and tabs."
+        default=None, description="Mark between columns; a blank means any number of blanks and tabs."
     )
-    decimal: Literal[".", ","] | None = Field(default=None, description="Mark of decimals.")
-    thousands: Annotated[str, Field(max_length=1)] | None = Field(default=None, description="Mark of thousands.")
+    decimal: Literal[".", ","] | None = Field(default=None, description="Decimal mark.")
+    thousands: Annotated[str, Field(max_length=1)] | None = Field(default=None, description="Thousands separator.")
     skip_rows: Annotated[int, Field(ge=0)] | None = Field(
         default=None, description="Lines before the line of the names."
     )
     encoding: str | None = None
-    names: list[str] | None = Field(default=None, description="Of the columns, where the file has none.")
+    names: list[str] | None = Field(default=None, description="Names of the columns, where the file has none.")
     units_row: bool | None = Field(default=None, description="Whether a line of units follows the names.")
     comment: Annotated[str, Field(min_length=1)] | None = Field(
         default=None, description="Beginning of the lines that are skipped."
     )
-    sheet: str | None = Field(default=None, description="Of a workbook.")
+    sheet: str | None = Field(default=None, description="Sheet of a workbook.")
 
     @property
     def dialect(self) -> Dialect:
@@ -82,14 +82,14 @@ class ImportMap(Strict):
 
     source: SourceMap = SourceMap()
     channels: dict[str, ChannelMap]
-    rig: dict[str, Any] = Field(default={}, description="As in manifest.toml; only an evidence folder needs it.")
+    rig: dict[str, Any] = Field(default={}, description="[rig] of manifest.toml; only an evidence folder needs it.")
     run: RunMap = RunMap()
 
     @model_validator(mode="after")
     def _channels_are_enough(self) -> "ImportMap":
         check_channel_names(self.channels)
         if not {"drive_force_N", "mass_accel_mps2", "motor_current_A"} & self.channels.keys():
-            raise ValueError("channels: must name drive_force_N or mass_accel_mps2; nothing shows a slip otherwise")
+            raise ValueError("channels: must name drive_force_N or mass_accel_mps2; no other column shows a slip")
         if "t_s" in self.channels and self.source.sample_rate_Hz is not None:
             raise ValueError("source.sample_rate_Hz: there is a channel t_s too; remove one of them")
         return self
@@ -99,7 +99,7 @@ class Imported(NamedTuple):
     """The result of an import."""
 
     out: Path  # evidence folder or .mcap file
-    file: str  # name of the data file or log that was written
+    file: str  # name of the written data file or log
     rows: int
     columns: list[str]
     missing: list[str]  # standard columns that the source does not have
@@ -128,9 +128,9 @@ def import_file(path: Path, map_path: Path, out: Path) -> Imported:
 
 
 def _with_sign(findings: list[Finding], file: str, columns: Columns, wanted: ImportMap, table: Table) -> list[Finding]:
-    """The findings, with a line to copy where the force has the other sign."""
-    others = [finding for finding in findings if finding.kind != "sign" or not finding.where.endswith("drive_force_N")]
-    if len(others) == len(findings) and not _pulls_back(columns):
+    """The findings, with a line to copy where the force has the wrong sign."""
+    kept = [finding for finding in findings if finding.kind != "sign" or not finding.where.endswith("drive_force_N")]
+    if len(kept) == len(findings) and not _pulls_back(columns):
         return findings
     channel = wanted.channels["drive_force_N"]
     known = known_unit(channel.unit or table.unit(channel.column))
@@ -139,12 +139,12 @@ def _with_sign(findings: list[Finding], file: str, columns: Columns, wanted: Imp
     line = (
         f"drive_force_N = {{ column = {json.dumps(channel.column, ensure_ascii=False)}, scale = {-scale!r}{offset} }}"
     )
-    text = "pulls against the drive's motion: its sign is the other one, and a diagnosis leaves it out; under [channels] write"
-    return [*others, Finding("sign", f"{file}: drive_force_N", f"{text} {line}")]
+    text = "pulls against the drive's motion: its sign is wrong, and a diagnosis leaves it out; under [channels] write"
+    return [*kept, Finding("sign", f"{file}: drive_force_N", f"{text} {line}")]
 
 
 def _pulls_back(columns: Columns) -> bool:
-    """Whether the drive would get work back all the way: friction gives none, whatever the rig is."""
+    """Whether the drive receives work over the run. Friction returns no work, so the sign is wrong on every rig."""
     if not {"drive_force_N", "drive_position_m"} <= columns.keys():
         return False
     work_J = np.nan_to_num(columns["drive_force_N"][1:] * np.diff(columns["drive_position_m"]))
@@ -154,7 +154,7 @@ def _pulls_back(columns: Columns) -> bool:
 def _check_free(out: Path) -> None:
     """Raise Fault CONFIG when `out` exists: it may be the measured file itself."""
     if out.exists():
-        raise Fault("CONFIG", f"{out}: is there already; nothing was written; choose another --out")
+        raise Fault("CONFIG", f"{out}: exists already; nothing was written; choose another --out")
 
 
 def _rig(given: dict[str, Any], map_name: str, mass_kg: float | None = None) -> tuple[RigTable, list[str]]:
@@ -177,16 +177,16 @@ def _to_folder(path: Path, columns: Columns, wanted: ImportMap, map_name: str, o
             line = f"{out / MANIFEST}: describes another rig than {map_name}; choose another --out, one folder a rig"
             raise Fault("BAD_EVIDENCE", line)
         if before.channels:
-            line = f"{out / MANIFEST}: has [channels], which imported runs must not pass; choose another --out"
+            line = f"{out / MANIFEST}: has [channels], which must not apply to imported runs; choose another --out"
             raise Fault("BAD_EVIDENCE", line)
-        if path.stem in {other.file.rsplit(".", 1)[0] for other in before.run}:
+        if path.stem in {earlier.file.rsplit(".", 1)[0] for earlier in before.run}:
             line = f"{out / run.file}: is already a run of this folder; rename {path.name} or choose another --out"
             raise Fault("BAD_EVIDENCE", line)
         runs = [*before.run, run]
     elif run.holdout:
         line = (
-            f"{map_name}: run.holdout = true: must be false for the first run of a folder, which would have none to fit; "
-            "import a run without it first"
+            f"{map_name}: run.holdout = true: must be false for the first run of a folder, which needs a run to fit; "
+            "import a run without holdout first"
         )
         raise Fault("CONFIG", line)
     _check_free(out / run.file)
@@ -210,7 +210,7 @@ def _to_folder(path: Path, columns: Columns, wanted: ImportMap, map_name: str, o
 def write_run(folder: Path, columns: Columns, rig: RigTable, runs: list[RunTable], assumed: list[str]) -> None:
     """Write the data file of the last of `runs` and the manifest of all."""
     fields = [pa.field(name, pa.float64(), nullable=False, metadata={"unit": unit_of(name)}) for name in columns]
-    # the manifest takes its place last: it names the table
+    # the manifest is replaced last, as it names the data file
     with replacing(folder / MANIFEST) as manifest, replacing(folder / runs[-1].file) as file:
         manifest.write(manifest_text(rig, runs, assumed).encode("utf-8"))
         pq.write_table(pa.table(list(columns.values()), schema=pa.schema(fields)), file, use_dictionary=False)
@@ -219,7 +219,7 @@ def write_run(folder: Path, columns: Columns, rig: RigTable, runs: list[RunTable
 def _even_clock(t_s: Floats, file: str) -> tuple[Floats, float, npt.NDArray[np.bool_], list[Finding]]:
     """An even clock over the times [rows]: its instants [samples], its step, which instants lie in a gap, and findings.
 
-    Over a gap nothing is interpolated: the log lacks these blocks, as it does where a recorder lost them.
+    Gaps are not interpolated: the log lacks these blocks, as if a recorder had lost them.
     """
     gaps, gap_text = gaps_of(t_s)
     where = f"{file}: t_s"
@@ -233,9 +233,9 @@ def _even_clock(t_s: Floats, file: str) -> tuple[Floats, float, npt.NDArray[np.b
     step_s = float(np.delete(np.diff(t_s), gaps).mean())
     even_s = t_s[0] + np.arange(int(float(t_s[-1] - t_s[0]) / step_s) + 1) * step_s
     before = np.clip(np.searchsorted(t_s, even_s, side="right") - 1, 0, len(t_s) - 2)
-    gone = np.isin(before, gaps) & (even_s > t_s[before] + 0.5 * step_s)
+    in_gap = np.isin(before, gaps) & (even_s > t_s[before] + 0.5 * step_s)
     text = f"{gap_text}: the log has no block there; the rest is on an even clock of {1.0 / step_s:g} Hz"
-    return even_s, step_s, gone, [Finding("time-gap", where, text, len(gaps))]
+    return even_s, step_s, in_gap, [Finding("time-gap", where, text, len(gaps))]
 
 
 def _to_log(path: Path, columns: Columns, out: Path) -> Imported:
@@ -254,11 +254,11 @@ def _to_log(path: Path, columns: Columns, out: Path) -> Imported:
             else len(t_s)
         )
         line = (
-            f"{path.name}: t_s: row {row}: must be later than the row before, in {_BLOCK_SAMPLES} rows at least; "
-            "a log has an even clock; repair the file, or import it into a folder"
+            f"{path.name}: t_s: row {row}: must be later than the row before, and a log needs {_BLOCK_SAMPLES} rows at least; "
+            "repair the file, or import it into a folder"
         )
         raise Fault("BAD_EVIDENCE", line)
-    even_s, step_s, gone, notes = _even_clock(t_s, path.name)
+    even_s, step_s, in_gap, notes = _even_clock(t_s, path.name)
     findings += notes
     if len(even_s) != len(t_s) or float(np.abs(t_s - even_s).max()) > _IRREGULAR_SHARE * step_s:
         columns = columns | {name: np.interp(even_s, t_s, columns[name]) for name in CHANNELS if name in columns}
@@ -266,13 +266,13 @@ def _to_log(path: Path, columns: Columns, out: Path) -> Imported:
     if left := len(even_s) - blocks * _BLOCK_SAMPLES:
         text = f"the last {counted(left, 'sample')} left out: too few for a block of {_BLOCK_SAMPLES}"
         findings.append(Finding("cut", path.name, text, left))
-    lacking = gone[: blocks * _BLOCK_SAMPLES].reshape(-1, _BLOCK_SAMPLES).any(axis=1)
+    lacking = in_gap[: blocks * _BLOCK_SAMPLES].reshape(-1, _BLOCK_SAMPLES).any(axis=1)
     missing = [name for name in CHANNELS if name not in columns]
     findings += [
         Finding("missing", f"{path.name}: {name}", "not in the source: no numbers in the log") for name in missing
     ]
     commanded = [name for name in columns if name.startswith("vibration")]
-    text = "left out, as the log holds sensors alone: without it the run counts as one without vibration; import it into a folder"
+    text = "left out: a log holds sensors alone, and the run counts as a run without vibration; import it into a folder"
     findings += [Finding("missing", f"{path.name}: {name}", text) for name in commanded]
     refuse_to_replace(out, LOG, str(out))
     with folder_beside(out) as folder:

@@ -8,20 +8,20 @@ import numpy.typing as npt
 
 from bridge.arrays import Floats
 
-# Seconds of a window. Too short: lines near each other melt together. Too long: every window holds a slip.
+# Length of a window. Too short: neighbouring lines merge. Too long: every window holds a slip.
 WINDOW_S = 0.02
-FEWEST_WINDOWS = 5  # windows that a frequency needs; a median of fewer may be one of a slip
+FEWEST_WINDOWS = 5  # fewest windows of a frequency; the median of fewer may be a window with a slip
 BESIDE_HZ = 3.5 / WINDOW_S  # distance to the neighbouring frequencies of a line; a line leaks over 2 / WINDOW_S at most
-_HIGHEST = 0.45  # share of the sampling rate above which a vibration is not used: sampling folds it to a low frequency
+_HIGHEST = 0.45  # highest used frequency of a vibration, over the sampling rate: above half of it, it is aliased
 
 
 class LockIn:
     """The windows of a run under a vibration that the sampling rate resolves.
 
     Attributes:
-        rate_Hz: of the samples.
+        rate_Hz: sampling rate.
         lowest_Hz: the smallest commanded frequency in each window, [windows].
-        used: indices of the windows that vibrate throughout.
+        used: indices of the windows with vibration at every sample.
 
     """
 
@@ -43,7 +43,7 @@ class LockIn:
         return values[: count * self._rows].reshape(count, self._rows)
 
     def steady(self) -> list[npt.NDArray[np.int64]]:
-        """For each frequency that is held for `FEWEST_WINDOWS` or more: the indices of its windows."""
+        """Indices of the windows of each frequency that is constant for `FEWEST_WINDOWS` or more."""
         held = self.used[self.lowest_Hz[self.used] == self._highest_Hz[self.used]]
         alike = [held[self.lowest_Hz[held] == each_Hz] for each_Hz in np.unique(self.lowest_Hz[held])]
         return [windows for windows in alike if len(windows) >= FEWEST_WINDOWS]
@@ -53,8 +53,8 @@ class LockIn:
 
         Args:
             values: the signal.
-            times: multiple of the commanded frequency.
-            apart_Hz: distance from this multiple.
+            times: the wanted frequency, as a multiple of the commanded frequency.
+            apart_Hz: offset that is added to this multiple.
 
         """
         turned = values * np.exp(-2j * np.pi * (times * self._turns + apart_Hz * (self._t_s - self._t_s[0])))

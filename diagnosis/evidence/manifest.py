@@ -1,4 +1,4 @@
-"""The keys of `manifest.toml` in an evidence folder: the rig, how well it is known, the channels and the runs."""
+"""The keys of `manifest.toml` in an evidence folder: the rig with its tolerances, the channels and the runs."""
 
 import math
 from collections import Counter
@@ -16,7 +16,7 @@ from diagnosis.evidence.manifest_keys import ChannelMap, NotNegative, Positive, 
 
 FORMAT = "evidence/1"
 MANIFEST = "manifest.toml"
-# of runs, in upper or lower case; the first bytes of a table give its format
+# suffixes of data files, in upper or lower case; the first bytes of a table give its format
 RUN_SUFFIXES = (
     ".parquet", ".csv", ".txt", ".dat", ".lvm", ".tsv", ".asc", ".mat", ".tdms", ".xlsx", ".xls", ".ods", ".h5", ".mcap",
 )  # fmt: skip
@@ -29,19 +29,19 @@ _FASTEST_RAD_PER_S = {
     "drive_stiffness_N_per_m": 3e4,  # the plant refuses 3.14e4; 88 on the paper's rig
 }
 _LONGEST_SLIP_S = 5.0  # a longer slip means a wrong unit of mass or stiffness
-_FASTEST_MPS = 10.0  # of a drive; a velocity in mm/s exceeds it even for a slow drive
+_FASTEST_MPS = 10.0  # largest velocity of a drive; in mm/s even a slow drive exceeds it
 DriveVelocity = Annotated[float, Field(ge=-_FASTEST_MPS, le=_FASTEST_MPS)]
 
 
 class RigTable(Strict):
-    """The rig as its owner describes it, SI units."""
+    """The rig as the owner describes it, SI units."""
 
     drive: Literal["spring", "force", "torsion"] = Field(
-        description="torsion: a rig that turns; every number in N m, rad and kg m2 in place of N, m and kg."
+        description="torsion: a rotary rig; every number in N m, rad and kg m2 in place of N, m and kg."
     )
     radius_m: Positive | None = Field(
         default=None,
-        description='With drive = "torsion": at this radius its numbers are given in N and m; 1 if not given.',
+        description='With drive = "torsion": radius at which the results are given in N and m; 1 if not given.',
     )
     mass_kg: Positive = Field(description="If not given, the mass that the runs show.")
     drive_stiffness_N_per_m: Positive | None = Field(default=None, description='With drive = "spring" only.')
@@ -53,7 +53,7 @@ class RigTable(Strict):
     static_force_N: Positive
     stribeck_velocity_mps: Positive
     force_per_current_N_per_A: Positive | None = Field(
-        default=None, description='With drive = "force": of the motor, where motor_current_A replaces the force.'
+        default=None, description='With drive = "force": force of the motor per ampere of motor_current_A.'
     )
     tolerance: dict[str, float] = Field(
         default={}, description="One standard deviation, relative; a number without a tolerance is known exactly."
@@ -115,15 +115,15 @@ class RunTable(Strict):
     file: Annotated[str, Field(min_length=1)]
     drive_velocity_mps: DriveVelocity | None = None
     holdout: bool = False
-    from_s: NotNegative = Field(default=0.0, description="Where the run begins, since the first sample of its file.")
-    until_s: Positive | None = Field(default=None, description="Where it ends; the end of the file if not given.")
+    from_s: NotNegative = Field(default=0.0, description="Begin of the run, since the first sample of its file.")
+    until_s: Positive | None = Field(default=None, description="End of the run; the end of the file if not given.")
     tare_N: float = Field(default=0.0, description="Reading of the force sensor without a force; subtracted.")
-    normal_load_N: Positive | None = Field(default=None, description="Constant, where no column gives it.")
-    channels: dict[str, ChannelMap] = Field(default={}, description="Of this run, where they differ from [channels].")
+    normal_load_N: Positive | None = Field(default=None, description="Constant load, where no column gives it.")
+    channels: dict[str, ChannelMap] = Field(default={}, description="Channels that differ from [channels] in this run.")
 
     @property
     def name(self) -> str:
-        """The file, with the stretch where the run is a part of it: `log-0-to-9s.csv`."""
+        """Name of the file, with the limits in time if the run is a part of it: `log-0-to-9s.csv`."""
         if self.from_s == 0.0 and self.until_s is None:
             return self.file
         path = PurePath(self.file)
@@ -152,7 +152,7 @@ class RunTable(Strict):
 
 
 class Manifest(Strict):
-    """The whole `manifest.toml`."""
+    """All keys of `manifest.toml`."""
 
     format: Literal["evidence/1"]
     rig: RigTable
@@ -182,19 +182,19 @@ def _refuse_overlap(runs: list[RunTable]) -> None:
     for run, after in pairwise(ordered):
         if run.file == after.file and after.from_s < (math.inf if run.until_s is None else run.until_s):
             raise ValueError(
-                f"run.from_s = {after.from_s:g} of {run.file!r}: another run has this stretch as well: must begin where that "
-                "one ends; set until_s"
+                f"run.from_s = {after.from_s:g} of {run.file!r}: another run has this stretch as well: must begin where the "
+                "other run ends; set until_s"
             )
 
 
 def check_folder(folder: Path) -> None:
     """Raise Fault BAD_EVIDENCE where `folder` is not a folder."""
     try:
-        what = "" if folder.is_dir() else "no folder" if folder.exists() else "no such folder"
+        problem = "" if folder.is_dir() else "no folder" if folder.exists() else "no such folder"
     except OSError as error:
-        what = f"cannot be read: {error.strerror}"
-    if what:
-        line = f"{folder}: {what}; evidence is a folder with {MANIFEST} and one data file a run"
+        problem = f"cannot be read: {error.strerror}"
+    if problem:
+        line = f"{folder}: {problem}; evidence is a folder with {MANIFEST} and one data file a run"
         raise Fault("BAD_EVIDENCE", line)
 
 
@@ -204,13 +204,13 @@ def read_manifest(folder: Path) -> Manifest:
 
 
 def described(folder: Path, mass_kg: float | None = None) -> tuple[Manifest, list[str]]:
-    """`manifest.toml` of an evidence folder, and the rig numbers that it leaves out and that are assumed.
+    """`manifest.toml` of an evidence folder, and the names of the rig numbers that are assumed, as it leaves them out.
 
     Raises Fault BAD_EVIDENCE, with one line for each problem.
 
     Args:
-        folder: with the manifest.
-        mass_kg: the mass that the runs show, for a manifest without a mass.
+        folder: the evidence folder.
+        mass_kg: the mass estimated from the runs, for a manifest without a mass.
 
     """
     if shown(folder) != str(folder):

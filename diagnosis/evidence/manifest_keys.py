@@ -1,4 +1,4 @@
-"""Keys that a manifest and a channel map share: the standard columns, and where a column comes from."""
+"""Keys that a manifest and a channel map share: the standard columns and their sources."""
 
 from typing import Annotated, Any
 
@@ -10,7 +10,7 @@ from bridge.tables.unit_words import known_unit
 from bridge.wire.channels import SENSOR_CHANNELS, Channel
 
 Columns = dict[str, Floats]  # [samples] by standard name
-VIBRATION = {  # as commanded
+VIBRATION = {  # commanded values
     "vibration_frequency_Hz": Channel("vibration_frequency_Hz", "frequency", "frequency", 0, 1e6, has_spikes=True),
     # piezo stacks move by a tenth of a millimetre
     "vibration_amplitude_m": Channel("vibration_amplitude_m", "length", "angle", 1, 1e-3, has_spikes=True),
@@ -30,12 +30,12 @@ NotNegative = Annotated[float, Field(ge=0, lt=1e12)]
 
 
 class ChannelMap(Strict):
-    """Source of a standard column: value = column * scale + offset, in its SI unit. A text alone is the column."""
+    """Source of a standard column: value = column * scale + offset, in its SI unit. A text alone names the column."""
 
-    column: Annotated[str, Field(min_length=1)] = Field(description="Its name, or its number, from 1 on.")
-    scale: float | None = Field(default=None, description="To SI; if not given, from the unit of the column.")
-    offset: float = Field(default=0.0, description="In SI.")
-    unit: str = Field(default="", description="Of the column, such as mm or kN, where its name does not state it.")
+    column: Annotated[str, Field(min_length=1)] = Field(description="Name of the column, or its number, from 1 on.")
+    scale: float | None = Field(default=None, description="Factor to SI; if not given, from the unit of the column.")
+    offset: float = Field(default=0.0, description="Offset in SI units.")
+    unit: str = Field(default="", description="Unit of the column, such as mm or kN, if its name does not state it.")
 
     @model_validator(mode="before")
     @classmethod

@@ -7,7 +7,7 @@ from diagnosis.evidence.manifest import FORMAT, RigTable, RunTable
 
 
 def manifest_text(rig: RigTable, runs: list[RunTable], assumed: list[str]) -> str:
-    """Text of a `manifest.toml` with this rig and these runs; rig numbers in `assumed` get the remark that they are assumed."""
+    """Text of a `manifest.toml` with this rig and these runs; rig numbers in `assumed` are marked as assumed."""
     lines = [f"format = {_value(FORMAT)}", "", *rig_lines(rig, assumed)]
     for run in runs:
         lines += ["", "[[run]]"]

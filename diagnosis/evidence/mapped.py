@@ -1,4 +1,4 @@
-"""The standard columns of a table: which column is which, in which unit, and all on one clock."""
+"""The standard columns of a table, in SI units and on one clock."""
 
 from typing import NamedTuple
 
@@ -16,14 +16,14 @@ from diagnosis.evidence.sentinels import without_sentinels
 
 # Values from which a column of times without a unit counts calendar time, not time of the run, with its unit [s]
 _SINCE_1970 = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3), (1e8, 1.0))
-# Days from 2000 to 2100 as spreadsheets and MATLAB's datenum count them. As seconds they are known by their steps: shorter ones
-# would be rates above 50 kHz, longer ones are less than 0.6 rows a second.
+# Days from 2000 to 2100 as spreadsheets and MATLAB's datenum count them. Their steps distinguish them from seconds: a step of
+# less than 2e-5 is a rate above 50 kHz in seconds, and above 0.6 rows a second in days.
 _DAYS = ((36526.0, 73051.0), (730486.0, 767011.0))
 _DAY_S, _LONGEST_STEP = 86400.0, 2e-5
 
 
 class Mapped(NamedTuple):
-    """The standard columns of a table, [rows] each, in SI units, with findings and assumptions."""
+    """The standard columns of a table, [rows] each, in SI units, and the findings."""
 
     columns: Columns
     findings: list[Finding]
@@ -34,8 +34,8 @@ def mapped(
 ) -> Mapped:
     """The standard columns that `channels` names.
 
-    The time is taken from its column, from `sample_rate_Hz`, or from the clock in the file. `rotary`: the rig turns; None:
-    unknown, and both N and N m are accepted.
+    The time is taken from its column, from `sample_rate_Hz`, or from the clock in the file. `rotary`: a rotary rig; None:
+    unknown, so both N and N m are accepted.
 
     Raises Fault BAD_TABLE for a column that is missing, is of another length or of another quantity; CONFIG without a time.
     """
@@ -74,7 +74,7 @@ def mapped(
 
 
 def _sampled(times_s: Floats, values: Floats) -> Sampled:
-    """A channel without the rows behind its last time, where another one of the file is longer."""
+    """A channel without the rows behind its last time, where another channel of the file is longer."""
     finite = np.isfinite(times_s)
     return Sampled(times_s[finite], values[finite])
 
@@ -85,12 +85,12 @@ def has_time(table: Table, channels: dict[str, ChannelMap]) -> bool:
     return "t_s" in channels or table.sample_rate_Hz is not None or (bool(with_clock) and all(with_clock))
 
 
-def _same_length(table: Table, channels: dict[str, ChannelMap], values: Columns, rows: int, what: str) -> None:
+def _same_length(table: Table, channels: dict[str, ChannelMap], values: Columns, rows: int, reference: str) -> None:
     for name, column in values.items():
         if len(column) != rows:
             line = (
-                f"{table.path.name}: column {channels[name].column}: {counted(len(column), 'row')}: must have {rows}, as {what}; "
-                "every channel needs one value a sample"
+                f"{table.path.name}: column {channels[name].column}: {counted(len(column), 'row')}: must have {rows}, as "
+                f"{reference}; every channel needs one value a sample"
             )
             raise Fault("BAD_TABLE", line)
 
@@ -116,25 +116,25 @@ def _factor(table: Table, name: str, channel: ChannelMap, findings: list[Finding
             text = f"column {column}: {stated!r} is not a known unit: the values are used unscaled; a map may give scale = ..."
             findings.append(Finding("units", f"{table.path.name}: {name}", text))
         return 1.0
-    what, factor = known
-    if rotary is False and what == STANDARD[name].turning != STANDARD[name].quantity:
-        line = f"{table.path.name}: column {channel.column}: is in {unit}, a {what}, and the rig slides"
-        raise Fault("BAD_TABLE", f'{line}; a rig that turns has drive = "torsion" under [rig]')
-    if what not in (STANDARD[name].quantity, STANDARD[name].turning):
-        line = f"{table.path.name}: column {channel.column}: is in {unit}, a {what}"
+    quantity, factor = known
+    if rotary is False and quantity == STANDARD[name].turning != STANDARD[name].quantity:
+        line = f"{table.path.name}: column {channel.column}: is in {unit}, a {quantity}, and the rig slides"
+        raise Fault("BAD_TABLE", f'{line}; a rotary rig has drive = "torsion" under [rig]')
+    if quantity not in (STANDARD[name].quantity, STANDARD[name].turning):
+        line = f"{table.path.name}: column {channel.column}: is in {unit}, a {quantity}"
         line += f": must be a {STANDARD[name].quantity}, as {name}"
         raise Fault("BAD_TABLE", f"{line}; name another column, or give channels.{name}.scale")
     if factor != 1.0 and not channel.unit:
-        text = f"column {channel.column} is in {unit}: times {factor:g} to be in {si_unit(what)}"
+        text = f"column {channel.column} is in {unit}: times {factor:g} to be in {si_unit(quantity)}"
         findings.append(Finding("units", f"{table.path.name}: {name}", text))
     return factor
 
 
 def _time(table: Table, channel: ChannelMap, findings: list[Finding]) -> Floats:
-    """The time in s, [rows]; a time of the calendar is counted from the first row."""
-    times_s, counted_already = table.seconds(channel.column)
+    """The time in s, [rows]; a calendar time is counted from the first row."""
+    times_s, is_clock = table.seconds(channel.column)
     where = f"{table.path.name}: t_s"
-    if counted_already:
+    if is_clock:
         if channel.scale not in (None, 1.0):
             raise Fault(
                 "CONFIG", f"{where}: column {channel.column} holds times: scale must be left out; they count in s"
@@ -145,9 +145,7 @@ def _time(table: Table, channel: ChannelMap, findings: list[Finding]) -> Floats:
     unit_s = calendar_unit_s(times_s)
     if unit_s is None:
         return times_s * _factor(table, "t_s", channel, findings, None) + channel.offset
-    findings.append(
-        Finding("time", where, f"is a time of the calendar in steps of {unit_s:g} s: counted from the first row")
-    )
+    findings.append(Finding("time", where, f"is a calendar time in steps of {unit_s:g} s: counted from the first row"))
     return (times_s - times_s[np.isfinite(times_s)][0]) * unit_s + channel.offset
 
 

@@ -1,4 +1,4 @@
-"""A rig that turns, converted to a rig that slides at a radius: N m, rad and kg m2 become N, m and kg there.
+"""Conversion of a rotary rig to a rig that slides at a radius: N m, rad and kg m2 become N, m and kg there.
 
 At a radius of 1 m every number keeps its digits.
 """
@@ -7,7 +7,7 @@ from bridge.log.finding import Finding
 from diagnosis.evidence.manifest import MANIFEST, RigTable, RunTable
 from diagnosis.evidence.manifest_keys import STANDARD, Columns
 
-# power of the radius by which a number of [rig] is multiplied where the rig turns
+# power of the radius by which a number of [rig] is multiplied on a rotary rig
 _POWERS = {
     "mass_kg": -2,
     "drive_stiffness_N_per_m": -2,
@@ -23,7 +23,7 @@ _POWERS = {
 
 
 def as_sliding(rig: RigTable) -> RigTable:
-    """The rig as one with a spring, at its `radius_m`. A rig that does not turn is returned unchanged."""
+    """The sliding rig that a rotary rig is at its `radius_m`; every other rig unchanged."""
     if rig.drive != "torsion":
         return rig
     radius_m = rig.radius_m or 1.0
@@ -32,7 +32,7 @@ def as_sliding(rig: RigTable) -> RigTable:
 
 
 def run_as_sliding(rig: RigTable, columns: Columns, table: RunTable) -> tuple[Columns, RunTable]:
-    """The columns [samples] and the run of a rig that turns, at its radius; others as they are."""
+    """The columns [samples] and the run of a rotary rig at its radius; of every other rig unchanged."""
     if rig.drive != "torsion":
         return columns, table
     radius_m = rig.radius_m or 1.0
@@ -46,10 +46,10 @@ def _at(name: str, value: float, radius_m: float) -> float:
 
 
 def told(rig: RigTable) -> list[Finding]:
-    """A finding that gives the units and the radius of such a rig's numbers."""
+    """A finding with the units and the radius of a rotary rig's numbers; empty for every other rig."""
     if rig.drive != "torsion":
         return []
-    text = f"turns: numbers are in N, m and kg at a radius of {rig.radius_m or 1.0:g} m" + (
-        ", where they have the digits of N m, rad and kg m2" if (rig.radius_m or 1.0) == 1.0 else ""
+    text = f"rotary: numbers are in N, m and kg at a radius of {rig.radius_m or 1.0:g} m" + (
+        ", where they equal those in N m, rad and kg m2" if (rig.radius_m or 1.0) == 1.0 else ""
     )
     return [Finding("rotary", f"{MANIFEST}: rig.drive", text)]

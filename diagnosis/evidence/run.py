@@ -15,17 +15,17 @@ class MeasuredRun(NamedTuple):
 
     file: str
     t_s: Floats
-    columns: dict[str, Floats]  # by standard name, without t_s; only the usable ones
-    # by standard name: lowest and highest value that the sensor can show, infinite where the run does not reach it
+    columns: dict[str, Floats]  # usable columns by standard name, without t_s
+    # lowest and highest value that the sensor can show, by standard name; infinite where the run does not reach it
     clipped: dict[str, tuple[float, float]]
-    drive_velocity_mps: float | None  # as the manifest states
-    holdout: bool  # held out: not fitted, only predicted
+    drive_velocity_mps: float | None  # velocity in the manifest
+    holdout: bool  # whether the run is held out: not fitted, only predicted
     pick_up: PickUp | None = None  # a vibration in the force signal that no spring carries
     distortion: Distortion | None = None  # a base that vibrates at other frequencies than the commanded one
 
 
 class Evidence(NamedTuple):
-    """A whole evidence folder; runs in the manifest's order."""
+    """All of an evidence folder; runs in the manifest's order."""
 
     folder: Path
     rig: RigTable

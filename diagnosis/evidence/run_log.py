@@ -37,7 +37,7 @@ def columns_of_log(path: Path) -> tuple[Columns, list[Finding]]:
 def _commanded(run: RunData) -> tuple[Floats, Floats]:
     """Frequency and amplitude in force during each block, [blocks]; 0 before the first command."""
     block = run.sensors["sequence"]
-    # The rig's own log of the applied commands comes first; else the command that answers the block before, as in lockstep.
+    # The applied commands that the rig reports have priority; else the command that answers the block before, as in lockstep.
     answered = np.where(block > 0, block - np.uint64(1), np.uint64(2**64 - 1))
     if len(run.applied):
         order = np.argsort(run.applied["sequence"], kind="stable")

@@ -9,8 +9,8 @@ from bridge.arrays import Floats
 from bridge.log.finding import Finding
 from bridge.units import counted
 
-# Distance from the median, in spreads (5th to 95th percentile), from which a value is a sentinel; the second for -9999 and the
-# like, and for a repeated value such as full scale. A slip moves a force or a position by a few spreads.
+# Distance from the median, in spreads (5th to 95th percentile), from which a value is a sentinel: any value; a number of nines
+# such as -9999, or a repeated value such as full scale. A slip moves a force or a position by a few spreads.
 _FAR, _FAR_ALIKE = 1000.0, 20.0
 _LARGEST = 1e20  # 1e30 and the largest float32 mean "no value"
 _NINES = re.compile(r"0*9{3,}0*")
@@ -20,9 +20,9 @@ def without_sentinels(values: Floats, where: str, smooth: bool) -> tuple[Floats,
     """A column with NaN in place of sentinels, [rows].
 
     Args:
-        values: as read from the file.
+        values: the column of the file, [rows].
         where: file and column, for the finding.
-        smooth: the column shows no spikes.
+        smooth: whether the measured quantity has no spikes.
 
     """
     small = np.where(np.abs(values) < _LARGEST, values, np.nan)
@@ -48,9 +48,9 @@ def without_sentinels(values: Floats, where: str, smooth: bool) -> tuple[Floats,
 
 
 def _leaps(values: Floats, far: npt.NDArray[np.bool_], least: float) -> npt.NDArray[np.bool_]:
-    """Marks stretches of one constant far value that begin and end with a jump, [rows]; no motion does that.
+    """Marks stretches of one constant far value that begin and end with a jump, [rows], which no motion does.
 
-    A slide that rests for long and then moves goes far, too.
+    A far value alone is not enough: a slide that rests for long and then moves goes far, too.
     """
     edges = np.diff(np.concatenate(([0], far.astype(np.int8), [0])))
     leaps = np.concatenate(([True], ~(np.abs(np.diff(values)) <= least), [True]))

@@ -1,6 +1,6 @@
-"""Stiffness from force and mass acceleration alone: it shows a sensor with the wrong sign, or a wrong unit.
+"""Stiffness from force and mass acceleration alone: it reveals a sensor with the wrong sign or unit.
 
-A drive that moves evenly pulls with F = k (s - x). So F'' = -k x'' in every slip, for any friction, and without a rig number.
+A drive that moves evenly pulls with F = k (s - x). So F'' = -k x'' in every slip, for any friction and without a rig number.
 """
 
 from collections.abc import Mapping
@@ -14,17 +14,17 @@ _BIN_S = 1e-3
 # Standard deviation of the smoothing. Too small: noise; too large: slips are lost. A slip on the paper's spring takes about
 # 40 ms, and 4 ms leave most of its acceleration.
 _SMOOTH_BINS = 4.0
-_BESIDE_BINS = 61  # around a vibration that are left out: its remainder in a mean over 1 ms is as large as a slip
-_FEWEST_BINS = 500  # that a run needs; a stiffness from fewer bins is noise
+_BESIDE_BINS = 61  # bins left out around a vibration: its remainder in a mean over 1 ms is as large as a slip
+_FEWEST_BINS = 500  # fewest bins of a run; a stiffness from fewer bins is noise
 # Smallest correlation of force and acceleration for which a stiffness is returned. Too small: runs without slips, noise against
 # noise, give a false stiffness. Too large: wrong signs and units stay unseen. Counted: docs/method/diagnosis.md.
 _LEAST_CORRELATION = 0.9
 
 
 def apparent_stiffness_N_per_m(t_s: Floats, columns: Mapping[str, Floats]) -> float | None:
-    """The drive's stiffness as force and mass acceleration show it; below 0 when one of the two has the wrong sign.
+    """The drive's stiffness from force and mass acceleration; below 0 when one of the two has the wrong sign.
 
-    None where the two do not correlate or one is missing. The stiffness leaves out the motion of the drive, so it is good for a
+    None where the two do not correlate or one is missing. The stiffness neglects the motion of the drive, so it is good for a
     sign and a unit only. `t_s` and every column are [samples].
     """
     if not {"drive_force_N", "mass_accel_mps2"} <= columns.keys():

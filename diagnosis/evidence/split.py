@@ -1,4 +1,4 @@
-"""One long run as two parts: one to fit and one to judge on, where the manifest marks no run."""
+"""Split of a single long run into parts to fit and a held-out part, where the manifest holds out no run."""
 
 import math
 
@@ -9,15 +9,15 @@ from bridge.arrays import Floats
 from bridge.log.finding import Finding
 from diagnosis.evidence.run import MeasuredRun
 
-_SHORTEST_S = 12.0  # of a run that is split: a third of it must hold some slips
-_WINDOW_S = 0.1  # over which speed and vibration count as one condition
-_PARTS = 3  # the part to judge on is one of them
+_SHORTEST_S = 12.0  # shortest run that is split: a third of it must hold some slips
+_WINDOW_S = 0.1  # window over which speed and vibration count as constant
+_PARTS = 3  # equal parts of the run; one of them is held out
 
 
 def split(run: MeasuredRun) -> tuple[list[MeasuredRun], list[Finding]]:
     """The run in parts, one of them held out, and a finding that names it; a short run unchanged.
 
-    Held out is the third whose speeds and vibrations occur most in the rest; among equals the last one.
+    The third whose speeds and vibrations occur most in the rest is held out; among equals the last third.
     """
     length_s = float(run.t_s[-1] - run.t_s[0])
     if length_s < _SHORTEST_S:
@@ -28,7 +28,7 @@ def split(run: MeasuredRun) -> tuple[list[MeasuredRun], list[Finding]]:
     common = [_common(condition[part == held], condition[part != held]) for held in range(_PARTS)]
     held = max(range(_PARTS), key=lambda i: (round(common[i], 2), i))
     first_s, last_s = (edges_s[held : held + 2] - run.t_s[0]).tolist()
-    until_s = last_s if held < _PARTS - 1 else math.inf  # the last sample is not a separate stretch
+    until_s = last_s if held < _PARTS - 1 else math.inf  # else the last sample would be a separate stretch
     stretches = [(0.0, first_s), (first_s, until_s), (until_s, math.inf)]
     parts = [
         cut(run, begin_s, end_s)._replace(holdout=number == 1)
@@ -43,7 +43,7 @@ def split(run: MeasuredRun) -> tuple[list[MeasuredRun], list[Finding]]:
 
 
 def cut(run: MeasuredRun, from_s: float, until_s: float) -> MeasuredRun:
-    """The stretch of a run, in seconds since its first sample; it goes by its stretch."""
+    """A stretch of a run, in seconds since its first sample; its limits are added to the name of the file."""
     since_s = run.t_s - run.t_s[0]
     inside = (since_s >= from_s) & (since_s < until_s)
     stem, dot, suffix = run.file.rpartition(".")
@@ -57,10 +57,10 @@ def _conditions(run: MeasuredRun) -> tuple[npt.NDArray[np.int64], Floats]:
     """A number for the speed and the vibration in each window of 0.1 s, and the windows' instants, [windows]."""
     at_s = np.arange(run.t_s[0], run.t_s[-1], _WINDOW_S)
     first = np.searchsorted(run.t_s, at_s)
-    place = run.columns.get("drive_position_m", run.columns.get("mass_position_m"))
+    position_m = run.columns.get("drive_position_m", run.columns.get("mass_position_m"))
     key = np.zeros(len(at_s), np.int64)
-    if place is not None and len(at_s) > 1:
-        speed = np.gradient(place[first], _WINDOW_S)
+    if position_m is not None and len(at_s) > 1:
+        speed = np.gradient(position_m[first], _WINDOW_S)
         fastest = float(np.abs(speed).max())
         if fastest > 0.0:  # octaves of the speed below the fastest, by direction
             octave = np.clip(np.round(-np.log2(np.maximum(np.abs(speed) / fastest, 1e-3))), 0, 9).astype(np.int64)

@@ -1,4 +1,4 @@
-"""The mass that the runs show, for an owner who cannot weigh it."""
+"""Estimate of the mass from the runs, for an owner who cannot weigh it."""
 
 import numpy as np
 from scipy.signal import savgol_filter
@@ -8,12 +8,14 @@ from diagnosis.evidence.manifest import RigTable, RunTable
 from diagnosis.evidence.manifest_keys import Columns
 from diagnosis.look.look import RecordFacts, look
 
-_WINDOW_S = 0.03  # of the cubic that smooths a position before it is differentiated twice
-_SLOW = 0.1  # of the fastest speed: below it the friction turns, and no line explains the force
+_WINDOW_S = 0.03  # window of the cubic that smooths a position before it is differentiated twice
+_SLOW = (
+    0.1  # share of the fastest speed below which samples are left out: friction turns, and is not linear in the speed
+)
 
 
 def shown_mass_kg(rig: RigTable, table: RunTable, columns: Columns) -> float | None:
-    """The mass in one run [samples]: from its slips on a spring, from force over acceleration on an axis. None: it shows none."""
+    """The mass from one run [samples]: from its slips on a spring, from force over acceleration on an axis; None: unknown."""
     force_N = columns.get("drive_force_N")
     if force_N is None:
         return None
@@ -27,7 +29,7 @@ def shown_mass_kg(rig: RigTable, table: RunTable, columns: Columns) -> float | N
 
 
 def _accelerated(force_N: Floats, columns: Columns) -> float | None:
-    """Force over acceleration, fitted together with a friction of two directions that rises with the speed."""
+    """Mass from force over acceleration, fitted together with Coulomb friction, viscous friction and a constant force."""
     step_s = float(np.median(np.diff(columns["t_s"])))
     window = max(2 * round(0.5 * _WINDOW_S / step_s) + 1, 5)
     position_m, accel = columns.get("mass_position_m"), columns.get("mass_accel_mps2")

@@ -1,6 +1,6 @@
 """The next run to measure, or the next check by hand.
 
 candidate_runs   runs that could be measured next
-proposal         which of these runs separates the two leading explanations
+proposal         the run that separates the two leading explanations
 checks_by_hand   checks by hand, without a run
 """

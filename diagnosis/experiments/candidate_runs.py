@@ -13,15 +13,15 @@ from diagnosis.gap.prepare import Prepared
 from diagnosis.gap.problem import Point, Problem
 from diagnosis.model.segment_starts import entries_of
 
-_LONGEST_S = 45.0  # no longer run is proposed; larger: more slow speeds, and more time to predict and to measure them
-_SHORTEST_S = 4.0  # a drag lasts at least so long, where `_FARTHEST_M` leaves room; smaller: few features at high speed
-# Stick-slip cycles that a drag shows. Fewer: features of a cycle scatter. More: longer runs.
+_LONGEST_S = 45.0  # longest proposed run; larger: more slow speeds, and more time to predict and to measure them
+_SHORTEST_S = 4.0  # shortest drag, unless `_FARTHEST_M` limits it; smaller: few features at high speed
+# Stick-slip cycles in a drag. Fewer: features of a cycle scatter. More: longer runs.
 _CYCLES = 5.0
-# Longest travel that a drag is planned for. Larger: a slide may not have the room. Smaller: fewer cycles at high speed.
+# Longest planned travel of a drag. Larger: a slide may not have the room. Smaller: fewer cycles at high speed.
 _FARTHEST_M = 0.02
 _LEAST_S = 1.0  # shortest run that can be diagnosed
-_HOLDS_S = (1.0, 10.0, 30.0)  # rests of the drive, far apart so that ageing of the contact shows
-_WATCHED_S = 10.0  # effort, in seconds of a run, that a run far outside the used speeds counts in addition
+_HOLDS_S = (1.0, 10.0, 30.0)  # durations of rests of the drive, far apart so that ageing of the contact shows
+_WATCHED_S = 10.0  # additional effort of a run far outside the used speeds, in seconds of a run
 # Shift of the start along the track; no multiple of a usual pitch, so that the run meets a periodic track in another phase.
 _SHIFT_M = 3.7e-3
 
@@ -36,12 +36,12 @@ class ConstantSpeed(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """One run that could be measured."""
+    """A run that could be measured."""
 
     what: str  # the instruction for the operator
     steps: tuple[ConstantSpeed, ...]
-    shift_m: float = 0.0  # start of the run, from the start of an earlier run
-    beyond: bool = False  # whether the speed is far outside those used, so that the rig may behave in a new way
+    shift_m: float = 0.0  # distance from the start of an earlier run to the start of the run
+    beyond: bool = False  # whether the speed is far outside the used speeds, so that the rig may behave in a new way
 
     @property
     def effort_s(self) -> float:
@@ -50,7 +50,7 @@ class Plan(NamedTuple):
 
 
 def plans(problem: Problem) -> list[Plan]:
-    """At most ten runs within the reach of the rig that the evidence shows; none where the drive never moved."""
+    """At most ten runs that the rig can make, by the evidence; empty if the drive never moved."""
     used = [segment for run in problem.runs for segment in run.commands.segments if segment.drive_velocity_mps != 0.0]
     if not used:
         return []
@@ -67,40 +67,40 @@ def plans(problem: Problem) -> list[Plan]:
         travel_m = min(_travel_m(problem.scales, cycle_m), _FARTHEST_M)
         seconds = max(travel_m / speed, min(_SHORTEST_S, _FARTHEST_M / speed), _LEAST_S)
         if seconds <= _LONGEST_S and _LEAST_S * speed <= max(_FARTHEST_M, seen_m):
-            what = f"Drag at {_speed(speed)} for {seconds:.2g} s without vibration."
-            result.append(Plan(what, (ConstantSpeed(seconds, speed),), beyond=beyond))
-    some_s = max(_travel_m(problem.scales, 2.0 * cycle_m) / usual, 2.0)
-    if some_s * 3.0 <= _LONGEST_S:
-        result += _others(usual, some_s, cycle_m)
+            instruction = f"Drag at {_speed(speed)} for {seconds:.2g} s without vibration."
+            result.append(Plan(instruction, (ConstantSpeed(seconds, speed),), beyond=beyond))
+    drag_s = max(_travel_m(problem.scales, 2.0 * cycle_m) / usual, 2.0)
+    if drag_s * 3.0 <= _LONGEST_S:
+        result += _other_profiles(usual, drag_s, cycle_m)
     result += _vibrations(used, usual, 2.0 * cycle_m / usual + 1.0)
     return result
 
 
-def _others(usual: float, some_s: float, cycle_m: float) -> list[Plan]:
+def _other_profiles(usual: float, drag_s: float, cycle_m: float) -> list[Plan]:
     again_s = max(2.0 * cycle_m / usual, 1.0)
     holds = [step for hold_s in _HOLDS_S for step in (ConstantSpeed(hold_s, 0.0), ConstantSpeed(again_s, usual))]
     dwells = ", ".join(f"{hold_s:g}" for hold_s in _HOLDS_S)
-    back = (ConstantSpeed(some_s, usual), ConstantSpeed(some_s, -usual))
+    back = (ConstantSpeed(drag_s, usual), ConstantSpeed(drag_s, -usual))
     return [
         Plan(
             f"Drag at {_speed(usual)}, hold the drive for {dwells} s in turn, and drag on after each.",
-            (ConstantSpeed(some_s, usual), *holds),
+            (ConstantSpeed(drag_s, usual), *holds),
         ),
-        Plan(f"Drag at {_speed(usual)} for {some_s:.0f} s, then back for {some_s:.0f} s.", back),
+        Plan(f"Drag at {_speed(usual)} for {drag_s:.0f} s, then back for {drag_s:.0f} s.", back),
         Plan(
-            f"Drag at {_speed(usual)} for {some_s:.0f} s, go back, wait 10 s, and drag along the same track again.",
-            (*back, ConstantSpeed(10.0, 0.0), ConstantSpeed(some_s, usual)),
+            f"Drag at {_speed(usual)} for {drag_s:.0f} s, go back, wait 10 s, and drag along the same track again.",
+            (*back, ConstantSpeed(10.0, 0.0), ConstantSpeed(drag_s, usual)),
         ),
         Plan(
-            f"Drag at {_speed(usual)} for {some_s:.0f} s from a start {_SHIFT_M * 1e3:.1f} mm further on.",
-            (ConstantSpeed(some_s, usual),),
+            f"Drag at {_speed(usual)} for {drag_s:.0f} s from a start {_SHIFT_M * 1e3:.1f} mm further on.",
+            (ConstantSpeed(drag_s, usual),),
             _SHIFT_M,
         ),
     ]
 
 
 def _vibrations(used: list[Segment], usual: float, each_s: float) -> list[Plan]:
-    """Runs at other frequencies and at other amplitudes of vibration; none where no run was vibrated."""
+    """Runs at other frequencies and at other amplitudes of vibration; empty if no run was vibrated."""
     shaken = [segment for segment in used if segment.frequency_Hz > 0.0]
     if not shaken:
         return []
@@ -109,22 +109,22 @@ def _vibrations(used: list[Segment], usual: float, each_s: float) -> list[Plan]:
     each_s = min(max(each_s, 1.5), 3.0)
     frequencies = [share * highest_Hz for share in (0.5, 1.5, 2.0)]
     amplitudes = [share * amplitude_m for share in (0.5, 1.5, 2.0)]
-    told_Hz = ", ".join(f"{frequency_Hz * 1e-3:.3g}" for frequency_Hz in frequencies)
-    told_m = ", ".join(f"{value_m * 1e9:.3g}" for value_m in amplitudes)
+    listed_kHz = ", ".join(f"{frequency_Hz * 1e-3:.3g}" for frequency_Hz in frequencies)
+    listed_nm = ", ".join(f"{value_m * 1e9:.3g}" for value_m in amplitudes)
     return [
         Plan(
-            f"Drag at {_speed(usual)} with {amplitude_m * 1e9:.3g} nm at {told_Hz} kHz, {each_s:.1f} s each.",
+            f"Drag at {_speed(usual)} with {amplitude_m * 1e9:.3g} nm at {listed_kHz} kHz, {each_s:.1f} s each.",
             tuple(ConstantSpeed(each_s, usual, frequency_Hz, amplitude_m) for frequency_Hz in frequencies),
         ),
         Plan(
-            f"Drag at {_speed(usual)} with {told_m} nm at {0.5 * highest_Hz * 1e-3:.3g} kHz, {each_s:.1f} s each.",
+            f"Drag at {_speed(usual)} with {listed_nm} nm at {0.5 * highest_Hz * 1e-3:.3g} kHz, {each_s:.1f} s each.",
             tuple(ConstantSpeed(each_s, usual, 0.5 * highest_Hz, value_m) for value_m in amplitudes),
         ),
     ]
 
 
 def as_run(problem: Problem, plan: Plan, point: Point) -> Prepared:
-    """The plan as a prepared run that measures the prediction of the model at `point`.
+    """The plan as a prepared run whose measurement is the prediction of the model at `point`.
 
     It has the channels of the measured run with the most channels, with an exciter if the plan needs one.
     """
@@ -147,15 +147,14 @@ def as_run(problem: Problem, plan: Plan, point: Point) -> Prepared:
     start = template.start._replace(position_m=template.start.position_m + plan.shift_m)
     run = template._replace(file=plan.what, holdout=False, commands=commands, start=start, entries=(), clipped={})
     signals = problem.signals(run, point)
-    settled_ones = tuple(settled(signals, segment, problem.scales) for segment in segments)
-    commands = commands._replace(segments=settled_ones)
+    commands = commands._replace(segments=tuple(settled(signals, segment, problem.scales) for segment in segments))
     return run._replace(signals=signals, commands=commands, entries=entries_of(signals, commands, problem.scales))
 
 
 def _cycle_m(rig: RigTable, scales: Scales) -> float:
     """Drive travel of one stick-slip cycle: the force falls by twice the difference of static and sliding friction.
 
-    At least the travel for a tenth of the static friction, as otherwise a run with tiny cycles would be too short to compare.
+    It is at least the travel for a tenth of the static friction, so that a run with tiny cycles is long enough to compare.
     """
     return max(2.0 * (rig.static_force_N - rig.coulomb_force_N), 0.1 * rig.static_force_N) / scales.stiffness_N_per_m
 

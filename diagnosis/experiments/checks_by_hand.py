@@ -1,4 +1,4 @@
-"""Checks by hand where no run of the rig separates two explanations: one look, one weight or one tap."""
+"""Checks by hand, if no run of the rig separates two explanations: with the eye, a weight or a hammer."""
 
 from typing import Final
 

@@ -1,7 +1,7 @@
 """The next run to measure: the shortest that separates the two leading explanations decisively, or the best separation.
 
-Both explanations predict every run that could be measured. The difference counts in noise floors, and only the part that
-neither explanation can imitate by moving numbers that the present runs leave uncertain: rig, sensors and its own parameters.
+Both explanations predict every run that could be measured. Their difference is measured in noise floors, without the part that
+either explanation can imitate by changing uncertain numbers of rig, sensors and effect.
 """
 
 import math
@@ -25,13 +25,12 @@ from plant.effects.library import EFFECTS
 
 # Replicates for a first look, and for a judgement. Fewer: the floor of the imagined run is uncertain. More: time.
 _FEW, _SOME = 2, 6
-# Separation, in standard deviations, that is enough. Smaller: an unsure run is proposed. Larger: longer runs for no more
-# certainty.
+# Sufficient separation, in standard deviations. Smaller: an unsure run is proposed. Larger: longer runs without more certainty.
 _DECISIVE = 10.0
 # A first look must exceed the decisive separation by this factor, as it subtracts nothing that could be imitated.
-# Smaller: more runs are judged in vain. Larger: a decisive short run is passed over.
+# Smaller: more runs are judged in vain. Larger: a decisive short run is skipped.
 _PROMISING = 1.5
-_JUDGED = 3  # runs that are judged where no run is decisive, the best first look first
+_JUDGED = 3  # number of judged runs if no run is decisive, those with the best first look
 # Separation, in standard deviations, below which no run is proposed. Smaller: an hour at the rig for little. Larger: a check by
 # hand where a run would help.
 _SEPARATES = 2.0
@@ -45,7 +44,7 @@ _MISSING = 4.0
 
 
 class _Look(NamedTuple):
-    """How well one run separates two explanations."""
+    """The separation of two explanations by a run."""
 
     plan: Plan
     separation: float  # standard deviations
@@ -68,7 +67,7 @@ def next_experiment(problem: Problem, nuisances: Nuisances, leaders: list[Fit]) 
     both = f"{_name(first)} and {_name(second)}"
     if problem.rig.drive == "force":
         return Experiment(advice(names, "force"), f"Of all tried explanations, {both} fit these runs best.", None)
-    # how far the two fits are apart in the present runs
+    # distance of the two fits in the present runs
     present = float(np.linalg.norm(first.residual - second.residual))
     best = _best(problem, nuisances, first, second)
     if best is None or best.separation < _SEPARATES or best.feature is None:
@@ -97,7 +96,7 @@ def _best(problem: Problem, nuisances: Nuisances, first: Fit, second: Fit) -> _L
     judged: list[_Look] = []
     possible = sorted(plans(problem), key=lambda plan: plan.effort_s)
     if any(EFFECTS[name].acts_on == "piezo" for fit in (first, second) for name in fit.hypothesis.effects):
-        # without vibration an effect of the piezo acts only through other numbers that the fit has moved
+        # without vibration an effect of the piezo acts only through other numbers that the fit has changed
         possible = [plan for plan in possible if any(step.frequency_Hz > 0.0 for step in plan.steps)]
     for plan in possible:
         look = _first_look(problem, nuisances, plan, first, second)
@@ -119,7 +118,7 @@ def _name(fit: Fit) -> str:
 
 
 class _Imagined:
-    """One plan as a run that is measured under the first explanation, with its noise floor."""
+    """A plan as a run that is measured under the first explanation, with its noise floor."""
 
     def __init__(self, problem: Problem, nuisances: Nuisances, plan: Plan, first: Fit, second: Fit, count: int) -> None:
         self._nuisances = nuisances
@@ -127,9 +126,10 @@ class _Imagined:
         self.problem = Problem(problem.rig, [as_run(problem, plan, first_point)])
         drawn = replicates(self.problem, first_point, ROUGHNESS, count, 3, perhaps=(first_point, second_point))
         self.floor: Floor = floor_of(self.problem, first_point, drawn)
-        expected, other = self._expected([first_point, second_point])
-        self.apart = np.where(np.isfinite(other - expected), other - expected, _MISSING)
-        """How far the second explanation is from the first, in floors [compared]."""
+        first_expected, second_expected = self._expected([first_point, second_point])
+        apart = second_expected - first_expected
+        self.apart = np.where(np.isfinite(apart), apart, _MISSING)
+        """Second explanation minus first, in floors [compared]."""
 
     def _expected(self, points: list[Point]) -> list[Floats]:
         """The expected features at every point, in floors [compared]."""
@@ -159,7 +159,7 @@ class _Imagined:
 
 
 def _first_look(problem: Problem, nuisances: Nuisances, plan: Plan, first: Fit, second: Fit) -> _Look | None:
-    """An upper bound of the separation, as nothing that could be imitated is subtracted; None where no feature compares."""
+    """An upper bound of the separation, without subtracting the part that can be imitated; None without a compared feature."""
     imagined = _Imagined(problem, nuisances, plan, first, second, _FEW)
     if not imagined.floor.compared.any():
         return None

@@ -2,11 +2,11 @@
 
 grid                        a run on the 1 ms grid
 segments                    commands of a run, and the segments in which the commands are constant
-slips                       the slips of a segment, with weights, and when a fall is half done
+slips                       the slips of a segment, with weights, and the instants of mid-fall
 feature                     definition of a feature
 spring_drive, force_drive   the features of a run with a spring drive, and with a force drive
-axis_motion                 the measured motion along which a force-driven model is led
+axis_motion                 the measured motion that a force-driven model is made to follow
 moving_mean                 a moving mean, compiled
-spring_law                  how the force follows the extension of the spring
+spring_law                  the force as a function of the spring's extension
 noise                       the noise of a run, taken from the run
 """

@@ -16,7 +16,7 @@ HIGH: Band = (50.0, 500.0)
 # features that are mean squares: noise and roughness add to them
 POWERS = frozenset({"scatter", "ring", "ripple", "rest", "spring rest"})
 DRIVE_WAVES = 24  # waves of the drive position over a run; more waves show shorter ripples and cost time
-RESOLVED_M = 1e-9  # least noise of a drive position; a commanded position that was logged as measured has only rounding
+RESOLVED_M = 1e-9  # least noise of a drive position; a commanded position in place of a measured one has only rounding
 
 
 class Feature(NamedTuple):
@@ -30,7 +30,7 @@ class Feature(NamedTuple):
 
 
 class Scales(NamedTuple):
-    """Typical numbers of a rig, which size windows and limits."""
+    """Typical numbers of a rig, from which windows and limits follow."""
 
     force_N: float  # static friction
     slip_s: float  # duration of a slip: half a period of the mass on its spring
@@ -40,7 +40,7 @@ class Scales(NamedTuple):
 
 
 class Features:
-    """Collects features of one run, with labels on request."""
+    """Collector of the features of one run, with labels on request."""
 
     def __init__(self, labelled: bool = True) -> None:
         self._labels: list[tuple[str, str, str, Band, int]] | None = [] if labelled else None
@@ -60,7 +60,7 @@ class Features:
     def add_all(
         self, names: Sequence[tuple[str, str]], signal: str, band_Hz: Band, segment: int, values: Sequence[float]
     ) -> None:
-        """Append many numbers of one signal and band, whose names and regimes are `names`."""
+        """Append several numbers of one signal and band; `names`: name and regime of each."""
         if self._labels is not None:
             self._labels += [(name, signal, regime, band_Hz, segment) for name, regime in names]
         self.values += values

@@ -27,20 +27,20 @@ _EDGE = 50
 # Edges of the slow bins, in Stribeck velocities. Below the first edge the slide is about to stick.
 # More bins resolve the Stribeck curve; each bin then holds fewer blocks.
 _SLOW = np.array([0.25, 0.5, 1.0, 2.0, 4.0])
-_FAST = 8  # bins from the last slow edge to the greatest speed
+_FAST = 8  # number of bins from the last slow edge to the greatest speed
 # Travel, in presliding lengths F_s / k_t, before features count. Too small: the unknown load on the contact at the start of the
 # run shows as a gap. Too large: short runs lose their features.
 _FORGETTING_LENGTHS = 20.0
-_FEWEST = 5  # blocks that a bin needs; fewer blocks make its mean noise
+_FEWEST = 5  # fewest blocks of a bin; the mean of fewer blocks is noise
 _FRICTION_WAVES_TIME = 72  # half waves: up to 3 Hz in 12 s
 _FRICTION_WAVES_POSITION = 80  # half waves: down to 5 mm on a stroke of 0.2 m
 _FORCE_WAVES = 8  # half waves of a force without direction, which changes slowly
 _BINS_PER_WAVE = 4  # bins for each half wave of the shortest wave
-# Blocks over which the acceleration is smoothed before its rate is taken. Too small: noise of the encoder passes for a lag.
+# Blocks over which the acceleration is smoothed before it is differentiated. Too small: noise of the encoder looks like a lag.
 # Too large: the rate is smeared.
 _RATE_WINDOW = 61
 _BANDS_HZ = ((3.0, 8.0), (8.0, 24.0))  # above the waves over time, below the noise
-_SHORTEST_REST_S = 0.2  # of a rest whose breakaway counts; shorter rests are reversals
+_SHORTEST_REST_S = 0.2  # shortest rest whose breakaway counts; shorter rests are reversals
 
 
 def axis_features(signals: Signals, commands: CommandedRun, rig: RigTable) -> Features:
@@ -52,10 +52,10 @@ def axis_features(signals: Signals, commands: CommandedRun, rig: RigTable) -> Fe
     _breakaways(features, rest_N, motion, rig.stribeck_velocity_mps)
     inner = slice(_first(motion, rig), len(rest_N) - _EDGE)
     cut = SlideMotion(*(values[inner] for values in motion))
-    # a velocity integrated from an acceleration is wrong by some mm/s: it does not show when the axis turns
+    # a velocity integrated from an acceleration is wrong by some mm/s, too much for the slow bins
     slowest = 0 if "mass_position_m" in signals else len(_SLOW)
     rest_N = _without_curve(features, rest_N[inner], cut, rig.stribeck_velocity_mps, slowest)
-    # near a turn of the motion every error of the presliding model would pass for a wave
+    # near a reversal every error of the presliding model would look like a wave
     sliding = np.abs(cut.velocity_mps) > _SLOW[-2] * rig.stribeck_velocity_mps
     rest_N = _without_inertia(features, np.where(sliding, rest_N, 0.0), cut, sliding)
     _waves(features, rest_N, cut, sliding)
@@ -75,7 +75,7 @@ def axis_features(signals: Signals, commands: CommandedRun, rig: RigTable) -> Fe
 def friction_share(force_N: Floats, motion: SlideMotion) -> tuple[Floats, npt.NDArray[np.bool_]]:
     """Relative deviation of the friction from its mean at that direction and speed, and the blocks where it is known.
 
-    Both are [blocks]. The deviation is 0 where the slide is too slow for it to be known.
+    Both are [blocks]. The deviation is 0 where the slide is too slow.
     """
     rest_N = force_N - motion.inertia_N
     speed = np.abs(motion.velocity_mps)
@@ -89,7 +89,7 @@ def friction_share(force_N: Floats, motion: SlideMotion) -> tuple[Floats, npt.ND
 
 
 def moving_s(motion: SlideMotion, rig: RigTable) -> float:
-    """Seconds of a run that its features can use."""
+    """Time of a run that its features use [s]."""
     if float(np.ptp(motion.position_m)) <= _forgetting_m(rig):
         return 0.0
     return max(len(motion.position_m) - _EDGE - _first(motion, rig), 0) * BLOCK_S
@@ -100,10 +100,9 @@ def _forgetting_m(rig: RigTable) -> float:
 
 
 def _first(motion: SlideMotion, rig: RigTable) -> int:
-    """First block that counts for the features."""
-    gone_m = np.abs(motion.position_m - motion.position_m[0])
-    gone = gone_m > _forgetting_m(rig)
-    return max(int(np.argmax(gone)), _EDGE)
+    """First block that the features use."""
+    travel_m = np.abs(motion.position_m - motion.position_m[0])
+    return max(int(np.argmax(travel_m > _forgetting_m(rig))), _EDGE)
 
 
 def _means(values: Floats, bins: Indices, count: int) -> Floats:
@@ -116,7 +115,7 @@ def _means(values: Floats, bins: Indices, count: int) -> Floats:
 def _profile(values: Floats, bins: Indices, count: int) -> Floats:
     """Mean of `values` [blocks] in each bin, [count], shrunk towards 0 in bins with fewer blocks than the median bin.
 
-    The mean over a place that the motion passes only once is mostly roughness.
+    The mean at a position that the motion passes only once is mostly roughness.
     """
     held = np.bincount(bins, minlength=count)
     sums = np.bincount(bins, values, count)
@@ -137,10 +136,10 @@ def _without_curve(
     slow = len(_SLOW) - 1  # rings 1 to `slow` have two branches
     forward = motion.velocity_mps > 0.0
     speeding = (motion.accel_mps2 > 0.0) == forward
-    # about to stick, the slide has only the direction of the acceleration
-    way = np.where(ring == 0, motion.accel_mps2 > 0.0, forward)
+    # below the first edge the acceleration alone gives the direction
+    direction = np.where(ring == 0, motion.accel_mps2 > 0.0, forward)
     branch = np.where((ring > 0) & (ring <= slow), speeding, False)
-    bins = ring * 4 + way * 2 + branch
+    bins = ring * 4 + direction * 2 + branch
     count = (len(edges) + 1) * 4
     means = _means(rest_N, bins, count)
     for number in range(len(edges) + 1):
@@ -154,7 +153,7 @@ def _without_curve(
 
 
 def _without_inertia(features: Features, rest_N: Floats, motion: SlideMotion, sliding: npt.NDArray[np.bool_]) -> Floats:
-    # smoothed well below the motion that leads the model: otherwise the encoder's noise in both would pass for a lag
+    # smoothed more than the motion that the model follows: otherwise the encoder's noise in both would look like a lag
     smooth = uniform_filter1d(uniform_filter1d(motion.accel_mps2, _RATE_WINDOW), _RATE_WINDOW)
     for name, column in (("inertia", motion.accel_mps2), ("lag", np.gradient(smooth, BLOCK_S))):
         about = np.where(sliding, column - column.mean(), 0.0)

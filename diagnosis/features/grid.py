@@ -19,11 +19,11 @@ MEANS = CHANNELS
 SHAKES = ("mass_shake_mps2", "base_shake_mps2")  # rms within a block, about the block's mean
 SIGNALS = (*MEANS, *SHAKES)
 SHAKEN = {"mass_shake_mps2": "mass_accel_mps2", "base_shake_mps2": "base_accel_mps2"}
-# Blocks from a block to the farthest block that it is averaged with. Too small: some frequencies find no partner.
+# Largest distance of a block to the two blocks that it is averaged with. Too small: no distance suits some frequencies.
 # Too large: slips are smeared.
 _FURTHEST_BLOCKS = 5
-# Largest cosine of the angle that the vibration turns by between the two. Too large: the average amplifies noise.
-# Too small: more frequencies find no partner.
+# Largest cosine of the phase that the vibration advances over this distance. Too large: the average amplifies noise.
+# Too small: no distance suits more frequencies.
 _LARGEST_COSINE = 0.3
 
 
@@ -66,20 +66,20 @@ def _index(run: MeasuredRun) -> npt.NDArray[np.int64]:
 
 
 class Averaged(NamedTuple):
-    """Blocks whose mean still holds some vibration, and the two blocks that each is averaged with; all [averaged]."""
+    """Blocks whose mean still holds some vibration, and the two blocks that each is averaged with, [averaged] each."""
 
     own: npt.NDArray[np.int64]
     before: npt.NDArray[np.int64]
     after: npt.NDArray[np.int64]
-    cosine: Floats  # of the angle that the vibration turns by from one of the blocks to the next
+    cosine: Floats  # cosine of the phase that the vibration advances from one of these blocks to the next
 
 
 def averaged(frequency_Hz: Floats) -> Averaged:
     """The blocks to average under a vibration of `frequency_Hz` [blocks], 0 without a vibration.
 
     A block holds 4.5 periods of 4.5 kHz. Its mean keeps up to 7 % of the amplitude, with a sign that depends on the phase of the
-    exciter, and no log holds this phase. So every block is averaged with one before and one after it. The distance is chosen so
-    that the vibration turns by nearly half a turn; the weights remove its frequency and keep a constant.
+    exciter, and no log holds this phase. So every block is averaged with a block before and a block after it. Their distance is
+    chosen so that the phase advances by nearly half a turn; the weights remove its frequency and keep a constant.
     """
     shaken = np.flatnonzero(frequency_Hz)
     values_Hz, which = np.unique(frequency_Hz[shaken], return_inverse=True)
@@ -97,7 +97,7 @@ def without_vibration(signals: dict[str, Floats], blocks: Averaged) -> dict[str,
 
     Args:
         signals: [blocks] each, measured or predicted.
-        blocks: from `averaged`, of the vibration in their run.
+        blocks: result of `averaged` for the vibration in the run.
 
     """
     blocks_of, before, after, cosine = blocks

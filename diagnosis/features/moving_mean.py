@@ -1,4 +1,4 @@
-"""A moving mean of equal weights, compiled: a call of scipy's takes 60 us before it begins."""
+"""A moving mean of equal weights, compiled: SciPy's function takes 60 us for each call."""
 
 import numpy as np
 
@@ -10,11 +10,11 @@ from bridge.kernel import kernel
 def moving_mean(values: Floats, width: int) -> Floats:
     """The mean over `width` blocks around each of `values` [blocks]; beyond an end the values continue in reverse order.
 
-    Bit by bit the result of scipy's filter in its mode "reflect".
+    The result equals SciPy's `uniform_filter1d` in its mode "reflect" bit by bit.
     """
     count = len(values)
     before = width // 2
-    # the values with their reflections, so that the loop asks for no ends
+    # the values with their reflections, so that the loop needs no test for the ends
     padded = np.empty(count + width)
     for i in range(count + width):
         at = (i - before) % (2 * count)

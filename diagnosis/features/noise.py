@@ -1,8 +1,7 @@
-"""The noise of a run, taken from the run: the part faster than 20 ms where the slide sticks, in pieces as measured.
+"""The noise of a run, taken from the run: measured pieces of the part faster than 20 ms where the slide sticks.
 
-The pieces keep hum, colour and quantisation, and no spectrum has to be assumed. Slower noise cannot be separated from motion;
-it is drawn as a small drift of the force. An accelerometer shows no motion where the slide sticks: its whole signal there is
-noise, slow or fast.
+The pieces keep hum, colour and quantisation, so no spectrum is assumed. Slower noise cannot be separated from motion; it is
+drawn as a small drift of the force. An accelerometer shows no motion where the slide sticks: all of its signal is noise there.
 """
 
 from typing import NamedTuple
@@ -15,25 +14,25 @@ from bridge.arrays import Floats
 from diagnosis.features.feature import Scales, Signals
 from diagnosis.features.segments import CommandedRun
 
-_WINDOW = 21  # blocks of the mean that is taken off. Too small: noise is lost; too large: motion counts as noise
-_FEWEST = 500  # blocks of a piece; a shorter piece would repeat too often within a run
-_FEWEST_STILL = 100  # blocks of a piece of acceleration: a short one is better than one with remains of a vibration
+_WINDOW = 21  # blocks of the mean that is subtracted. Too small: noise is lost; too large: motion counts as noise
+_FEWEST = 500  # fewest blocks of a piece; a shorter piece would repeat too often within a run
+_FEWEST_STILL = 100  # fewest blocks of a piece of acceleration: a short piece is better than remains of a vibration
 # Drift of the force sensor in a replicate, as a share of the static friction: 5 mN on the paper's rig, the drift of a strain
 # gauge within 10 s. Too small: a good sensor's drift is a gap; too large: small effects on the level of the force are hidden.
 _SLOW_SHARE = 3e-4
-_SLOW_WAVES = 6  # half waves over a run that the drift is made of
-_POSITION_WINDOW, _FORCE_WINDOW = 41, 5  # blocks of the cubic that is taken off, with a force drive
+_SLOW_WAVES = 6  # number of half waves over a run in the drift
+_POSITION_WINDOW, _FORCE_WINDOW = 41, 5  # blocks of the cubic that is subtracted, with a force drive
 
 
 class RunNoise(NamedTuple):
     """The noise of one run."""
 
-    pieces: dict[str, Floats]  # by signal: a stretch of measured noise, [blocks of the piece]
-    shake_mps2: dict[str, float]  # by shake signal: rms of an accelerometer without a vibration
-    slow_force_N: float  # size of the force sensor's drift
+    pieces: dict[str, Floats]  # stretch of measured noise by signal, [blocks of the piece]
+    shake_mps2: dict[str, float]  # rms of an accelerometer without a vibration, by shake signal
+    slow_force_N: float  # rms of the force sensor's drift
 
     def drawn(self, name: str, blocks: int, random: np.random.Generator) -> Floats:
-        """A drawn stretch of noise of the signal `name`, [blocks], in the unit of the signal."""
+        """A random stretch of noise of the signal `name`, [blocks], in the unit of the signal."""
         piece = self.pieces[name]
         offset = int(random.integers(len(piece)))
         result = np.tile(piece, blocks // len(piece) + 2)[offset : offset + blocks]
@@ -81,13 +80,13 @@ def noise_of(signals: Signals, commands: CommandedRun, scales: Scales) -> RunNoi
 def _axis_noise(signals: Signals, scales: Scales) -> RunNoise:
     """Noise with a force drive, where the slide rarely rests: the remainder of a cubic, without ends and reversals.
 
-    Of the position it is the part that the measured force does not explain, 12 Hz and above, so mains hum stays in. The force is
-    an input and may move in any way, so only its fastest part is noise; the noise that this misses does not move the mass.
+    Position noise is the part above 12 Hz, which includes mains hum and which the measured force does not explain. The force is
+    an input and may move in any way, so only its fastest part is noise; slower noise of the force does not move the mass.
     """
     pieces: dict[str, Floats] = {}
     for name, values in signals.items():
         window = _FORCE_WINDOW if name == "drive_force_N" else _POSITION_WINDOW
-        # the cubic follows white noise by the weight of the middle sample; this restores the size of the remainder
+        # the cubic follows white noise by the weight of its middle sample; this factor restores the size of the remainder
         scale = (1.0 - float(np.asarray(savgol_coeffs(window, 3))[window // 2])) ** -0.5
         rest = scale * (values - np.asarray(savgol_filter(values, window, 3)))
         size = uniform_filter1d(np.abs(rest), _POSITION_WINDOW)

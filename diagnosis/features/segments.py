@@ -22,17 +22,17 @@ _WINDOW = 100
 # Smallest change of speed, as a share of the faster speed. Too small: the ripple of a screw splits segments.
 # Too large: two speeds count as one.
 _SMALLEST_CHANGE = 0.35
-SHORTEST_S = 0.3  # of a segment; shorter stretches of constant command are not compared
-_SHORTEST_WINDOWS = 3  # of a piece of constant velocity; with fewer windows a ripple counts as a change
+SHORTEST_S = 0.3  # shortest segment; shorter stretches of constant command are not compared
+_SHORTEST_WINDOWS = 3  # fewest windows of a piece of constant velocity; with fewer a ripple counts as a change
 # A drive counts as at rest below this share of the run's fastest speed, where its slope is the sensor's noise; and below this
 # travel in a whole run, which is rounding (or below its noise, if larger).
 _SLOWEST, _STILL_M = 0.01, 1e-9
-# Deviation of a window from the velocity of its piece, as a share of the change of speed, up to which the drive has arrived.
-# Too small: noise and ripple count as a drive under way. Too large: the end of a ramp counts as constant speed.
+# Deviation of a window from the velocity of its piece, as a share of the change of speed, up to which the speed is reached.
+# Too small: noise and ripple count as a change of speed. Too large: the end of a ramp counts as constant speed.
 _ON_THE_WAY = 0.1
-_QUICK = 2  # windows up to which a change of speed counts as a step; `_SETTLING` covers half of them
-_LONGEST_RAMP = 20  # windows up to which a rise of speed counts as a change; a longer rise is a piece with a gap
-_RATE_WINDOW = 41  # blocks over which the velocity of a change is read: 1 um of noise gives 13 um/s
+_QUICK = 2  # longest change of speed that counts as a step [windows]; `_SETTLING` covers half of it
+_LONGEST_RAMP = 20  # longest rise of speed that counts as a change [windows]; a longer rise is a piece with a gap
+_RATE_WINDOW = 41  # blocks over which the velocity during a change is measured: 1 um of noise gives 13 um/s
 # Blocks (0.1 s) left out after a change of command and at the start of a run, while drive and piezo settle.
 # Too small: the settling shows as a gap; too large: short segments lose their slips. Counted: docs/method/diagnosis.md.
 _SETTLING = 100
@@ -49,9 +49,9 @@ class Segment(NamedTuple):
     drive_velocity_mps: float  # 0 with a force drive
     frequency_Hz: float
     amplitude_m: float
-    slips: int = 0  # measured slips
-    sticks: bool = False  # at least one whole stick between two slips was measured
-    still: bool = False  # even sliding was measured
+    slips: int = 0  # number of measured slips
+    sticks: bool = False  # whether a complete stick between two slips was measured
+    still: bool = False  # whether even sliding was measured
 
     @property
     def at_the_edge(self) -> bool:
@@ -73,15 +73,15 @@ class CommandedRun(NamedTuple):
     amplitude_m: Floats
     segments: tuple[Segment, ...]
     motion: SlideMotion | None = None  # measured motion of the slide, with a force drive only
-    changing_s: float = 0.0  # sum of the stretches that are too short to be a segment
+    changing_s: float = 0.0  # total time of the stretches that are too short to be a segment
 
 
 def commands_of(run: MeasuredRun, rig: RigTable, reduced: dict[str, Floats]) -> CommandedRun:
     """The commands of a run, from its columns and the velocity that the manifest states.
 
     Args:
-        run: the columns as measured.
-        rig: as described.
+        run: the measured run.
+        rig: the described rig.
         reduced: signals of the run on the 1 ms grid, [blocks] each.
 
     """
@@ -124,11 +124,11 @@ def commands_of(run: MeasuredRun, rig: RigTable, reduced: dict[str, Floats]) -> 
 def never_constant(position_m: Floats, drive: Floats) -> bool:
     """Whether a drive changes its velocity all the time: a sine, a ramp, a control that hunts.
 
-    For more than half of its way in time it is then in no piece of constant velocity, or in one whose velocity rises and falls
-    in a single bow.
+    For more than half of the time in which it moves, it is then in no piece of constant velocity, or in a piece whose velocity
+    rises and falls in a single bow.
 
     Args:
-        position_m: as measured, [blocks].
+        position_m: measured position, [blocks].
         drive: velocity as pieces of constant velocity, [blocks].
 
     """
@@ -147,7 +147,7 @@ def never_constant(position_m: Floats, drive: Floats) -> bool:
 
 
 def _is_bowed(velocity: Floats) -> bool:
-    """Whether the velocity of a piece [windows] is one smooth bow, by as much as makes two pieces."""
+    """Whether the velocity of a piece [windows] is one smooth bow, as high as a change of speed."""
     if len(velocity) < 2 * _SHORTEST_WINDOWS:
         return False
     time = np.linspace(-1.0, 1.0, len(velocity))
@@ -169,7 +169,7 @@ def _stated(velocity_mps: float, blocks: int, position_m: Floats | None) -> Floa
 
 
 def _pieces(position_m: Floats) -> Floats:
-    """Velocity [m/s] of each block: constant between changes of speed; as measured during a slow change."""
+    """Velocity [m/s] of each block: constant between changes of speed, the measured velocity during a slow change."""
     blocks = len(position_m)
     if blocks < 4 * _WINDOW:
         return np.full(blocks, _slope(position_m))
@@ -207,20 +207,20 @@ def _pieces(position_m: Floats) -> Floats:
     return result
 
 
-def _windows_under_way(velocity: Floats, speed: float, other: float, at_the_end: bool) -> int:
-    """Number of windows, from the first, in which a piece has not reached its velocity `speed`; `other` is the neighbour's.
+def _windows_under_way(velocity: Floats, speed: float, neighbour: float, at_the_end: bool) -> int:
+    """Number of windows from the first in which a piece has not reached its velocity `speed`; `neighbour`: the piece before.
 
     At an end of the run no neighbour is known; there a drive that starts or stops is below half of its velocity.
     """
     if at_the_end and speed * velocity[0] >= 0.5 * speed * speed:
         return 0
-    on_the_way = np.abs(velocity - speed) > _ON_THE_WAY * abs(speed - other)
+    on_the_way = np.abs(velocity - speed) > _ON_THE_WAY * abs(speed - neighbour)
     most = len(velocity) - _SHORTEST_WINDOWS
     return min(int(np.argmin(on_the_way)), max(most, 0))
 
 
 def _is_ramp(velocity: Floats) -> bool:
-    """Whether a piece is one long change of speed."""
+    """Whether a piece is a single change of speed."""
     if len(velocity) > _LONGEST_RAMP:
         return False
     time = np.linspace(-0.5, 0.5, len(velocity))
@@ -247,7 +247,7 @@ def _changes(velocity: Floats, first: int, last: int, fastest: float) -> list[in
         return []
     left = float(np.median(velocity[first:best]))
     right = float(np.median(velocity[best:last]))
-    # a window that holds the change spoils neither median; a stop is compared with the fastest speed of the run
+    # medians, as a window that holds the change must not count; a stop is compared with the fastest speed of the run
     if abs(left - right) < max(_SMALLEST_CHANGE * max(abs(left), abs(right)), _SLOWEST * fastest):
         return []
     return [*_changes(velocity, first, best, fastest), best, *_changes(velocity, best, last, fastest)]

@@ -13,30 +13,30 @@ from diagnosis.features.grid import BLOCK_S
 from diagnosis.features.segments import Segment
 from diagnosis.slips import turns
 
-# instants at which the shape of a slip is read, in slip durations (half periods of the mass on its spring) after mid-fall
+# instants at which the shape of a slip is sampled, in slip durations (half periods of the mass on its spring) after mid-fall
 SHAPE_AT = np.array([-1.5, -1.0, -0.75, -0.5, -0.35, -0.2, 0.0, 0.2, 0.35, 0.5, 0.75, 1.0, 1.5, 2.0])
-# Sum of the weights of its slips from which a segment slips. Too small: a slip at the edge of a segment decides which
+# Least sum of the weights of the slips in a segment that slips. Too small: a slip at the edge of a segment decides which
 # features are compared. Too large: short segments are not compared.
 _ENOUGH_SLIPS = 0.5
-# Change of the force over the second half of a segment, as a share of the static friction, up to which the slide slides evenly.
+# Largest change of the force over the second half of a segment of even sliding, as a share of the static friction.
 # Too small: a friction wave counts as a climb. Too large: a first climb counts as sliding.
 _LEVEL = 0.15
 # Share of a segment, from either end, over which the weight of a slip grows from 0 to 1.
 # Too small: features jump when a slip enters the segment. Too large: slips are wasted.
 _TAPER = 0.12
-_turns = kernel(turns)  # thousands of records are searched
+_turns = kernel(turns)  # compiled, as thousands of records are searched
 
 
 class SegmentSlips(NamedTuple):
     """The slips of a segment, [slips] each, in blocks from the start of the segment.
 
-    The weight of a slip falls to 0 towards the ends of its segment. A slip that enters or leaves the segment as a parameter
-    changes then does not make the features jump, and a fit can follow their slope.
+    The weight of a slip falls to 0 towards the ends of its segment, so that the features do not jump when a parameter moves a
+    slip into or out of the segment, and a fit can follow their slope.
     """
 
     tops: Indices  # breakaways
     bottoms: Indices  # re-sticks
-    middles: Floats  # instants at which half of the fall is done
+    middles: Floats  # instants of mid-fall
     weights: Floats  # 0 to 1
 
     @property
@@ -54,11 +54,11 @@ NO_SLIPS = SegmentSlips(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0
 
 
 def settled(signals: Signals, segment: Segment, scales: Scales) -> Segment:
-    """A segment cut to the part that its start does not decide, marked with slips, even sliding, or neither (a first climb).
+    """A segment without the part that depends on its start, marked with slips, even sliding, or neither (a first climb).
 
     With three slips or more the segment begins in the second stick, where the load of the spring and the age of the contact
-    before the segment no longer matter. A single slip near an end, or a climb that just does not slip, would come and go with
-    every parameter; nothing is read from either.
+    before the segment no longer matter. A single slip near an end, or a climb just below a slip, would appear and disappear with
+    every parameter; neither gives a feature.
     """
     cut = {name: segment.sign * values[segment.first : segment.last] for name, values in signals.items()}
     slips = find_slips(cut, scales)
@@ -87,22 +87,22 @@ def find_slips(cut: Signals, scales: Scales) -> SegmentSlips:
 
     Args:
         cut: signals of the segment, [blocks] each, with positive values in the direction of the drive.
-        scales: of the rig.
+        scales: scales of the rig.
 
     """
     if "drive_force_N" in cut:
         falling, drop = cut["drive_force_N"], scales.drop_N
     else:
-        # Without a force: the velocity of the slide (the acceleration integrated with a leak over two slip durations) rises
-        # and falls once a slip.
+        # Without a force, the velocity of the slide is searched (the acceleration, integrated with a leak over two slip
+        # durations): it rises and falls once a slip.
         keep = math.exp(-BLOCK_S / (2.0 * scales.slip_s))
         falling = -np.asarray(lfilter([BLOCK_S], [1.0, -keep], cut["mass_accel_mps2"]))
         swing_mps = scales.drop_N * math.pi / (scales.stiffness_N_per_m * scales.slip_s)  # over sqrt(stiffness x mass)
         drop = max(0.3 * float(np.ptp(falling)), swing_mps)
     at = np.empty(len(falling), np.int64)
-    count = _turns(falling, drop, at) // 2 * 2  # without a fall that does not end
+    count = _turns(falling, drop, at) // 2 * 2  # without an incomplete fall at the end
     tops, bottoms = at[:count:2], at[1:count:2]
-    # a fall that takes ten times as long as a slip is a change of level
+    # a fall that lasts ten slip durations or more is a change of level
     quick = (bottoms - tops) * BLOCK_S < 10.0 * scales.slip_s
     tops, bottoms = tops[quick], bottoms[quick]
     middles = _half_fallen(falling, tops, bottoms)
@@ -113,7 +113,7 @@ def find_slips(cut: Signals, scales: Scales) -> SegmentSlips:
 
 @kernel
 def _half_fallen(falling: Floats, tops: Indices, bottoms: Indices) -> Floats:
-    """Instant, in samples, at which half of each fall is done, [falls]; interpolated between two samples."""
+    """Instant [samples] of mid-fall, [falls]; interpolated between two samples."""
     middles = np.empty(len(tops))
     for fall in range(len(tops)):
         half = 0.5 * (falling[tops[fall]] + falling[bottoms[fall]])

@@ -1,8 +1,8 @@
 """Features of a run with a spring drive; none depends on the instants of the slips.
 
 Features of a segment of constant command: means and trends over the cycles, shapes aligned at the middle of a slip, the level
-over time where nothing slips, the vibration that arrives. Features of a run: relations between channels that need no friction
-model. A measured and a predicted run pass through the same code; a feature that a run does not have is NaN.
+over time without slips, the measured vibration. Features of a run: relations between channels that need no friction model. A
+measured and a predicted run pass through the same code; a feature that a run does not have is NaN.
 """
 
 import math
@@ -21,18 +21,18 @@ from diagnosis.features.slips import NO_SLIPS, SHAPE_AT, SegmentSlips, find_slip
 from diagnosis.features.spring_law import spring_bend, spring_law
 
 _LOW_AND_HIGH = np.array([0.05, 0.95])
-_LEVELS = 8  # bins over a segment without slips
+_LEVELS = 8  # number of bins over a segment without slips
 _BREAKAWAY_WAVES = 5  # half waves of the breakaway force over a segment; more follow shorter friction waves and noise
 
 
 def spring_features(signals: Signals, commands: CommandedRun, scales: Scales, labelled: bool = True) -> Features:
-    """All features of a run with a spring drive; commands and channels alone decide which features there are.
+    """All features of a run with a spring drive; the list of features depends on commands and channels alone.
 
     Args:
         signals: [blocks] each, measured or predicted, from `without_vibration`.
-        commands: of the run, with settled segments.
-        scales: of the rig.
-        labelled: whether the labels are wanted; without them it takes a tenth less time.
+        commands: commands of the run, with settled segments.
+        scales: scales of the rig.
+        labelled: whether the labels are wanted; without them the call takes a tenth less time.
 
     """
     features = Features(labelled)
@@ -128,23 +128,23 @@ _LEVEL_NAMES = tuple(
 
 
 def _level(features: Features, number: int, force_N: Floats, slips: SegmentSlips, segment: Segment) -> None:
-    """Add levels of the force: over whole cycles, weighted as their slips are; over the segment where nothing slips.
+    """Add levels of the force: over complete cycles with the weights of their slips; over the segment without slips.
 
-    A jump of the force at the start of a segment, as a late force sensor makes it, looks like a slip. It has weight 0, and its
+    A jump of the force at the start of a segment, due to a delayed force sensor, looks like a slip. It has weight 0, and its
     cycle must not count in the level (docs/method/diagnosis.md).
     """
     name = "drive_force_N"
     still = segment.still and not segment.at_the_edge
-    whole, counts = force_N, np.ones(len(force_N))
+    counted_N, counts = force_N, np.ones(len(force_N))
     weights = slip_pairs(slips)
     if weights.sum() > 0.1:
-        whole, counts = force_N[slips.tops[0] : slips.tops[-1]], np.repeat(weights, np.diff(slips.tops))
+        counted_N, counts = force_N[slips.tops[0] : slips.tops[-1]], np.repeat(weights, np.diff(slips.tops))
     levels = np.full(4, np.nan)
     if still or (segment.slips > 2 and not segment.at_the_edge):
         total = counts.sum()
-        mean_N = (whole * counts).sum() / total
-        about_N = whole - mean_N
-        levels = np.array([mean_N, ((about_N * about_N) * counts).sum() / total, *_quantiles(whole, counts)])
+        mean_N = (counted_N * counts).sum() / total
+        about_N = counted_N - mean_N
+        levels = np.array([mean_N, ((about_N * about_N) * counts).sum() / total, *_quantiles(counted_N, counts)])
         levels[1] **= 0.5
     bins = [math.nan] * _LEVELS
     middle = fast = math.nan
@@ -159,16 +159,16 @@ def _level(features: Features, number: int, force_N: Floats, slips: SegmentSlips
 
 
 def _quantiles(values: Floats, weights: Floats) -> Floats:
-    """The result of `numpy.quantile` at 5 and 95 % by the inverted distribution, in a fifth of its time."""
+    """Same result as `numpy.quantile` at 5 and 95 % by the inverted distribution, in a fifth of its time."""
     order = np.argsort(values)
     share = weights[order].cumsum()
     share /= share[-1]
     quantiles = values[order[np.minimum(np.searchsorted(share, _LOW_AND_HIGH), len(values) - 1)]]
-    return np.full(2, np.nan) if np.isnan(values[order[-1]]) else quantiles  # of a model that diverges
+    return np.full(2, np.nan) if np.isnan(values[order[-1]]) else quantiles  # NaN: the model diverges
 
 
 def _mean(values: Floats) -> float:
-    """As `values.mean()`, which takes five times as long for some hundred values."""
+    """Same result as `values.mean()`, which takes five times as long for some hundred values."""
     return float(np.add.reduce(values)) / len(values)
 
 
@@ -183,7 +183,7 @@ def _shapes(
     features: Features, number: int, cut: Signals, slips: SegmentSlips, scales: Scales, frequency_Hz: float
 ) -> None:
     width = scales.slip_s / BLOCK_S
-    shaken = frequency_Hz > 0.0  # a vibration that the sampling folds to low frequencies would pass for a ring
+    shaken = frequency_Hz > 0.0  # an aliased vibration would look like a ring
     names = [name for name in ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m") if name in cut]
     if not names:
         return
@@ -220,7 +220,7 @@ def _vibration(features: Features, number: int, cut: Signals) -> None:
         features.add("vibration", source, "steady", HIGH, number, math.log(mean + 1e-9))
         if source == "base_accel_mps2":
             time = _line(len(shake))
-            shaken = mean > 0.0  # a dead sensor or a tripped amplifier shows 0, and 0 cannot divide
+            shaken = mean > 0.0  # a dead sensor or a tripped amplifier gives 0
             over_time = float(shake @ time) / (mean * len(shake) / 3.0) if shaken else math.nan
             features.add("vibration over time", source, "steady", HIGH, number, over_time)
             if "drive_force_N" in cut:

@@ -1,4 +1,4 @@
-"""How the force follows the extension e of the spring: a massless linear spring, measured without delay, pulls with k e."""
+"""The force as a function of the extension e of the spring: a massless linear spring, measured without delay, pulls with k e."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -12,9 +12,9 @@ from diagnosis.features.moving_mean import moving_mean
 from diagnosis.features.segments import Segment
 
 _ENTRY_MARGIN = 10  # blocks left out around the start of a segment: longer than the delays of a measuring chain
-# Moving means, in slip durations, between which the bend is read. Shorter short mean: noise of the displacement sensors, which
-# grows with the square of frequency; longer: it smears the slip. Longer long mean: a sensor's bow passes for a bend; shorter: the
-# slip is removed. Counted on 60 rigs without a gap (docs/method/diagnosis.md).
+# Widths of two moving means, in slip durations; the bend is fitted to the band between them. Shorter short mean: noise of the
+# displacement sensors, which grows with the square of frequency; longer: it smears the slip. Longer long mean: a sensor's bow
+# looks like a bend; shorter: the slip is removed. Counted on 60 rigs without a gap (docs/method/diagnosis.md).
 _SHORT, _LONG = 0.25, 8.0
 
 
@@ -23,12 +23,12 @@ def spring_law(
 ) -> dict[str, float]:
     """Part of the force [N] that follows the extension, its rate, its cube, time and direction; and the rest's mean square.
 
-    The parts are taken one after the other, by name: stiffness, rate, cube, time, direction (NaN without both), rest.
+    The parts are fitted one after the other: stiffness, rate, cube, time, direction (NaN in a run of one direction), rest.
 
     Args:
         force_N, extension_m: [blocks] each.
-        segments: of the run.
-        scale_N, stiffness_N_per_m: typical force and stiffness, which size the columns.
+        segments: segments of the run.
+        scale_N, stiffness_N_per_m: typical force and stiffness, which scale the columns.
 
     """
     even = _away_from_entries(segments, len(force_N), _ENTRY_MARGIN)
@@ -40,7 +40,7 @@ def spring_law(
     columns = {
         "stiffness": reaches,
         "rate": rate_mps * 1e3,
-        "cube": reaches * reaches * reaches,  # a power would take as long as the rest of this function
+        "cube": reaches * reaches * reaches,  # `**` would take as long as the rest of this function
         "time": np.linspace(-1.0, 1.0, len(even))[even],
     }
     if both:
@@ -51,11 +51,11 @@ def spring_law(
 
 
 def spring_bend(force_N: Floats, extension_m: Floats, segments: Sequence[Segment], slip_s: float) -> float:
-    """The force [N] for each m/s2 of the extension's second derivative, read where slips are fast.
+    """The force [N] for each m/s2 of the extension's second derivative, in the band of the slips.
 
-    A force that is late by T is F - T F' + T^2 F'' / 2. Behind n equal low-passes with the same total delay, the factor of T^2
-    F'' is (n + 1) / (2 n) instead of 1/2. A swinging frame bends the force without making it late. So the bend separates a
-    delay, a low-pass and a frame.
+    A force with a delay of T is F - T F' + T^2 F'' / 2. Behind n equal low-passes with the same total delay, the factor of T^2
+    F'' is (n + 1) / (2 n) instead of 1/2. A swinging frame bends the force without a delay. So the bend separates a delay, a
+    low-pass and a frame.
     """
     short, long = (max(round(slips * slip_s / BLOCK_S), 1) for slips in (_SHORT, _LONG))
     level_m = moving_mean(extension_m, short)
@@ -74,7 +74,7 @@ def spring_bend(force_N: Floats, extension_m: Floats, segments: Sequence[Segment
 
 
 def _away_from_entries(segments: Sequence[Segment], blocks: int, about: int) -> npt.NDArray[np.bool_]:
-    """Marks [blocks] all blocks but those within `about` of the start of a segment, where the model takes the measured force."""
+    """Marks [blocks] without `about` blocks around the start of each segment, where the model starts at the measured force."""
     even = np.ones(blocks, np.bool_)
     for segment in segments:
         if segment.still or segment.slips > 0:
@@ -83,9 +83,9 @@ def _away_from_entries(segments: Sequence[Segment], blocks: int, about: int) -> 
 
 
 def _sequential_fit(columns: Mapping[str, Floats], force_N: Floats) -> tuple[dict[str, float], float]:
-    """Coefficient of the force [blocks] on each column, each freed of the columns before it; and the rest's sum of squares.
+    """Coefficient of the force [blocks] on each column, orthogonal to the columns before it; and the rest's sum of squares.
 
-    A fit of all columns at once would pass the noise of one to the other.
+    A fit of all columns at once would transfer the noise of a column to the others.
     """
     centred = np.array([*columns.values(), force_N])
     centred -= centred.mean(axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""The noise floor: the difference that a perfect model would still show."""
+"""The noise floor: the difference that remains with a perfect model."""
 
 from collections.abc import Sequence
 from itertools import chain
@@ -13,12 +13,12 @@ from diagnosis.gap.problem import Draw, Point, Problem
 from diagnosis.model.rig import Roughness
 from diagnosis.processes import each
 
-# Noise floors up to which a difference counts in full; beyond, it counts as its logarithm.
-# Too small: large differences, which name the effect, hardly count. Too large: one signal that is far off hides all others.
+# Difference, in noise floors, up to which it counts in full; beyond, it counts as its logarithm.
+# Too small: large differences, which identify the effect, count little. Too large: a signal that is far off hides all others.
 KNEE = 6.0
 _LEAST_POWER = 1e-30  # squared unit of the signal: keeps the logarithm of a power finite; far below any sensor's noise
-# Smallest scatter of "spring bend" [s2 x stiffness]: the bend of the force over the extension by sensors alone.
-# Too small: rigs without a gap show a bend. Too large: a slow and a late force sensor are not separated.
+# Smallest scatter of "spring bend" [s2 x stiffness]: the bend of the force over the extension due to sensors.
+# Too small: rigs without a gap show a bend. Too large: a slow and a delayed force sensor are not separated.
 # Counted on 20 rigs without a gap (docs/method/diagnosis.md).
 _SENSORS_BEND_S2 = 1e-7
 _SHORT_WAVES = frozenset(f"wave {number}" for number in range(5, DRIVE_WAVES + 1))  # shorter than a sensor's bow
@@ -29,7 +29,7 @@ CellKey = tuple[str, str, tuple[float, float], str]
 
 
 class Floor(NamedTuple):
-    """The difference that a perfect model would still show, by feature.
+    """The noise floor of each feature.
 
     The features belong to one `Problem`. Arrays are [features], in the unit of each feature, unless stated otherwise.
     """
@@ -43,14 +43,14 @@ class Floor(NamedTuple):
     level: float  # root mean square of the replicates themselves over the cells, in noise floors
 
     def expected(self, predicted: Floats) -> Floats:
-        """The mean [features] that a rough and noisy rig shows where the noise-free prediction is `predicted` [features].
+        """Expected features of a rough and noisy rig whose noise-free prediction is `predicted`; [features] each.
 
-        Powers come as half their logarithm.
+        A power is returned as half its logarithm.
         """
         return logarithms(predicted + self.bias, self.powers)
 
     def of_features(self, mask: npt.NDArray[np.bool_]) -> "Floor":
-        """The floor of the features marked in `mask` [features], which must be all features of some runs.
+        """The floor of the features marked in `mask` [features]: all features of one or several runs.
 
         Runs are independent of each other, so the whitening may be cut at their borders.
         """
@@ -61,13 +61,13 @@ class Floor(NamedTuple):
             scatter=self.scatter[mask],
             compared=self.compared[mask],
             whitening=self.whitening[rows][:, rows],
-            cells=tuple(cell for cell, is_own in zip(self.cells, rows, strict=True) if is_own),
+            cells=tuple(cell for cell, marked in zip(self.cells, rows, strict=True) if marked),
             level=self.level,
         )
 
 
 def compress(z: Floats, knee: float = KNEE) -> Floats:
-    """T of the gap's definition (`diagnosis.gap.measure`): `z` in noise floors, any shape; fits begin with a larger knee."""
+    """Function T of the gap's definition (`diagnosis.gap.measure`), of `z` in noise floors; fits begin with a larger knee."""
     return knee * np.arcsinh(z / knee)
 
 
@@ -85,18 +85,18 @@ def replicates(
     jobs: int = 1,
     perhaps: Sequence[Point] = (),
 ) -> Floats:
-    """Predicted features of one model on other rough surfaces with other sensor noise, [count, features].
+    """Predicted features of a model on random rough surfaces with random sensor noise, [count, features].
 
     The result does not depend on the number of processes.
 
     Args:
         problem: the runs.
         point: the model.
-        roughness: share of the friction, and the length around which each replicate draws its own.
-        count: of replicates.
-        seed: of the draws.
+        roughness: scatter of the friction, and the length around which the length of each replicate is drawn.
+        count: number of replicates.
+        seed: seed of the draws.
         jobs: processes.
-        perhaps: points that may be asked for next, simulated where a lane is free.
+        perhaps: points that may be requested next, simulated where a lane is free.
 
     """
     shares = np.array_split(np.arange(count), jobs)
@@ -129,12 +129,12 @@ def floor_of(problem: Problem, point: Point, drawn: Floats, before: Floor | None
     count = np.maximum(finite.sum(axis=0), 1)
     mean = np.where(finite, drawn, 0.0).sum(axis=0) / count
     bias = np.where(compared, mean - np.where(compared, plain, 0.0), 0.0)
-    # Noise only adds to a power, so a bias below 0 is chance. Added to the prediction of a weaker ring, such a bias would give
-    # a negative power, whose logarithm is far off (docs/method/diagnosis.md).
+    # Noise can only increase a power, so a negative bias is chance. Added to the prediction of a weaker ring, it would give a
+    # negative power, whose logarithm is far off (docs/method/diagnosis.md).
     bias[powers] = np.maximum(bias[powers], 0.0)
     about = np.where(finite, logarithms(drawn, powers) - logarithms(mean, powers), 0.0)
-    # Under vibration the phase at which a slip begins decides how the slip goes. So the prediction scatters as the measured
-    # run does, and the variance of their difference is twice the variance of the replicates.
+    # Under vibration a slip depends on the phase at which it begins. So the prediction scatters as much as the measured run,
+    # and the variance of their difference is twice the variance of the replicates.
     about *= np.where(_slips_under_vibration(problem), 2.0**0.5, 1.0)
     spread = np.sqrt((about * about).sum(axis=0) / np.maximum(count - 1, 1))
     least = np.array([_least(label, problem) for _, label in labels])
@@ -150,19 +150,19 @@ def floor_of(problem: Problem, point: Point, drawn: Floats, before: Floor | None
         for (file, label), use in zip(labels, compared, strict=True)
         if use
     )
-    # The replicates show only the drawn part of the scatter; the whitening needs the least part as well.
-    promised = np.where(lost, 1.0, least / scatter)[compared] ** 2
-    # A further run differs from the mean of `count` replicates by a little more than the replicates do among themselves.
-    others = (len(drawn) + 1.0) / (len(drawn) - 1.0)
+    # The replicates show only the drawn part of the scatter; the whitening needs the least scatter as well.
+    further = np.where(lost, 1.0, least / scatter)[compared] ** 2
+    # A new run differs from the mean of `count` replicates by a little more than the replicates do.
+    correction = (len(drawn) + 1.0) / (len(drawn) - 1.0)
     squares = np.where(lost[compared], 1.0, z * z)
-    # no cell: the model shows none of the measured features, so there is no mean; the caller reports it
-    level = np.sqrt(others * np.mean([cell_means(row, cells).mean() for row in squares])) if cells else np.nan
+    # without a cell the model shows none of the measured features; the caller reports it
+    level = np.sqrt(correction * np.mean([cell_means(row, cells).mean() for row in squares])) if cells else np.nan
     segments = [(file, label.segment) for (file, label), use in zip(labels, compared, strict=True) if use]
-    return Floor(bias, powers, scatter, compared, _whitening(z, promised, segments), cells, float(level))
+    return Floor(bias, powers, scatter, compared, _whitening(z, further, segments), cells, float(level))
 
 
 def logarithms(values: Floats, powers: npt.NDArray[np.bool_]) -> Floats:
-    """Features [..., features] with each power as half its logarithm; all others unchanged.
+    """Features [..., features] with each power as half its logarithm; other features unchanged.
 
     A difference of two powers is then the relative difference of two amplitudes.
     """
@@ -186,23 +186,23 @@ def cell_means(squares: Floats, cells: tuple[CellKey, ...]) -> Floats:
     return np.bincount(index, squares, len(number)) / np.bincount(index, minlength=len(number))
 
 
-def _whitening(z: Floats, promised: Floats, segments: list[tuple[str, int]]) -> Floats:
+def _whitening(z: Floats, further: Floats, segments: list[tuple[str, int]]) -> Floats:
     """Inverse root of the covariance of the replicates `z` [count, compared], segment by segment.
 
     Each segment runs on another piece of the track. With so few replicates, a correlation of two segments is chance, and a
-    shrinkage strong enough to remove this chance would also remove the common effect of a slip on all features of its segment.
+    shrinkage strong enough to remove it would also remove the common effect of a slip on all features of its segment.
     """
     result = np.zeros((len(segments), len(segments)))
     for segment in dict.fromkeys(segments):
         mask = np.array([label == segment for label in segments])
-        result[np.outer(mask, mask)] = _inverse_root(z[:, mask], promised[mask]).ravel()
+        result[np.outer(mask, mask)] = _inverse_root(z[:, mask], further[mask]).ravel()
     return result
 
 
-def _inverse_root(z: Floats, promised: Floats) -> Floats:
+def _inverse_root(z: Floats, further: Floats) -> Floats:
     """Inverse root of the covariance of the replicates `z` [count, features], shrunk towards independence.
 
-    The intensity of the shrinkage follows Ledoit and Wolf (2004). `promised` [features] is added to the variances.
+    The intensity of the shrinkage follows Ledoit and Wolf (2004). `further` [features] is added to the variances.
     """
     count, features = z.shape
     sample = z.T @ z / count
@@ -213,7 +213,7 @@ def _inverse_root(z: Floats, promised: Floats) -> Floats:
     )
     shrink = float(np.clip(noise / count / max(float((off**2).sum()), 1e-12), 0.05, 1.0))
     covariance = (1.0 - shrink) * off
-    covariance[np.diag_indices(features)] = np.maximum(np.diag(sample) + promised, 0.3)
+    covariance[np.diag_indices(features)] = np.maximum(np.diag(sample) + further, 0.3)
     values, vectors = np.linalg.eigh(covariance)
     return (vectors / np.sqrt(np.maximum(values, 0.05))) @ vectors.T
 
@@ -221,18 +221,18 @@ def _inverse_root(z: Floats, promised: Floats) -> Floats:
 def _least(label: Feature, problem: Problem) -> float:
     """Smallest scatter of a feature, in the unit of the feature: resolution of the grid and accuracy of ordinary sensors.
 
-    A smaller value raises false gaps from sensors as they are sold; a larger value hides small effects in that feature. A
-    number without a comment was set so that synthetic evidence without a gap differs by one to two noise floors (rms
-    over eight evidences of the protocol "ladder").
+    A smaller value makes false gaps from ordinary sensors; a larger value hides small effects in that feature. A number
+    without a comment was set so that synthetic evidence without a gap differs by one to two noise floors (rms over eight
+    evidences of the protocol "ladder").
     """
     force_N, slip_s, _, stiffness, _ = problem.scales
     if problem.rig.drive == "force":
         return _least_of_axis(label, force_N, problem.force_peak_N)
     drop_m = 0.3 * force_N / stiffness  # length of a slip when friction falls by a sixth
     if label.name == "rest":
-        return 1.5  # noise of a displacement sensor between 5 and 24 Hz cannot be taken from the run
+        return 1.5  # noise of a displacement sensor between 5 and 24 Hz cannot be estimated from the run
     if label.name in {"scatter", "ripple"}:
-        return 0.6  # small powers: hum, slow noise and the roughness of one track are as large
+        return 0.6  # small powers: hum, slow noise and the roughness of a track are as large
     if label.name in {"ring", "spring rest"}:
         return 0.25
     if label.name == "spring cube":
@@ -253,7 +253,9 @@ def _least(label: Feature, problem: Problem) -> float:
         if label.name in {"shape -0.5", "shape 0.5"}:  # the acceleration jumps where a slip begins and where it ends
             return 0.1 * drop_m * (np.pi / slip_s) ** 2
         return 4e-3 * drop_m * (np.pi / slip_s) ** 2
-    if label.signal == "drive_position_m":  # a sensor's bow fills the long waves; over a short way its error is small
+    if (
+        label.signal == "drive_position_m"
+    ):  # a sensor's bow appears in the long waves; over a short way its error is small
         return (4e-4 if label.name in _SHORT_WAVES else 2e-3) * drop_m
     return 1e-3 * drop_m
 
@@ -266,5 +268,5 @@ def _least_of_axis(label: Feature, force_N: float, peak_N: float) -> float:
     if label.regime == "breakaway" and label.name in {"mean", "over rest"}:
         return 0.02 * force_N  # the load on the contact before the run is not known
     if " over " in label.name:
-        return 2e-4 * force_N  # waves over time and position: a force channel errs slowly
+        return 2e-4 * force_N  # waves over time and position: the error of a force channel changes slowly
     return 5e-4 * peak_N  # linearity of a good force channel

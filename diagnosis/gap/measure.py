@@ -1,20 +1,19 @@
-"""The gap, defined once.
+"""Definition of the gap.
 
 A measured run and its prediction are compared feature by feature (`diagnosis.features`). A sample-by-sample difference of two
 stick-slip records measures their phase: with 0.1 % more static friction this difference is as large as the signal after a few
 cycles, while every cycle looks the same.
 
-Each difference is divided by its noise floor. The floor is the scatter that the feature shows among replicates of the model:
-they differ by sensor noise as measured, by the rough surface, and by the age of the contact at the start. The floor is never
-below the resolution of the 1 ms grid and the accuracy of ordinary sensors. The gap is the root of the mean square of the
-differences over cells of signal x regime x band x run. Each cell counts alike, so a shape of 14 points weighs no more than one
-mean level:
+Each difference is divided by its noise floor. The floor is the scatter of the feature among replicates of the model: they differ
+by measured sensor noise, by the rough surface, and by the age of the contact at the start. The floor is never below the
+resolution of the 1 ms grid and the accuracy of ordinary sensors. The gap is the root mean square of the differences over cells of
+signal x regime x band x run. Each cell has the same weight, so a shape of 14 points weighs no more than one mean level:
 
     gap = sqrt(mean over cells of mean over the cell's features of T(difference / floor)^2) / level,  T(z) = 6 asinh(z / 6)
 
-The level is the same root for the replicates themselves, so a perfect model has the gap 1.0. T is the identity up to a few
-floors and a logarithm beyond. A ripple of 500 floors in a very accurate drive position proves no more than a ripple of 50 floors,
-and must not hide all other differences.
+The level is the same root for the replicates, so a perfect model has the gap 1.0. T is the identity up to a few floors and a
+logarithm beyond: a ripple of 500 floors in a very accurate drive position proves no more than a ripple of 50 floors, and must not
+hide all other differences.
 """
 
 import numpy as np
@@ -29,13 +28,13 @@ DEFINITION = (
     "replicates of the model with measured noise and a rough surface; beyond 6 units logarithmic; 1.0 is a perfect model"
 )
 # Difference, in noise floors, of every feature of a rig that cannot be simulated: larger than any other difference.
-# Too small: an impossible rig, which only pays for missing features, beats the possible ones (docs/method/diagnosis.md).
+# Too small: an impossible rig, which has no features to differ in, beats possible rigs (docs/method/diagnosis.md).
 _IMPOSSIBLE = 1e4
-# Difference, in noise floors, of one feature that the rig shows and the model does not; only for the gap that is reported.
-# Too small: a model without slips seems near. Too large: the logarithm of T takes the rest away.
+# Difference, in noise floors, of a feature that the rig shows and the model does not; only for the reported gap.
+# Too small: a model without slips seems good. Too large: it has little effect, as T is a logarithm there.
 _LACKING = 8.0
-# Penalty, in noise floors, for one measured slip that the model does not show (after whitening, so one slip counts once).
-# Too small: models that lose slips win. Too large: a fit that starts with late slips cannot find its way back.
+# Penalty, in noise floors, for a measured slip that the model does not show (after whitening, so each slip counts once).
+# Too small: models that lose slips win. Too large: a fit that starts with late slips cannot recover.
 # Counted on one late slip (docs/method/diagnosis.md).
 _LACKING_SLIP = 5.0
 
@@ -48,7 +47,7 @@ def chi2_of(left: Floats) -> float:
 def differences(floor: Floor, problem: Problem, predicted: Floats) -> Floats:
     """Measured less predicted features, in noise floors, [compared], not compressed.
 
-    `predicted` is [features]; a feature that is measured and not predicted counts `_LACKING`.
+    `predicted` is [features]; a measured feature without a prediction counts as `_LACKING`.
     """
     z = between(floor, predicted, problem.measured)
     return np.where(np.isfinite(z), z, _LACKING)
@@ -57,13 +56,13 @@ def differences(floor: Floor, problem: Problem, predicted: Floats) -> Floats:
 def whitened(floor: Floor, problem: Problem, predicted: Floats, knee: float = KNEE) -> tuple[Floats, Floats]:
     """Differences of measured and predicted features, compressed and made independent; and the derivative of the compression.
 
-    Both are [compared]. Slips that the prediction lacks are charged by segment, see `_LACKING_SLIP`.
+    Both are [compared]. Slips that the prediction lacks are penalised by segment, see `_LACKING_SLIP`.
 
     Args:
         floor: the noise floor of `problem`.
         problem: the measured runs.
         predicted: features of the model, [features]; all NaN for a rig that cannot be simulated.
-        knee: noise floors beyond which a difference counts as its logarithm.
+        knee: difference, in noise floors, beyond which its logarithm counts.
 
     """
     if not np.isfinite(predicted).any():

@@ -1,4 +1,4 @@
-"""A measured run made ready for comparison: the 1 ms grid, segments, noise, and the state in which each segment begins."""
+"""Preparation of measured runs for the comparison: the 1 ms grid, segments, noise, and the start state of each segment."""
 
 from typing import NamedTuple
 
@@ -17,23 +17,23 @@ from diagnosis.model.predict import predict
 from diagnosis.model.rig import Start, StartState, rig_config
 from diagnosis.model.segment_starts import entries_of
 
-# Seconds that an axis must move in a run. Too small: the mean friction is noise. Too large: short strokes are refused.
+# Shortest time in which an axis moves in a run. Too small: the mean friction is noise. Too large: short strokes are refused.
 _SHORTEST_MOTION_S = 0.5
 _BESIDE = ("normal_load_N", "other_force_N")
 
 
 class Prepared(NamedTuple):
-    """One run, ready. Signals are [blocks of 1 ms] each."""
+    """A run, ready for comparison. Signals are [blocks of 1 ms] each."""
 
     file: str
-    holdout: bool  # held out: not fitted, only predicted
+    holdout: bool  # whether the run is held out: not fitted, only predicted
     signals: Signals
     commands: CommandedRun
     start: Start
-    entries: tuple[StartState, ...]  # state at the start of each segment, with the force as the sensor read it
-    before_s: float  # sum of the durations of the runs before this one, in the manifest's order
+    entries: tuple[StartState, ...]  # state at the start of each segment, with the measured force
+    before_s: float  # total duration of the runs before this run, in the manifest's order
     noise: RunNoise
-    clipped: dict[str, tuple[float, float]]  # by signal: lowest and highest value that the sensor can show
+    clipped: dict[str, tuple[float, float]]  # lowest and highest value that the sensor can show, by signal
     beside: Signals = {}  # measured channels that no model predicts: normal load, another force
 
 
@@ -52,7 +52,7 @@ def prepare(evidence: Evidence) -> list[Prepared]:
 
 def _prepare(rig: RigTable, run: MeasuredRun, before_s: float) -> Prepared:
     signals = reduce_run(run)
-    for shake, source in SHAKEN.items():  # a model is clipped in its block means only: its vibration would differ
+    for shake, source in SHAKEN.items():  # a model is clipped in its block means only, so its vibration would differ
         if source in run.clipped:
             signals.pop(shake, None)
     commands = commands_of(run, rig, signals)
@@ -84,7 +84,7 @@ def _start(rig: RigTable, signals: Signals, commands: CommandedRun) -> Start:
     if rig.drive == "force":
         assert commands.motion is not None, "a force drive has a motion"  # noqa: S101
         at_m, velocity_mps = (float(values[0]) for values in commands.motion[:2])
-        # friction at the start: of steady sliding, or, at rest, the force that the contact holds
+        # friction at the start: sliding friction, or the force that the contact holds at rest
         sliding = abs(velocity_mps) > rig.stribeck_velocity_mps
         force_N = float(signals["drive_force_N"][first].mean())
         return Start(np.sign(velocity_mps) * rig.coulomb_force_N if sliding else force_N, at_m, velocity_mps)

@@ -1,4 +1,4 @@
-"""The measured features of one evidence, and predicted features for any rig numbers, sensor chain and effects."""
+"""The measured features of an evidence, and predicted features for any rig numbers, sensor chain and effects."""
 
 import math
 import time
@@ -30,12 +30,12 @@ from plant.four_rigs_step import LANES, NARROW
 AGEING, AGE_BEFORE = "static-friction-ageing", "age_before_s"  # an effect, and the contact's age when a run begins
 PIEZO_EFFECTS = frozenset(name for name, effect in EFFECTS.items() if effect.acts_on == "piezo")
 # Spread of the position channels' scale from one piece of track to another (relative, standard deviation of the replicates).
-# Too small: the bow of a good sensor passes for a spring. Too large: a changed stiffness is hidden.
+# Too small: the bow of a good sensor looks like a spring. Too large: a changed stiffness is hidden.
 # A linearity of 0.2 % of the range is up to 0.8 % in slope.
 _SCALE_SPREAD = 0.004
 # Simulated runs that are kept, of 0.6 MB each. Fewer: trials simulate their common start again. More: memory.
 _KEPT = 64
-_DIVERGED = 1e100  # SI units: a feature beyond counts as missing, as its square must still be a number
+_DIVERGED = 1e100  # a larger feature counts as missing, as its square would overflow
 
 
 class OutOfTimeError(Exception):
@@ -58,11 +58,11 @@ class Draw(NamedTuple):
 
 
 class _Request(NamedTuple):
-    """One run of the model to simulate."""
+    """A run of the model to simulate."""
 
     point: Point
     draw: Draw | None
-    effects: Effects  # those that move the rig; sensor effects are applied afterwards
+    effects: Effects  # effects on the rig; sensor effects are applied after the simulation
     start: Start
     entries: tuple[StartState, ...]
     chain: SensorChain
@@ -77,8 +77,8 @@ class Problem:
     def __init__(self, rig: RigTable, runs: list[Prepared]) -> None:
         self.rig = rig
         self.runs = runs
-        self.until_s = math.inf  # of `time.monotonic`, which all processes share: `predicted_many` gives up before
-        self.pace = 0.0  # seconds of work a simulated second of one lane, as the last batch took
+        self.until_s = math.inf  # deadline of `predicted_many` by `time.monotonic`, which all processes share
+        self.pace = 0.0  # computing time for a simulated second of one lane, from the last batch [s/s]
         self.scales = scales_of(rig)
         self.force_peak_N = max(float(np.abs(run.signals.get("drive_force_N", np.zeros(1))).max()) for run in runs)
         self._simulated: dict[object, Signals | None] = {}
@@ -87,10 +87,10 @@ class Problem:
         self.measured = np.concatenate([np.array(features.values) for features in measured])
         self.labels = [
             (run.file, label) for run, features in zip(runs, measured, strict=True) for label in features.labels
-        ]  # file and feature of every entry, [features]
+        ]  # file and label of each feature, [features]
         places = [(file, label.segment) for file, label in self.labels]
         numbers = {place: number for number, place in enumerate(dict.fromkeys(places))}
-        self.place = np.array([numbers[place] for place in places], np.int64)  # segment of every entry, [features]
+        self.place = np.array([numbers[place] for place in places], np.int64)  # segment of each feature, [features]
         segments = {run.file: run.commands.segments for run in runs}
         self.slips = [segments[file][segment].slips if segment >= 0 else 1 for file, segment in numbers]  # [places]
 
@@ -112,16 +112,16 @@ class Problem:
         Args:
             points: the models.
             draws: the random part of each point; empty for noise-free predictions.
-            perhaps: points that may be asked for next, simulated where a lane is free.
+            perhaps: points that may be requested next, simulated where a lane is free.
 
         """
-        if math.isfinite(self.until_s) and len(points) > LANES:  # time is looked at between batches
+        if math.isfinite(self.until_s) and len(points) > LANES:  # the deadline is checked between batches
             batches = [slice(first, first + LANES) for first in range(0, len(points), LANES)]
             return [
                 features for batch in batches for features in self.predicted_many(points[batch], draws[batch], perhaps)
             ]
         parts: list[list[float]] = [[] for _ in points]
-        with np.errstate(over="ignore", invalid="ignore"):  # a refit may start so far away that the model diverges
+        with np.errstate(over="ignore", invalid="ignore"):  # the model may diverge at the start of a refit
             for run in self.runs:
                 signals_of_points = self._signals(run, points, draws or [None] * len(points), perhaps)
                 for part, signals in zip(parts, signals_of_points, strict=True):
@@ -133,19 +133,19 @@ class Problem:
         return result
 
     def signals(self, run: Prepared, point: Point) -> Signals:
-        """Noise-free predicted signals of one run, [blocks] each, as its sensors would show them.
+        """Noise-free predicted signals of a run behind its sensors, [blocks] each.
 
         Raises ValueError when the rig at `point` cannot be simulated.
         """
         (signals,) = self._signals(run, [point], [None])
         if signals is None:
-            raise ValueError(f"no rig is like that: {point}")
+            raise ValueError(f"no rig with these numbers can be simulated: {point}")
         return signals
 
     def _signals(
         self, run: Prepared, points: Sequence[Point], draws: Sequence[Draw | None], perhaps: Sequence[Point] = ()
     ) -> list[Signals | None]:
-        """Signals of each point, as the sensors show them; None where such a rig cannot be simulated."""
+        """Signals of each point behind the sensors; None where such a rig cannot be simulated."""
         requests = [_request(run, point, draw) for point, draw in zip(points, draws, strict=True)]
         if self.rig.drive == "force":
             return [self._led_signals(run, request) for request in requests]
@@ -156,7 +156,7 @@ class Problem:
         ]
 
     def _led_signals(self, run: Prepared, request: _Request) -> Signals | None:
-        """Signals of one point with a force drive: among them the force that leads the model along the measured motion."""
+        """Signals of a point with a force drive, among them the force that makes the model follow the measured motion."""
         effects, draw = request.point.effects, request.draw
         chain = relative(request.point.chain)
         commands = true_commands(run.commands, effects, chain)
@@ -167,7 +167,7 @@ class Problem:
             motion = commands.motion
             if motion is not None and "mass_position_m" in noise:
                 motion = motion._replace(position_m=motion.position_m + noise["mass_position_m"])
-            # noise on the input force moves the mass; the leading force that corrects this motion is the effect of the noise
+            # noise on the input force moves the mass, and the force that corrects this motion shows the noise
             commands = commands._replace(drive=commands.drive + noise["drive_force_N"], motion=motion)
         sensors = {name: table for name, table in effects.items() if name in SENSOR_EFFECTS}
         (raw,) = self._raw(run, commands, [request], (chain, _hashable(sensors)))
@@ -191,7 +191,7 @@ class Problem:
     ) -> list[Signals | None]:
         """Simulated signals of each model, before the sensors; None where such a rig cannot be simulated.
 
-        A run without a draw is kept and found again; a run with a draw is simulated each time.
+        A run without a draw is cached; a run with a draw is simulated each time.
         """
         keys = [
             number if request.draw is not None else _key(run, request, inputs)
@@ -210,7 +210,7 @@ class Problem:
                 cached[key] = signals
             elif signals is not None:
                 self._simulated[key] = signals
-        # The entries used last move to the end and are dropped last: the common start of all trials is needed often.
+        # The most recently used entries move to the end and are dropped last: the common start of all trials is needed often.
         self._simulated |= {
             key: cached[key] for key, request in zip(keys, requests, strict=True) if request.draw is None
         }
@@ -221,7 +221,7 @@ class Problem:
     def _simulate(self, commands: CommandedRun, requests: Sequence[_Request], wanted: int) -> list[Signals | None]:
         """Signals of each model, before the sensors.
 
-        The first `wanted` are all simulated, and None means that such a rig cannot be; the others only where a lane is free.
+        The first `wanted` are all simulated; None: such a rig cannot be simulated. The others are simulated if a lane is free.
         """
         configs: dict[int, RigConfig] = {}
         for number, request in enumerate(requests):
@@ -276,7 +276,7 @@ def _request(run: Prepared, point: Point, draw: Draw | None) -> _Request:
 
 
 def _rig_effects(run: Prepared, effects: Effects, draw: Draw | None) -> Effects:
-    """The effects that move the rig, with the numbers that they have in this run."""
+    """The effects on the rig, with their numbers in this run."""
     seed = draw.roughness.seed if draw else None
     in_this_run = {name: in_run(table, run.file, run.holdout, seed) for name, table in effects.items()}
     moving = {name: table for name, table in in_this_run.items() if table is not None and name not in SENSOR_EFFECTS}
@@ -288,7 +288,7 @@ def _rig_effects(run: Prepared, effects: Effects, draw: Draw | None) -> Effects:
 
 
 def _sensor_signals(run: Prepared, request: _Request, raw: Signals) -> Signals:
-    """A simulated run as its sensors show it: gains, delays, noise, clipping."""
+    """A simulated run behind its sensors: gains, delays, noise, clipping."""
     result = sensed(raw, run.commands.frequency_Hz, request.point.effects, request.chain)
     result = {name: result[name] for name in run.signals}
     for name in result:
@@ -303,7 +303,7 @@ def _sensor_signals(run: Prepared, request: _Request, raw: Signals) -> Signals:
 
 
 def _key(run: Prepared, request: _Request, inputs: object) -> object:
-    """Key of a run without a draw: all that decides how it goes."""
+    """Key of a run without a draw: all inputs of its simulation."""
     rig = _hashable({"rig": request.point.values})
     return (
         run.file,
@@ -324,7 +324,7 @@ def _with_paths(effects: Effects, run: Prepared, draw: Draw | None) -> Effects:
     """The effects with a path for each random effect.
 
     The path follows from the effect's seed; with seed 0, from the draw. Without seed and draw the effect is left out, as its
-    mean is 0. An effect over time takes another path in every run, an effect over place the same path in all runs.
+    mean is 0. An effect over time has another path in every run, an effect over position the same path in all runs.
     """
     result: Effects = {}
     for name, table in effects.items():

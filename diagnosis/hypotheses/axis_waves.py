@@ -1,6 +1,6 @@
-"""Where to look for a wave on a force-driven axis: lines in the friction, relative to its mean at that speed and direction.
+"""Candidate waves on a force-driven axis: lines in the friction, relative to its mean at that speed and direction.
 
-Only starting points for a refit come from here, never a verdict.
+They are only starting points of a refit, never a verdict.
 """
 
 import numpy as np
@@ -11,9 +11,9 @@ from diagnosis.features.grid import BLOCK_S
 from diagnosis.gap.prepare import Prepared
 from diagnosis.hypotheses.waves import Wave, WaveSeries, fitted, wave_of
 
-_EVERY = 8  # blocks that make one sample
-_MOST_TURNS = 200  # of a wave within the longest run
-_STEPS_PER_TURN = 3  # a line is as narrow as the run is long
+_EVERY = 8  # blocks for each sample
+_MOST_TURNS = 200  # most turns of a wave within the longest run
+_STEPS_PER_TURN = 3  # tried periods for each turn: a line is one turn wide
 
 
 def axis_waves(runs: list[Prepared], over: str, most: int) -> list[Wave]:

@@ -1,7 +1,7 @@
-"""Every effect in the diagnosis, one row each: words, the residual that shows it, how each form is tried, the check by hand.
+"""Every effect of the diagnosis: its meaning, the residual that shows it, how each form is tried, the check by hand.
 
-Its physics is in `plant.effects`. A form that is listed there and not here is not tried: no prediction follows the path of a
-random form, which `diagnosis.fits.random_friction` searches for.
+The physics is in `plant.effects`. A form that is missing here is not tried: it is a random form, whose path no prediction can
+follow; `diagnosis.fits.random_friction` searches for it.
 """
 
 from typing import Final
@@ -49,7 +49,7 @@ _DAMPING_RATIO = {"damping_ratio": Scale(0.05, True, 0.7)}
 
 
 def _level(_: Sizes) -> dict[str, Scale]:
-    """Wide, so that the rig's number of the same name, which holds a part of it, goes back to where it was."""
+    """A wide prior, so that the rig's number, which has taken up a part of the deviation, returns to its described value."""
     return {"ratio": Scale(0.1, False, 3.0)}
 
 
@@ -58,7 +58,7 @@ def _gain(_: Sizes) -> dict[str, Scale]:
 
 
 def _by_waves(_: Sizes) -> dict[str, Scale]:
-    """The coordinates come with the waves that are found."""
+    """No scales, as the starts from waves define their coordinates."""
     return {}
 
 
@@ -228,7 +228,7 @@ CATALOGUE: Final[dict[str, EffectRow]] = {
     "piezo-roll-off": EffectRow(
         words="the piezo moves less than commanded at high frequency",
         shown_by=OF_EXCITER,
-        # with a drift, the fit of a corner of 4 kHz ends at chi2 860 if it starts at 9 kHz, at 201 if it starts at 4 kHz
+        # several starts, as a fit that starts far from the corner ends in a local minimum
         forms={
             "first-order": Tried(
                 lambda rig: {"corner_Hz": Scale(2.0 * max(rig.highest_Hz, 1.0), True, 1.5)},

@@ -10,9 +10,9 @@ from diagnosis.hypotheses.starts import Starts, at_scale
 
 @dataclass(frozen=True)
 class Tried:
-    """How a form is tried. Parameters without a scale stay at their default."""
+    """How a form is tried. Parameters without a scale keep their default."""
 
-    scale: Callable[[Sizes], dict[str, Scale]]  # of the free parameters, on a rig of these sizes
+    scale: Callable[[Sizes], dict[str, Scale]]  # scales of the free parameters on a rig of these sizes
     starts: Starts = at_scale
 
 
@@ -22,14 +22,16 @@ Over = tuple[str, str]  # a residual, and the variable that it is drawn over: na
 class EffectRow(NamedTuple):
     """An effect in the diagnosis."""
 
-    words: str  # its meaning on a machine
-    shown_by: tuple[Over, ...]  # the residuals that show it, the best first; the next where channels are missing
+    words: str  # meaning on a machine, in plain words
+    shown_by: tuple[Over, ...]  # residuals that show the effect, the best first; the next if channels are missing
     forms: dict[str, Tried]
-    check: str = ""  # by hand; empty: the check for the place where it acts
+    check: str = ""  # check by hand; empty: the check for the part on which it acts
     check_against: dict[
         str, str
-    ] = {}  # check by hand that separates it from another effect; in the row of one of the two
-    shown_twice: bool = False  # its formulas show over different variables: the first two are drawn
+    ] = {}  # check by hand that separates it from another effect; stated in one of the two rows
+    shown_twice: bool = (
+        False  # whether the first two of `shown_by` are drawn, as its forms show over different variables
+    )
 
 
 BREAKAWAY: Final = "breakaway"

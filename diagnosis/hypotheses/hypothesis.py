@@ -8,8 +8,8 @@ from diagnosis.model.per_run import is_phase
 from diagnosis.model.rig import Effects
 from plant.effects.library import EFFECTS
 
-# Effects that change a number of the rig table alone: number and effect are one direction of the fit. With a separate derivative
-# for each, the number stays at its bound and the effect at 3 of 10 %: chi2 196 in place of 133, and another effect is named.
+# Effect -> number of the rig table that it changes. Both are one direction of the fit and share a derivative: with a derivative
+# for each, the number stays at its bound, the effect stays too small, and another effect is named.
 LEVELS = {
     "coulomb-level": "coulomb_force_N",
     "static-level": "static_force_N",
@@ -19,7 +19,7 @@ LEVELS = {
 
 
 class Coordinate(NamedTuple):
-    """One parameter of an effect as a coordinate: value = scale * w, or scale * exp(w) where it must stay positive."""
+    """A parameter of an effect as a coordinate w: value = scale * w, or scale * exp(w) where it must stay positive."""
 
     effect: str
     name: str
@@ -38,18 +38,18 @@ class Coordinate(NamedTuple):
 
 
 class Hypothesis(NamedTuple):
-    """Effects in given formulas with their free parameters; the others are held."""
+    """Effects in given forms with their free parameters; the other parameters keep their default."""
 
     forms: dict[str, str]  # effect -> form
     coordinates: tuple[Coordinate, ...]
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names."""
+        """Names of the effects."""
         return tuple(self.forms)
 
     def tables(self, w: Floats) -> Effects:
-        """As a rig file would have them."""
+        """The effects at the coordinates `w`, as tables of a rig file."""
         tables: Effects = {name: {"form": form} for name, form in self.forms.items()}
         for coordinate, value in zip(self.coordinates, w.tolist(), strict=True):
             tables[coordinate.effect][coordinate.name] = coordinate.value(value)

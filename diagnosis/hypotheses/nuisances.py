@@ -1,7 +1,7 @@
 """Nuisances, which may differ from the description without being a gap: rig numbers within tolerances, and ordinary sensors.
 
-All of them are refitted before any effect is judged. An incomplete set makes all effects look alike: each effect takes up the
-difference of a missing nuisance in another way.
+All of them are refitted before any effect is judged. With a missing nuisance all effects look alike: each of them imitates the
+missing nuisance in another way.
 """
 
 from bridge.arrays import Floats
@@ -12,8 +12,8 @@ from diagnosis.model.sensor_chain import SensorChain
 from diagnosis.result import RigNumber
 
 # Mean and standard deviation of sensor numbers that no manifest states. A 2 kHz force channel lags by 80 us, an 800 Hz
-# displacement by 200 us, an unfiltered one by nothing; displacement sensors are linear to 0.2 % of their range: up to 0.8 % in
-# slope, and of 40 mm 0.2 / m; accelerometers of the bench begin at 0 to 0.5 Hz and end at 10 kHz or well above.
+# displacement channel by 200 us, an unfiltered channel by 0; displacement sensors are linear to 0.2 % of their range: up to 0.8 %
+# in slope, and a bow of 0.2 / m for a range of 40 mm; common accelerometers begin at 0 to 0.5 Hz and end at 10 kHz or above.
 _CHAIN = {
     "force_delay_s": (4e-5, 4e-5),
     "position_delay_s": (1e-4, 1e-4),
@@ -23,13 +23,14 @@ _CHAIN = {
     "accel_lowest_Hz": (0.25, 0.25),
     "accel_rolled_off": (0.5, 0.5),
 }
-# A table states two friction levels and a velocity; the curve between them differs from law to law, and from a Gaussian by this.
+# Standard deviation of the tail of the Stribeck curve: a table states two friction levels and a velocity, and the curve between
+# them is not exactly the Gaussian of tail 0.
 _TAIL = 0.4
 _NOT_NEGATIVE = ("accel_lowest_Hz", "accel_rolled_off")
 
 
 class Nuisances:
-    """The nuisances of a rig as a vector in units of their tolerances, 0 as described. [nuisances]"""
+    """The nuisances of a rig as a vector [nuisances] in units of their tolerances; 0 is the described rig."""
 
     def __init__(self, rig: RigTable) -> None:
         known = {name: value for name, value in rig.values().items() if value is not None}
@@ -43,16 +44,16 @@ class Nuisances:
         return len(self.names)
 
     def value(self, name: str, deviation: float) -> float:
-        """A number of the rig table at a deviation from its described value; never below a tenth of that."""
+        """A number of the rig table at a deviation from its described value; at least a tenth of that value."""
         described = self._described[name]
         return described * max(1.0 + self._tolerance[name] * deviation, 0.1)
 
     def growth(self, name: str, deviation: float) -> float:
-        """The share by which a number of the rig table grows per tolerance, at a deviation."""
+        """Relative growth of a number of the rig table per tolerance, at a deviation."""
         return self._tolerance[name] * self._described[name] / self.value(name, deviation)
 
     def parameters(self, deviations: Floats) -> tuple[RigNumber, ...]:
-        """The rig's numbers at these deviations, as the model has them, the shape of its Stribeck curve included."""
+        """The rig's numbers in the model at these deviations, including the shape of its Stribeck curve."""
         count = len(self.rig_names)
         values = {name: self.value(name, float(deviations[i])) for i, name in enumerate(self.rig_names)}
         values = self._described | values

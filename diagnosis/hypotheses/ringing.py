@@ -1,6 +1,6 @@
-"""Where to look for a structure that rings: the peaks of an acceleration's spectrum while nothing vibrates the rig.
+"""Candidate frequencies of a structure that rings: the peaks of an acceleration's spectrum without commanded vibration.
 
-Only starting points for a refit come from here, never a verdict.
+They are only starting points of a refit, never a verdict.
 """
 
 import numpy as np
@@ -10,13 +10,16 @@ from bridge.arrays import Floats
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.gap.prepare import Prepared
 
-_WINDOW = 512  # blocks: 2 Hz
-_LOWEST_HZ, _HIGHEST_HZ = 20.0, 450.0  # of a base that rings: slower is a slip, faster is beyond a grid of 1 ms
-_PROMINENCE = 2.0  # of the logarithm of power; combs of regular slips stay below
+_WINDOW = 512  # blocks of a window: a resolution of 2 Hz
+_LOWEST_HZ, _HIGHEST_HZ = (
+    20.0,
+    450.0,
+)  # range of a ringing base: slips are slower, the 1 ms grid resolves no faster ringing
+_PROMINENCE = 2.0  # smallest prominence of a peak in the logarithm of power; combs of regular slips stay below
 
 
 def ringing_Hz(runs: list[Prepared], signal: str, most: int) -> list[float]:
-    """Frequencies of the most prominent peaks [most at most]; none without the signal."""
+    """Frequencies of the most prominent peaks, `most` at most; empty without the signal."""
     power: Floats = np.zeros(_WINDOW // 2 + 1)
     frequency_Hz = np.fft.rfftfreq(_WINDOW, BLOCK_S)
     for run in runs:

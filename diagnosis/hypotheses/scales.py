@@ -1,4 +1,4 @@
-"""How large a step of each parameter is worth trying: sizes of a rig that the scales of the catalogue are made of."""
+"""Scales of the parameters: how large a step is worth trying, from typical sizes of a rig."""
 
 import math
 from typing import NamedTuple
@@ -9,7 +9,7 @@ from diagnosis.gap.prepare import Prepared
 
 
 class Scale(NamedTuple):
-    """How a parameter becomes a coordinate; `logarithmic` ones stay positive."""
+    """How a parameter becomes a coordinate; a `logarithmic` parameter stays positive."""
 
     scale: float
     logarithmic: bool
@@ -20,13 +20,13 @@ class Sizes(NamedTuple):
     """Typical sizes of a rig and its runs."""
 
     static_N: float
-    stiffness_N_per_m: float  # of the drive, or where a force drives of the contact
-    reach_m: float  # over which that spring carries the static friction
-    critical_Ns_per_m: float  # damping that would stop its swinging
-    slip_s: float  # duration and
+    stiffness_N_per_m: float  # stiffness of the drive's spring; with a force drive, of the contact
+    reach_m: float  # extension of that spring at the static friction
+    critical_Ns_per_m: float  # critical damping of the mass on that spring
+    slip_s: float  # duration of a slip
     slip_mps: float  # speed of a slip
-    length_s: float  # of the longest run
-    highest_Hz: float  # of the vibration; 0 without
+    length_s: float  # duration of the longest run
+    highest_Hz: float  # highest frequency of the vibration; 0 without a vibration
 
 
 def longest_run_s(runs: list[Prepared]) -> float:

@@ -1,6 +1,6 @@
-"""Where the refit of a form starts: one function for each way to find out, which rows of the catalogue name.
+"""Starting points for the refit of a form: a function for each method, referenced by the rows of the catalogue.
 
-Only starting points come from here, never a verdict.
+They are only starting points, never a verdict.
 """
 
 import math
@@ -31,31 +31,31 @@ from diagnosis.model.rig import AGE_BEFORE_S, AGE_SPREAD
 from plant.effects.library import EFFECTS
 
 _WAVES = 4  # ranges of periods that are searched
-# of waves with a harmonic: bumps of 3.14 mm had 0.38 of the breakaways' sum of squares as sines, 0.90 with it
+# Ranges of periods that are searched for waves with a harmonic: sines explain less than half of the variance of bumps.
 _STEEP_WAVES = 2
-# Bumps: the longest pitches are tried, and a quarter of their spread to either side: a fit of bumps of 1.30 mm ends at chi2 641
-# from a start at 1.306 mm, at 131 from 1.295 mm.
+# Bumps: number of the longest pitches that are tried, and further starts in shares of their spread: a fit from a pitch that is
+# off by half a percent may end in a local minimum.
 _LOBES_OF_BUMPS, _BESIDE = 2, (-0.25, 0.0, 0.25)
-_STUCK = (1.05, 1.13)  # own frequency of a base over the one at which it rings with the slide stuck to it
-_AGE_LIMITS_S = (1e-3, 1e5)  # a block, a day
-_AXIS_WAVES = 3  # of a force-driven axis, whose strong waves are clear lines
+_STUCK = (1.05, 1.13)  # natural frequency of a base over the frequency at which it rings with the slide stuck to it
+_AGE_LIMITS_S = (1e-3, 1e5)  # bounds of the contact's age: one block, one day
+_AXIS_WAVES = 3  # waves that are tried on a force-driven axis, where strong waves are clear lines
 
 
 class Trial(NamedTuple):
-    """A form and where its refit starts."""
+    """A form and the start of its refit, [coordinates]."""
 
     hypothesis: Hypothesis
     w: Floats
 
 
 class TrialRequest(NamedTuple):
-    """A form of an effect that is to be tried on an evidence."""
+    """A form of an effect to try on an evidence."""
 
     name: str
     form: str
-    scale: dict[str, Scale]  # of its free parameters
+    scale: dict[str, Scale]  # scales of its free parameters
     problem: Problem
-    highest_Hz: float  # of the vibration
+    highest_Hz: float  # highest frequency of the vibration
 
     def trial(self, start: dict[str, float], further: Iterable[Coordinate] = ()) -> Trial:
         """A trial from these values, or from the scales where a value is missing; `further` coordinates come last."""
@@ -66,7 +66,7 @@ Starts = Callable[[TrialRequest], list[Trial]]
 
 
 def at_scale(asked: TrialRequest) -> list[Trial]:
-    """One start, every parameter at its scale."""
+    """A single start, with every parameter at its scale."""
     return [asked.trial({})]
 
 
@@ -76,17 +76,17 @@ def at_values(parameter: str, *values: float) -> Starts:
 
 
 def at_times_its_scale(parameter: str, *times: float) -> Starts:
-    """A start at so many times the parameter's scale each."""
+    """A start at each of these multiples of the parameter's scale."""
     return lambda asked: [asked.trial({parameter: time * asked.scale[parameter].scale}) for time in times]
 
 
 def at_times_the_vibration(parameter: str, *times: float) -> Starts:
-    """A start at so many times the highest frequency of the vibration each."""
+    """A start at each of these multiples of the highest frequency of the vibration."""
     return lambda asked: [asked.trial({parameter: time * asked.highest_Hz}) for time in times]
 
 
 def aged_before(asked: TrialRequest) -> list[Trial]:
-    """One start, with the age of the contact at the beginning of every run free."""
+    """A single start; the age of the contact at the beginning of each run is a free parameter."""
     of_runs = [
         Coordinate(asked.name, of_run(AGE_BEFORE, run.file), AGE_BEFORE_S, True, AGE_SPREAD, *_AGE_LIMITS_S)
         for run in asked.problem.runs
@@ -96,11 +96,11 @@ def aged_before(asked: TrialRequest) -> list[Trial]:
 
 
 def where_the_base_rings(asked: TrialRequest) -> list[Trial]:
-    """At the frequencies of the base's own ringing, or else spread."""
+    """A start at each frequency at which the base rings; without a peak at three frequencies."""
     rings_Hz = [times * f for f in ringing_Hz(asked.problem.runs, "base_accel_mps2", 2) for times in _STUCK]
     if not rings_Hz:
         return at_values("frequency_Hz", 50.0, 120.0, 300.0)(asked)
-    # several turns a slip: further off, a refit ends a turn away
+    # a narrow prior: the base swings several times in a slip, and a refit from a wrong frequency would miss a period
     near = {"frequency_Hz": asked.scale["frequency_Hz"]._replace(prior=0.1)}
     return at_values("frequency_Hz", *rings_Hz)(asked._replace(scale=asked.scale | near))
 
@@ -115,7 +115,7 @@ def waves_of_track(asked: TrialRequest) -> list[Trial]:
 
 
 def waves_of_time(asked: TrialRequest) -> list[Trial]:
-    """Waves of the friction over time, which restart in every run or continue."""
+    """Waves of the friction over time, with one phase for all runs or a phase for each run."""
     runs, scales = asked.problem.runs, asked.problem.scales
     if asked.problem.rig.drive == "force":
         return _waves(asked, axis_waves(runs, "time", _AXIS_WAVES))
@@ -124,14 +124,14 @@ def waves_of_time(asked: TrialRequest) -> list[Trial]:
 
 
 def waves_of_screw(asked: TrialRequest) -> list[Trial]:
-    """Waves of the drive's velocity along its way, or else of the friction along the track."""
+    """Waves of the drive's velocity along its way; without a drive position, of the friction along the track."""
     runs, scales = asked.problem.runs, asked.problem.scales
     waves = drive_waves(runs, "position", _WAVES) or friction_waves(runs, scales, "position", _WAVES)
     return _waves(asked, waves)
 
 
 def waves_of_motor(asked: TrialRequest) -> list[Trial]:
-    """Waves of the drive's velocity over time, or else of the friction."""
+    """Waves of the drive's velocity over time; without a drive position, of the friction."""
     runs, scales = asked.problem.runs, asked.problem.scales
     waves = drive_waves(runs, "time", _WAVES) or friction_waves(runs, scales, "time", _WAVES)
     series = drive_series(runs, "time") or friction_series(runs, scales, "time")
@@ -178,7 +178,7 @@ def _trial(name: str, form: str, scale: dict[str, Scale], start: dict[str, float
 
 
 def wave_trial(name: str, form: str, wave: Wave, slowest_Hz: float) -> Trial:
-    """A form of one wave, started at the found wave. A wave slower than `slowest_Hz` does not count as a wave over time."""
+    """A form with a single wave that starts at `wave`; a wave over time must not be slower than `slowest_Hz`."""
     axes: list[Coordinate] = []
     for row in EFFECTS[name].forms[form].parameters:
         if row.name == PHASE:
@@ -188,7 +188,7 @@ def wave_trial(name: str, form: str, wave: Wave, slowest_Hz: float) -> Trial:
         elif row.name in {"second_sin", "second_cos"}:
             axes.append(Coordinate(name, row.name, 0.4, False, 1.0, row.low, row.high))
         elif row.name == "frequency_Hz":
-            # a free phase in every run could imitate any trend: in runs of 10 s a tilted track is named a load of 0.06 Hz
+            # with a free phase in every run, a slower wave could imitate any trend, such as a tilted track
             axes.append(
                 Coordinate(name, row.name, 1.0 / wave.period, True, wave.spread, max(row.low, slowest_Hz), row.high)
             )
@@ -199,7 +199,7 @@ def wave_trial(name: str, form: str, wave: Wave, slowest_Hz: float) -> Trial:
     return Trial(Hypothesis({name: form}, tuple(axes)), w)
 
 
-def _two_waves_trial(name: str, first: Wave, other: Wave) -> Trial:
+def _two_waves_trial(name: str, first: Wave, second: Wave) -> Trial:
     rows = {row.name: row for row in EFFECTS[name].forms["two-waves"].parameters}
 
     def positive(parameter: str, size: float, prior: float) -> Coordinate:
@@ -210,17 +210,17 @@ def _two_waves_trial(name: str, first: Wave, other: Wave) -> Trial:
         positive("ratio", ratio, 1.5),
         positive("wavelength_m", first.period, first.spread),
         Coordinate(name, PHASE, 1.0, False, 3.0, -20.0, 20.0),
-        positive("other_share", max(other.ratio / ratio, 0.05), 1.0),
-        positive("other_wavelength_m", other.period, other.spread),
+        positive("other_share", max(second.ratio / ratio, 0.05), 1.0),
+        positive("other_wavelength_m", second.period, second.spread),
         Coordinate(name, OTHER_PHASE, 1.0, False, 3.0, -20.0, 20.0),
     )
     return Trial(
-        Hypothesis({name: "two-waves"}, axes), np.array([0.0, 0.0, first.phase_rad, 0.0, 0.0, other.phase_rad])
+        Hypothesis({name: "two-waves"}, axes), np.array([0.0, 0.0, first.phase_rad, 0.0, 0.0, second.phase_rad])
     )
 
 
 def _bumps_trial(name: str, wave: Wave, sign: float) -> Trial:
-    """Bumps where a wave is high, or dips where it is low."""
+    """Bumps where a wave is high (`sign` 1), or dips where it is low (`sign` -1)."""
     rows = {row.name: row for row in EFFECTS[name].forms["bumps"].parameters}
 
     def axis(parameter: str, size: float, logarithmic: bool, prior: float) -> Coordinate:

@@ -1,4 +1,4 @@
-"""The trials on an evidence: every effect of the plant in each of its formulas, with the coordinates and starts of its refit.
+"""The trials on an evidence: every effect of the plant in each of its forms, with the coordinates and starts of its refit.
 
 Scales derive from the rig, so that a step of 1 in a coordinate is a noticeable effect on any rig.
 """
@@ -35,7 +35,7 @@ def trials(problem: Problem) -> list[Trial]:
 
 
 def cannot_show(rig: RigTable, runs: Sequence[Prepared], assumed: Sequence[str]) -> tuple[str, ...]:
-    """Effects that this kind of drive cannot have, that need a vibration, or that change a number in `assumed`, left out."""
+    """Effects that this kind of drive cannot have, that need a missing vibration, or that change an assumed rig number."""
     highest_Hz = max(float(run.commands.frequency_Hz.max()) for run in runs)
     return tuple(name for name in EFFECTS if not _shows(name, rig, highest_Hz) or LEVELS.get(name) in assumed)
 

@@ -1,6 +1,6 @@
-"""Where to look for a wave: the periods that the scatter of the breakaways, the level of sliding and the drive position show.
+"""Candidate waves: the periods that the scatter of the breakaways, the level of sliding and the drive position show.
 
-Only starting points for a refit come from here, never a verdict.
+They are only starting points of a refit, never a verdict.
 """
 
 from collections.abc import Mapping
@@ -17,11 +17,11 @@ from diagnosis.gap.prepare import Prepared
 from diagnosis.model.per_run import phase_of
 from diagnosis.slips import turning_points
 
-_GRID = 1500  # periods that are tried for a wave
-_LOBES = 2  # peaks in every range: pieces of track apart from each other leave the period ambiguous
-_LOBE = 10  # grid points within which peaks are one
+_GRID = 1500  # number of periods that are tried for a wave
+_LOBES = 2  # peaks that are tried in each range: separate pieces of track leave the period ambiguous
+_LOBE = 10  # least distance of two peaks, in grid points
 _TWO_WAVES = 3  # pairs of waves that are tried
-_STEEPEST = 0.8  # of a second harmonic, relative to the first
+_STEEPEST = 0.8  # largest second harmonic, relative to the first
 
 
 class Wave(NamedTuple):
@@ -32,20 +32,20 @@ class Wave(NamedTuple):
     phase_rad: float
     second_sin: float = 0.0
     second_cos: float = 0.0
-    spread: float = 0.2  # of the period, relative: one standard deviation
+    spread: float = 0.2  # relative standard deviation of the period
     phases_of: Mapping[str, float] = MappingProxyType(
         {}
-    )  # in the runs after the first, where it begins in another phase there
+    )  # phases in the runs after the first; empty: one phase for all runs
 
 
 class WaveSeries(NamedTuple):
     """A quantity along a coordinate; its mean is free."""
 
     at: Floats
-    value: Floats  # relative to the mean of its stretch
+    value: Floats  # deviation from the mean, relative
     weight: float = 1.0
-    run: str = ""  # file
-    of_slips: bool = False  # one value a breakaway; else as it goes on
+    run: str = ""  # file of the run
+    of_slips: bool = False  # whether there is one value for each breakaway; False: values of continuous motion
 
 
 def friction_waves(runs: list[Prepared], scales: Scales, over: str, most: int, harmonics: int = 1) -> list[Wave]:
@@ -54,7 +54,7 @@ def friction_waves(runs: list[Prepared], scales: Scales, over: str, most: int, h
 
 
 def friction_waves_beside(runs: list[Prepared], scales: Scales, waves: list[Wave], at: tuple[float, ...]) -> list[Wave]:
-    """Waves along the track with their harmonic and best phase, at periods `at` spreads away from the periods of `waves`."""
+    """Waves along the track with harmonic and best phase; their periods are `at` spreads away from the periods of `waves`."""
     series = friction_series(runs, scales, "position")
     result: list[Wave] = []
     for wave in waves:
@@ -66,14 +66,14 @@ def friction_waves_beside(runs: list[Prepared], scales: Scales, waves: list[Wave
 
 
 def two_friction_waves(runs: list[Prepared], scales: Scales, most: int) -> list[tuple[Wave, Wave]]:
-    """The two waves of the friction along the track that take most together, of the strongest of each range of periods."""
+    """Pairs of the strongest waves of the friction along the track, those that explain most together first."""
     series = friction_series(runs, scales, "position")
-    together = [_both(series, *two) for two in combinations(_strongest(series, most), 2)]
+    together = [_fitted_pair(series, *two) for two in combinations(_strongest(series, most), 2)]
     together.sort(key=lambda pair: -pair[0])
     return [two for _, two in together[:_TWO_WAVES]]
 
 
-def _both(series: list[WaveSeries], first: Wave, second: Wave) -> tuple[float, tuple[Wave, Wave]]:
+def _fitted_pair(series: list[WaveSeries], first: Wave, second: Wave) -> tuple[float, tuple[Wave, Wave]]:
     """The part of the sum of squares that two waves explain together, and the two waves refitted."""
     columns: list[Floats] = []
     for part_of_run in series:
@@ -91,7 +91,7 @@ def _both(series: list[WaveSeries], first: Wave, second: Wave) -> tuple[float, t
 
 
 def friction_series(runs: list[Prepared], scales: Scales, over: str) -> list[WaveSeries]:
-    """Breakaways, or levels where nothing slips, over `position` [m] or `time` [s]; one series a segment."""
+    """Breakaways, or levels of sliding without slips, over `position` [m] or `time` [s]; a series for each segment."""
     series: list[WaveSeries] = []
     for run in runs:
         force = run.signals.get("drive_force_N")
@@ -115,7 +115,7 @@ def friction_series(runs: list[Prepared], scales: Scales, over: str) -> list[Wav
                     WaveSeries(coordinate[inside][at], cut[at] / cut[at].mean() - 1.0, run=run.file, of_slips=True)
                 )
             elif len(turned) == 0 and len(cut) > 500:
-                # where nothing slips the slide moves evenly, once the climb to that level is over
+                # without slips the slide moves evenly after the first climb
                 even = cut[len(cut) // 3 :]
                 level = even[: len(even) // 20 * 20].reshape(-1, 20).mean(axis=1)
                 if np.ptp(level) < 0.2 * scales.force_N and level.mean() > 0.5 * scales.force_N:
@@ -125,12 +125,12 @@ def friction_series(runs: list[Prepared], scales: Scales, over: str) -> list[Wav
 
 
 def drive_waves(runs: list[Prepared], over: str, most: int) -> list[Wave]:
-    """The strongest waves of the drive's velocity over its `position` [m] or `time` [s], relative to it, likewise."""
+    """The strongest waves of the drive's relative velocity over its `position` [m] or `time` [s]."""
     return _strongest(drive_series(runs, over), most, 2)
 
 
 def drive_series(runs: list[Prepared], over: str) -> list[WaveSeries]:
-    """The drive's velocity relative to its mean over its `position` [m] or `time` [s]; one series a segment."""
+    """The drive's velocity relative to its mean, over its `position` [m] or `time` [s]; a series for each segment."""
     series: list[WaveSeries] = []
     for run in runs:
         position = run.signals.get("drive_position_m")
@@ -138,13 +138,13 @@ def drive_series(runs: list[Prepared], over: str) -> list[WaveSeries]:
             continue
         for segment in run.commands.segments:
             path = position[segment.first : segment.last]
-            whole = len(path) // 20 * 20
-            if whole < 400 or segment.drive_velocity_mps == 0.0:
+            kept = len(path) // 20 * 20
+            if kept < 400 or segment.drive_velocity_mps == 0.0:
                 continue
-            mean = path[:whole].reshape(-1, 20).mean(axis=1)
+            mean = path[:kept].reshape(-1, 20).mean(axis=1)
             t_s = (segment.first + 10.0 + 20.0 * np.arange(len(mean))) * BLOCK_S
             slope = np.gradient(mean, 20 * BLOCK_S) / segment.drive_velocity_mps
-            # noise of the position is the smaller in a relative velocity the faster the drive
+            # the weight is the speed: the faster the drive, the less noise in its relative velocity
             speed_mm_per_s = 1e3 * abs(segment.drive_velocity_mps)
             series.append(
                 WaveSeries(mean if over == "position" else t_s, slope / slope.mean() - 1.0, speed_mm_per_s, run.file)
@@ -153,18 +153,18 @@ def drive_series(runs: list[Prepared], over: str) -> list[WaveSeries]:
 
 
 def waves_apart(series: list[WaveSeries], runs: list[Prepared], most: int) -> list[Wave]:
-    """The strongest waves over time if each run may begin in another phase; none where no two runs show any."""
+    """The strongest waves over time if each run may have another phase; empty unless two runs have a series."""
     by_run = {run.file: [part for part in series if part.run == run.file] for run in runs}
     if sum(bool(parts) for parts in by_run.values()) < 2:
         return []
     waves: list[Wave] = []
     for wave in _strongest(series, most, apart=True):
-        first, *others = (
+        first, *later = (
             wave_of(wave.period, fitted(parts, np.array([wave.period]))[1][0]) if parts else wave
             for parts in by_run.values()
         )
-        ratio = float(np.sqrt(np.mean([other.ratio**2 for other in (first, *others)])))
-        phases_of = {phase_of(run.file): other.phase_rad for run, other in zip(runs[1:], others, strict=True)}
+        ratio = float(np.sqrt(np.mean([in_run.ratio**2 for in_run in (first, *later)])))
+        phases_of = {phase_of(run.file): in_run.phase_rad for run, in_run in zip(runs[1:], later, strict=True)}
         waves.append(wave._replace(ratio=ratio, phase_rad=first.phase_rad, phases_of=phases_of))
     return waves
 
@@ -177,13 +177,13 @@ def _strongest(series: list[WaveSeries], most: int, harmonics: int = 1, apart: b
     if span <= 0.0 or spacing <= 0.0:
         return []
     reach = max(float(part.at.max()) for part in series) - min(float(part.at.min()) for part in series)
-    # less than one turn is a drift
+    # a wave of less than one turn is a drift
     periods = np.geomspace(max(0.3 * spacing, span / 100.0), min(2.0 * span, reach), _GRID)
     power, shares = fitted(series, periods, harmonics)
     if apart:
         runs = dict.fromkeys(part.run for part in series)
         power = np.sum([fitted([part for part in series if part.run == run], periods)[0] for run in runs], axis=0)
-    # the best of every range of periods: short ones fit the few breakaways best whatever is there
+    # the best of each range of periods: short periods always fit the few breakaways best
     edges = np.linspace(0, _GRID, most + 1).astype(np.int64)
     best: list[int] = []
     for first, last in pairwise(edges.tolist()):
@@ -194,7 +194,7 @@ def _strongest(series: list[WaveSeries], most: int, harmonics: int = 1, apart: b
 
 
 def fitted(series: list[WaveSeries], periods: Floats, harmonics: int = 1) -> tuple[Floats, Floats]:
-    """Waves with up to two harmonics, fitted each alone.
+    """Waves with `harmonics` harmonics, one fit for each period.
 
     Returns:
         The part of the sum of squares that each explains [periods], and its shares of sine and cosine [periods, 2 x harmonics].

@@ -14,15 +14,15 @@ from diagnosis.look.numbers import Number, mean_of
 from diagnosis.look.record import smoothed
 from diagnosis.look.slips import RecordSlips
 
-_FEWEST = 4  # tops: two for each half
-_SMOOTHED = 3  # samples of a smoothing from which the falls have samples enough to be laid over each other
-_STAYS = 0.5  # share of the correction that may be wrong, in the interval
-_OF_LARGEST = 2.0  # standard deviations of noise that the largest of some samples is too large by
-_BEYOND = 2  # widths of the smoothing, on either side of the searched stretch
+_FEWEST = 4  # fewest tops: two for each half
+_SMOOTHED = 3  # smallest width of the smoothing [samples]: with less, falls have too few samples to be overlaid
+_STAYS = 0.5  # share of the correction by which the interval is widened
+_OF_LARGEST = 2.0  # bias of the largest of some samples, in standard deviations of the noise
+_BEYOND = 2  # margin on either side of the searched stretch, in widths of the smoothing
 
 
 class _Tops(NamedTuple):
-    """Force at breakaway of each slip except the first, whose stick is not recorded, [slips - 1]; and the part cut off."""
+    """Force at breakaway, and the part of it that smoothing cuts off; [slips - 1], as the first stick is not recorded."""
 
     force_N: Floats
     cut_N: Floats
@@ -33,8 +33,8 @@ def breakaway_of(slips_of_parts: list[RecordSlips], each: Number) -> Number:
 
     Args:
         slips_of_parts: slips of each part.
-        each: the mean of the tops that are found one by one; returned where there are too few slips or samples, and where the
-            falls differ so much that the mean of the overlaid tops is lower by more than noise.
+        each: the mean of the tops located one by one; returned where there are too few slips or samples, and where the falls
+            differ so much that the mean of the overlaid tops is lower by more than noise.
 
     """
     tops = [top for top in map(_tops_of, slips_of_parts) if top is not None]
@@ -49,7 +49,7 @@ def breakaway_of(slips_of_parts: list[RecordSlips], each: Number) -> Number:
 
 
 def _tops_of(slips: RecordSlips) -> _Tops | None:
-    """The tops of a part; None for too few."""
+    """The tops of a part; None with too few slips or samples."""
     force_N, width = slips.part.force_N, slips.width | 1
     tops, bottoms = (ends[1:] for ends in slips.falls)
     if len(tops) < _FEWEST or width < _SMOOTHED:
@@ -68,9 +68,9 @@ def _tops_of(slips: RecordSlips) -> _Tops | None:
     cut_N = np.empty(len(at))
     top_N = np.empty(len(at))
     for half in (0, 1):
-        measured, other = slice(half, None, 2), slice(1 - half, None, 2)
+        measured, locating = slice(half, None, 2), slice(1 - half, None, 2)
         of_once, of_twice = (
-            _BEYOND * width + int(np.argmax(courses[other].mean(axis=0)[inner])) for courses in (once, twice)
+            _BEYOND * width + int(np.argmax(courses[locating].mean(axis=0)[inner])) for courses in (once, twice)
         )
         cut_N[measured] = once[measured, of_once] - twice[measured, of_twice]
         top_N[measured] = once[measured, of_once] + cut_N[measured]

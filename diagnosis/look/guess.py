@@ -1,4 +1,4 @@
-"""Which column of a table is the time, the force, the load, the drive's position: by names, units, and their course."""
+"""Which column of a table is the time, the force, the load, the drive's position: by names, units and values."""
 
 import re
 from typing import NamedTuple
@@ -33,7 +33,7 @@ _FEWEST_STEPS = 8
 # columns that are never used as force, load, speed or position, even if their name matches
 _OTHER = re.compile(r"acc|beschl|temp|humid|feucht|count|zyklus|cycle|voltage|current", re.IGNORECASE)
 
-# a commanded force, which is not the measured one; a commanded position is as good as a measured one
+# names of commanded values: excluded as the force, which must be measured; a commanded position is as good as a measured one
 _WANTED = re.compile(r"soll|set.?p(oin)?t|target|demand|command|nominal", re.IGNORECASE)
 
 
@@ -110,12 +110,12 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
 
 
 def _in(table: Table, name: str, what: str) -> bool:
-    """Whether a column states a unit of the wanted quantity."""
+    """Whether the unit of a column belongs to the wanted quantity."""
     return (known_unit(table.unit(name)) or ("",))[0] in _QUANTITIES[what]
 
 
 def _refuse_empty_force(table: Table, numeric: list[str]) -> None:
-    """Raise Fault CONFIG where a column is named as the force and holds no number: no other column may take its place."""
+    """Raise Fault CONFIG where a column is named as the force and holds no number: no other column may replace it."""
     if empty := _empty(table, "force", numeric):
         text = f"{table.path.name}: column {empty!r} holds no number: must hold the force, by its name"
         raise Fault(
@@ -143,7 +143,7 @@ def _empty(table: Table, what: str, numeric: list[str]) -> str:
 
 
 def _is_empty(table: Table, what: str, name: str) -> bool:
-    """Whether no cell holds a number; where there are words in their place, only of a column that states its unit."""
+    """Whether no cell holds a number; a column of words counts only if its unit belongs to the wanted quantity."""
     try:
         return not np.isfinite(table.column(name)).any()
     except Fault:
@@ -173,7 +173,7 @@ def _numeric(table: Table) -> list[str]:
 
 
 def _one_each(table: Table, names: list[str]) -> list[str]:
-    """The names without long names of columns that also have a short name."""
+    """The shortest name of each column, as a column may have a long and a short name."""
     seen: dict[int, str] = {}
     for name in names:
         key = id(table.columns[name])
@@ -203,7 +203,7 @@ def _named(table: Table, what: str, names: list[str]) -> str:
 
 
 def _has_times(table: Table, name: str) -> bool:
-    """Whether a column holds a time at all: LabVIEW writes the names of columns that it leaves empty."""
+    """Whether a column holds any time: LabVIEW names columns that it leaves empty."""
     try:
         return bool(np.isfinite(table.seconds(name)[0]).any())
     except Fault:

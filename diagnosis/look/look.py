@@ -1,4 +1,4 @@
-"""One measured record at a glance."""
+"""All numbers of one measured record."""
 
 import math
 import re
@@ -17,7 +17,7 @@ from diagnosis.look.slips import RecordSlips, find_slips
 from diagnosis.look.speeds import AtSpeed, over_dwell, over_speed
 from diagnosis.look.sticks import Cycle, cycles_of
 
-# names of numbers of a force, where a coefficient is looked at
+# name of a number of the force -> name of the number of a friction coefficient
 _MU = {
     "static_force_N": "mu_s",
     "kinetic_force_N": "mu_k",
@@ -27,18 +27,18 @@ _MU = {
     "dwell_N_per_decade": "mu_dwell_per_decade",
 }
 
-# the units of a rig that turns
+# unit of a linear rig -> unit of a rotary rig
 _TURNING = {"N": "N m", "N/s": "N m/s", "N/m": "N m/rad", "kg": "kg m²", "N per decade": "N m per decade"}
 
 
 class RecordFacts(NamedTuple):
-    """Numbers that the operator gives, SI units; for a rig that turns torque for force, rad for m, kg m² for kg."""
+    """Numbers that the operator gives, SI units; for a rotary rig torque for force, rad for m, kg m² for kg."""
 
-    speed_mps: float | None = None  # of the drive, where its position was not measured
+    speed_mps: float | None = None  # speed of the drive, where its position was not measured
     load_N: float | None = None  # normal load
-    mass_kg: float | None = None  # of the slide
+    mass_kg: float | None = None  # mass of the slide
     coefficient: bool = False  # the record holds the force over an unknown load
-    torsion: bool = False  # the rig turns: forces are torques, ways are angles
+    torsion: bool = False  # the rig is rotary: forces are torques, ways are angles
 
     @property
     def force_unit(self) -> str:
@@ -47,7 +47,7 @@ class RecordFacts(NamedTuple):
 
     @property
     def speed_unit(self) -> str:
-        """Of the drive."""
+        """Unit of the drive's speed."""
         return "rad/s" if self.torsion else "m/s"
 
 
@@ -68,12 +68,12 @@ class LookResult(NamedTuple):
 
     @in_json
     def swings_without_stick(self) -> int:
-        """Number of swings of the force in a record without sticks."""
+        """Number of swings of the force in a record without sticks; 0 in a record with sticks."""
         return 0 if self.sticks else len(self.cycles)
 
     @in_json
     def slips(self) -> int:
-        """How many slips began."""
+        """Number of slips that began; 0 in a record without sticks."""
         return len(self.cycles) if self.sticks else 0
 
 
@@ -165,16 +165,16 @@ def _of_cycles(slips_of_parts: list[RecordSlips], cycles: list[Cycle], step_s: f
 
 
 def _stiffness(stuck: list[Cycle]) -> dict[str, Number | None]:
-    """The stiffness of the drive and of drive and contact in series, where the sticks show the contact; else the latter alone.
+    """Stiffness of the drive, and stiffness of drive and contact in series; the latter alone where sticks hide the contact.
 
-    The compliance of the contact comes from a formula, so the interval holds all of it, both ways; where the sticks do not
-    resolve it, as much of it as they allow.
+    The contact's compliance comes from a formula, so the interval is widened by all of it, both ways; where the sticks do not
+    resolve it, by the largest compliance that they allow.
     """
     series = mean_of([cycle.stiffness_N_per_m for cycle in stuck], "N/m")
     drive = mean_of([cycle.drive_m_per_N for cycle in stuck], "m/N")
     if series is None or drive is None or not drive.low > 0.0:
         return {"stiffness_N_per_m": series}
-    # fewer half intervals: the scatter of the second column would exceed half of its correction
+    # below 2 half intervals the scatter of the contact's compliance exceeds half of its correction
     if not 1.0 / series.value - drive.value > 2.0 * (drive.high - drive.value):
         return {"stiffness_N_per_m": series._replace(high=max(series.high, 1.0 / drive.low))}
     value = 1.0 / drive.value
@@ -192,19 +192,19 @@ def _of_falls(slips_of_parts: list[RecordSlips], numbers: dict[str, Number]) -> 
         falls for falls in (falls_of(slips, top.value, bottom.value) for slips in slips_of_parts) if falls is not None
     ]
     midway = 0.5 * (top.value + bottom.value)
-    # undamped it is the middle; heavily damped it is at the re-stick
+    # sliding friction lies in the middle of an undamped fall, near the re-stick of a heavily damped one
     guess = Number(midway, midway - 0.5 * (top.value - bottom.value), midway + 0.25 * (top.value - bottom.value), "N")
     if not stacks:
         return {"kinetic_force_N": guess}
     falls = max(stacks, key=lambda stack: stack.slips)
-    shape, others, more = shape_of(falls)
+    shape, partials, alternative = shape_of(falls)
     if shape is None:
         return {"kinetic_force_N": guess}
-    kinetic = jackknifed(shape.force_N, [other.force_N for other in others], "N")
-    omega = jackknifed(shape.omega_rad_per_s, [other.omega_rad_per_s for other in others], "rad/s")
-    if more is not None:
-        kinetic = kinetic.wider(more.force_N - shape.force_N)
-        omega = omega.wider(more.omega_rad_per_s - shape.omega_rad_per_s)
+    kinetic = jackknifed(shape.force_N, [partial.force_N for partial in partials], "N")
+    omega = jackknifed(shape.omega_rad_per_s, [partial.omega_rad_per_s for partial in partials], "rad/s")
+    if alternative is not None:
+        kinetic = kinetic.wider(alternative.force_N - shape.force_N)
+        omega = omega.wider(alternative.omega_rad_per_s - shape.omega_rad_per_s)
     result = {"kinetic_force_N": kinetic, "omega_rad_per_s": omega, "static_force_N": _breakaway(shape, numbers)}
     if "stiffness_N_per_m" in numbers:
         stiffness = numbers["stiffness_N_per_m"]
@@ -234,7 +234,7 @@ def _between_samples(numbers: dict[str, Number], step_s: float) -> dict[str, Num
     if "slope_N_per_s" not in numbers:
         return {}
     more = abs(numbers["slope_N_per_s"].value) * step_s
-    wanted = (name for name in ("static_force_N", "kinetic_force_N") if name in numbers)
+    names = (name for name in ("static_force_N", "kinetic_force_N") if name in numbers)
     return {
-        name: numbers[name]._replace(low=numbers[name].low - more, high=numbers[name].high + more) for name in wanted
+        name: numbers[name]._replace(low=numbers[name].low - more, high=numbers[name].high + more) for name in names
     }

@@ -1,4 +1,4 @@
-"""Numbers with an interval that holds the true one with 90 % probability."""
+"""Numbers with an interval that holds the true value with 90 % probability."""
 
 import math
 from collections.abc import Sequence
@@ -10,13 +10,13 @@ import numpy.typing as npt
 from bridge.arrays import Floats
 from bridge.results import in_json
 
-_GROUPS = 10  # of slips, of which one after the other is left out
+_GROUPS = 10  # groups of slips for the jackknife
 # Student's t for 90 %, two sides, by degrees of freedom; 1.645 beyond the table
 _T = (math.inf, 6.314, 2.920, 2.353, 2.132, 2.015, 1.943, 1.895, 1.860, 1.833, 1.812, 1.796, 1.782, 1.771, 1.761, 1.753)
 
 
 class Number(NamedTuple):
-    """A number in its unit; the interval is NaN where one value alone is known."""
+    """A number, its interval and its unit; the interval is NaN where it comes from a single value."""
 
     value: float
     low: float
@@ -30,18 +30,18 @@ class Number(NamedTuple):
         return self.low, self.high
 
     def times(self, factor: float, unit: str) -> "Number":
-        """The number in another unit, or per something that is known exactly."""
+        """The number times an exactly known factor, in the unit of the product."""
         ends = sorted((self.low * factor, self.high * factor)) if math.isfinite(self.low) else [self.low, self.high]
         return Number(self.value * factor, ends[0], ends[1], unit)
 
     def wider(self, more: float) -> "Number":
-        """The number with an independent error of `more` added to its interval, both ways."""
+        """The number with an independent error of `more` added to both sides of its interval."""
         low, high = (math.hypot(end - self.value, more) for end in (self.low, self.high))
         return self._replace(low=self.value - low, high=self.value + high)
 
 
 def quantile_t(free: int) -> float:
-    """Student's t, 90 % within, for `free` degrees of freedom."""
+    """Student's t for a two-sided interval of 90 %, for `free` degrees of freedom."""
     if free < len(_T):
         return _T[max(free, 0)]
     return 1.645 + 1.55 / free
@@ -62,24 +62,24 @@ def mean_of(values: Floats | Sequence[float], unit: str, resolution: float = 0.0
     return Number(mean, mean - error, mean + error, unit)
 
 
-def jackknifed(whole: float, without: Sequence[float], unit: str) -> Number:
-    """A number of all slips; its interval comes from the same number without one group of slips each."""
-    finite = np.asarray([value for value in without if math.isfinite(value)])
+def jackknifed(value: float, without: Sequence[float], unit: str) -> Number:
+    """A number from all slips; its interval comes from the numbers `without` one group of slips each (jackknife)."""
+    finite = np.asarray([partial for partial in without if math.isfinite(partial)])
     if len(finite) < 3:
-        return Number(whole, math.nan, math.nan, unit)
+        return Number(value, math.nan, math.nan, unit)
     n = len(finite)
     error = quantile_t(n - 1) * math.sqrt((n - 1) / n * float(((finite - finite.mean()) ** 2).sum()))
-    return Number(whole, whole - error, whole + error, unit)
+    return Number(value, value - error, value + error, unit)
 
 
 def groups_of(count: int) -> list[npt.NDArray[np.int64]]:
-    """Indices of `count` things in at most ten groups, every tenth in one."""
+    """Indices 0 to `count` - 1 in at most ten groups; with ten groups every tenth index is in the same group."""
     groups = min(_GROUPS, count)
     return [np.arange(first, count, groups) for first in range(groups)]
 
 
 def slope_of(x: Floats, y: Floats, unit: str) -> Number | None:
-    """The slope of y over x, [n] each; None with fewer than four."""
+    """The slope of y over x, [n] each; None with fewer than four points."""
     if len(x) < 4:
         return None
     centred = x - x.mean()

@@ -1,4 +1,4 @@
-"""A measured force as even parts of one direction, and the noise of it."""
+"""A measured force as evenly sampled parts of one direction, each with its noise."""
 
 from itertools import pairwise
 from typing import NamedTuple
@@ -11,10 +11,10 @@ from bridge.arrays import Floats
 from bridge.log.watches.arrays import noise_of
 
 _GAP_STEPS = 10.0  # usual steps; a longer gap cuts the record, as it may hide slips
-FEWEST = 16  # samples of a part
-_UNEVEN = 0.01  # of a step; beyond it the record is interpolated to an even clock
-_BOTH_WAYS = 0.3  # share of the force's largest size that it reaches with either sign on a rig that goes both ways
-_TURN = 0.1  # of that size: a force that changes sign by less has not turned
+FEWEST = 16  # fewest samples of a part
+_UNEVEN = 0.01  # share of a step; with a larger deviation from an even clock the record is interpolated
+_BOTH_WAYS = 0.3  # share of its largest size that the force reaches with either sign on a rig that moves both ways
+_TURN = 0.1  # share of that size: a force that changes sign by less has not turned
 
 
 class OneWayPart(NamedTuple):
@@ -22,8 +22,8 @@ class OneWayPart(NamedTuple):
 
     t_s: Floats
     force_N: Floats
-    position_m: Floats | None  # of the drive, positive along the motion
-    sign: float  # of the force as measured
+    position_m: Floats | None  # position of the drive, rising along the motion
+    sign: float  # sign of the measured force
     noise_N: float  # standard deviation of the force from sample to sample
 
     @property
@@ -33,7 +33,7 @@ class OneWayPart(NamedTuple):
 
 
 def parts_of(t_s: Floats, force_N: Floats, position_m: Floats | None = None) -> list[OneWayPart]:
-    """The even parts of a record, [samples] each; samples without a number or back in time are left out."""
+    """The even parts of a record, [samples] each, without samples that hold no number or go back in time."""
     good = np.isfinite(t_s) & np.isfinite(force_N)
     if position_m is not None:
         good &= np.isfinite(position_m)
@@ -54,15 +54,15 @@ def parts_of(t_s: Floats, force_N: Floats, position_m: Floats | None = None) -> 
             continue
         inside = slice(first, last)
         sign = -1.0 if float(np.median(force_N[inside])) < 0.0 else 1.0
-        place = None if position_m is None else position_m[inside]
-        if place is not None and place[-1] < place[0]:
-            place = -place
-        parts.append(_even(t_s[inside], sign * force_N[inside], place, sign))
+        position = None if position_m is None else position_m[inside]
+        if position is not None and position[-1] < position[0]:
+            position = -position
+        parts.append(_even(t_s[inside], sign * force_N[inside], position, sign))
     return parts
 
 
 def _turns(force_N: Floats) -> npt.NDArray[np.int64]:
-    """Where the force changes its sign for good, on a rig that goes both ways; else nothing."""
+    """Indices where the direction turns; empty for a rig that moves one way."""
     size = float(np.quantile(np.abs(force_N), 0.99))
     if min(np.quantile(force_N, 0.95), -np.quantile(force_N, 0.05)) < _BOTH_WAYS * size:
         return np.zeros(0, np.int64)
@@ -82,6 +82,6 @@ def _even(t_s: Floats, force_N: Floats, position_m: Floats | None, sign: float) 
 
 
 def smoothed(values: Floats, width: int) -> Floats:
-    """Means over `width` samples around each, [samples]; an even width is made odd."""
+    """Moving mean over `width` samples, [samples]; an even width is made odd."""
     width = width | 1
     return values if width <= 1 else np.asarray(uniform_filter1d(values, width, mode="mirror"), np.float64)

@@ -16,16 +16,17 @@ from bridge.arrays import Floats
 from diagnosis.look.numbers import groups_of, jackknifed
 from diagnosis.look.slips import RecordSlips
 
-# Share of the fall at either end that is not fitted: it belongs to breakaway and re-stick. The smaller shows its influence.
+# Share of the fall at either end that is not fitted: it belongs to breakaway and re-stick. A second fit with the smaller share
+# shows the influence of this choice.
 _FIRST, _LESS = 0.12, 0.06
-_MOST_SAMPLES = 4000  # that are fitted
-_FEWEST = 5  # samples of a fall
-# Bounds and scales of the fits: level and size over the fall, frequency and instant over its length; decay over frequency,
-# frequency and instant.
+_MOST_SAMPLES = 4000  # most samples that are fitted
+_FEWEST = 5  # fewest samples of a fall
+# Lower bounds, upper bounds and scales of the fits. _EVEN: level and size as shares of the fall, angular frequency and instant
+# in lengths of the fall. _DECAYING: decay over frequency, frequency, instant.
 _EVEN = [0.0, 0.2, 1.0, -0.5], [1.0, 2.0, 6.0, 0.5], [0.1, 0.1, 1.0, 0.1]
 _DECAYING = [-0.5, 1.0, -0.5], [1.5, 6.0, 0.5], [0.1, 1.0, 0.1]
-# A decay counts from this share of the frequency, as creep and slowly falling friction look like a decay of up to 0.041 on 127
-# rigs, and from so many half intervals of 90 %.
+# Smallest decay, as a share of the frequency and in half intervals of 90 %. On 127 rigs creep and slowly falling friction looked
+# like a decay of up to 0.041.
 _LEAST_DECAY, _SURE = 0.05, 1.6
 _FEWEST_FOR_SCATTER = 3
 
@@ -33,31 +34,31 @@ _FEWEST_FOR_SCATTER = 3
 class Shape(NamedTuple):
     """The mean fall of several slips."""
 
-    force_N: float  # of sliding
-    omega_rad_per_s: float  # of the slide on the drive's spring
-    ratio: float  # of decay and frequency
-    parameters: tuple[float, ...]  # from which another fit begins
+    force_N: float  # sliding friction
+    omega_rad_per_s: float  # angular frequency of the slide on the drive's spring
+    ratio: float  # decay over frequency
+    parameters: tuple[float, ...]  # solution of the fit; start of the fits of subsets
 
 
 class StackedFalls(NamedTuple):
     """All whole falls of a part laid over each other: samples [n] and the number of their slip [n]."""
 
-    since_s: Floats  # since half of the fall was done
+    since_s: Floats  # time since half of the fall
     force_N: Floats
     slip: npt.NDArray[np.int64]
     slips: int
-    length_s: float  # of the usual fall, from breakaway to re-stick
-    top_N: float  # mean
-    bottom_N: float
+    length_s: float  # median duration of a fall, from breakaway to re-stick
+    top_N: float  # mean force at breakaway
+    bottom_N: float  # mean force at re-stick
 
     def without(self, group: npt.NDArray[np.int64]) -> "StackedFalls":
-        """Those that do not belong to some slips."""
+        """The samples that do not belong to a group of slips."""
         kept = ~np.isin(self.slip, group)
         return self._replace(since_s=self.since_s[kept], force_N=self.force_N[kept], slip=self.slip[kept])
 
 
 def falls_of(slips: RecordSlips, top_N: float, bottom_N: float) -> StackedFalls | None:
-    """The falls of a part, whose mean forces at breakaway and re-stick are known; None where they are too quick to be seen."""
+    """The falls of a part; None where they have too few samples. `top_N`, `bottom_N`: mean forces at breakaway and re-stick."""
     part, (tops, bottoms) = slips.part, slips.falls
     lengths = bottoms - tops
     if not len(lengths) or float(np.median(lengths)) < _FEWEST:
@@ -78,32 +79,32 @@ def falls_of(slips: RecordSlips, top_N: float, bottom_N: float) -> StackedFalls 
 
 
 def shape_of(falls: StackedFalls) -> tuple[Shape | None, list[Shape], Shape | None]:
-    """The swing, the swings without one group of falls each, and another swing that may be as good; None: no fit.
+    """The swing, the swings without one group of falls each, and an alternative that may be as good; None: no fit.
 
-    The swing decays where the falls show a decay beyond its interval. Then the other one is the swing without a decay, as
-    friction that falls slowly and a contact that creeps bend a fall alike; else it is the swing of a longer part of the falls.
+    The swing decays where the falls show a decay beyond its interval. Then the alternative is the swing without a decay, as
+    slowly falling friction and a creeping contact bend a fall alike; else it is the swing of a longer part of the falls.
     """
     groups = groups_of(falls.slips) if falls.slips >= _FEWEST_FOR_SCATTER else []
 
     def fitted(fit: Callable[[StackedFalls, Shape | None], Shape | None]) -> tuple[Shape | None, list[Shape]]:
-        whole = fit(falls, None)
-        without = [fit(falls.without(group), whole) for group in groups] if whole is not None else []
-        return whole, [other for other in without if other is not None]
+        shape = fit(falls, None)
+        partials = [fit(falls.without(group), shape) for group in groups] if shape is not None else []
+        return shape, [partial for partial in partials if partial is not None]
 
-    (even, others), (decaying, without) = fitted(_even), fitted(_decaying)
+    (even, even_partials), (decaying, partials) = fitted(_even), fitted(_decaying)
     if even is None:
         return None, [], None
-    if decaying is not None and len(without) >= _FEWEST_FOR_SCATTER and decaying.ratio > _LEAST_DECAY:
-        ratio = jackknifed(decaying.ratio, [other.ratio for other in without], "1")
+    if decaying is not None and len(partials) >= _FEWEST_FOR_SCATTER and decaying.ratio > _LEAST_DECAY:
+        ratio = jackknifed(decaying.ratio, [partial.ratio for partial in partials], "1")
         if ratio.value > _SURE * (ratio.high - ratio.value):
-            return decaying, without, even
-    return even, others, _even(falls, even, _LESS)
+            return decaying, partials, even
+    return even, even_partials, _even(falls, even, _LESS)
 
 
 def _decaying(falls: StackedFalls, near: Shape | None) -> Shape | None:
     """The swing with a decay that begins at rest at the mean breakaway and ends at rest at the mean re-stick; None: no fit.
 
-    These ends tie the level and the size to the decay, which is seen through more noise then.
+    With these ends the decay alone determines level and size, so it can be estimated in more noise.
     """
 
     def swing(t: Floats, ratio: float, w: float, middle: float) -> Floats:
@@ -112,14 +113,14 @@ def _decaying(falls: StackedFalls, near: Shape | None) -> Shape | None:
         return level + (1.0 - level) * np.exp(-ratio * phase) * (np.cos(phase) + ratio * np.sin(phase))
 
     fitted = _fitted(falls, swing, [0.05, math.pi, 0.0], _DECAYING, near, _FIRST)
-    if fitted is None or fitted.active_mask.any():  # at a bound the falls do not determine it
+    if fitted is None or fitted.active_mask.any():  # a parameter at its bound is not determined by the falls
         return None
     ratio, w, _ = fitted.x.tolist()
     return _shape(falls, _level(ratio), w, ratio, fitted)
 
 
 def _level(ratio: float) -> float:
-    """Where the level lies between the lower and the upper end of a swing with a decay, at rest at both; 0.5 without."""
+    """Level between the lower (0) and upper (1) end of a decaying swing that is at rest at both; 0.5 without a decay."""
     return 1.0 / (1.0 + math.exp(math.pi * ratio))
 
 
@@ -147,8 +148,8 @@ def _fitted(
     drop_N = falls.top_N - falls.bottom_N
     if drop_N <= 0.0:
         return None
-    reach_s = math.acos(1.0 - 2.0 * first) / math.pi  # of the fall before its ends
-    inside = np.abs(falls.since_s) < (0.5 - reach_s) * falls.length_s
+    margin = math.acos(1.0 - 2.0 * first) / math.pi  # share of the fall's duration at either end
+    inside = np.abs(falls.since_s) < (0.5 - margin) * falls.length_s
     t, y = falls.since_s[inside] / falls.length_s, (falls.force_N[inside] - falls.bottom_N) / drop_N
     if len(t) < 2 * len(start):
         return None

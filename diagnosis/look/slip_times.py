@@ -1,4 +1,4 @@
-"""How long a slip and a stick last, from all falls of a part laid over each other.
+"""Durations of slip and stick, from all falls of a part laid over each other.
 
 The largest of noisy samples lies somewhere on the end of the flat climb, so slips that are timed one by one are too long. The
 mean course of many falls has little noise, so parabolas through few of its samples find its top and its bottom.
@@ -13,19 +13,19 @@ from bridge.arrays import Floats
 from diagnosis.look.numbers import Number, groups_of, jackknifed
 from diagnosis.look.slips import RecordSlips
 
-_FEWEST_SLIPS, _FEWEST_SAMPLES = 3, 5  # of a fall
-_BINS = 100  # in a fall
-_REACH = 0.9  # of a fall, before and after its middle, in which top and bottom are looked for
-# Half the span of a parabola, in falls, at least and at most; between them as much as leaves this share of the fall as noise.
+_FEWEST_SLIPS, _FEWEST_SAMPLES = 3, 5  # fewest slips, and fewest samples of a fall
+_BINS = 100  # bins in a fall
+_REACH = 0.9  # top and bottom are searched in this share of a fall before and after its middle
+# Smallest and largest half span of a parabola, in falls; between them the span reduces noise to the third share of the fall.
 _LEAST, _MOST, _NOISE = 0.06, 0.2, 0.002
-_LEAST_SAMPLES = 1.5  # of that half: three samples of each slip are in the whole
-_RIDGE = 1e-9  # where all slips have their samples at the same instants, fewer than three are in some spans
+_LEAST_SAMPLES = 1.5  # smallest half span in samples: a span holds three samples of each slip
+_RIDGE = 1e-9  # regularises spans with fewer than three instants, as where all slips are sampled at the same instants
 
 
 def with_slip_times(numbers: dict[str, Number], slips_of_parts: list[RecordSlips]) -> dict[str, Number]:
     """Numbers with `slip_s` and `dwell_s` from the mean fall of the part with most slips, if it has slips and samples enough.
 
-    Of a fall of few samples it is only known that it lies between the sample before and the sample after it.
+    A fall with few samples lies between the sample before and the sample after it: its interval is widened by two steps.
     """
     if "slip_s" not in numbers:
         return numbers
@@ -33,7 +33,7 @@ def with_slip_times(numbers: dict[str, Number], slips_of_parts: list[RecordSlips
     seen = [falls for falls in map(_falls_of, slips_of_parts) if falls is not None]
     if seen:
         mean = max(seen, key=lambda falls: falls.slips).slip_time()
-        if dwell is not None:  # a stick begins and ends where slips end and begin
+        if dwell is not None:  # a slip that is shorter leaves more time to the stick
             more_s = slip.value - mean.value
             dwell = Number(dwell.value + more_s, dwell.low + more_s, dwell.high + more_s, "s")
             dwell = dwell.wider(mean.high - mean.value)
@@ -47,24 +47,24 @@ def with_slip_times(numbers: dict[str, Number], slips_of_parts: list[RecordSlips
 
 
 class _Falls(NamedTuple):
-    """Samples of all falls by the time since their middle: how many, and the sum of their forces, [groups of slips, bins]."""
+    """Samples of all falls by the time since their middle: their number and the sum of their forces, [groups of slips, bins]."""
 
     counts: Floats
     sums: Floats
     slips: int
-    half_bins: int  # of a parabola
+    half_bins: int  # half span of a parabola [bins]
     bin_s: float
     step_s: float
 
     def slip_time(self) -> Number:
-        """From the top of the mean course to its bottom; each instant is uncertain by half the span of a parabola."""
+        """Time from the top of the mean course to its bottom; the error of each is half the span of a parabola."""
         counts, sums = self.counts.sum(axis=0), self.sums.sum(axis=0)
-        whole = self._long_s(counts, sums)
-        without = [self._long_s(counts - c, sums - s) for c, s in zip(self.counts, self.sums, strict=True)]
+        duration_s = self._duration_s(counts, sums)
+        without = [self._duration_s(counts - c, sums - s) for c, s in zip(self.counts, self.sums, strict=True)]
         sampled_s = 1.645 * self.step_s / math.sqrt(6.0)  # each end lies between two samples
-        return jackknifed(whole, without, "s").wider(math.hypot(sampled_s, self.half_bins * self.bin_s))
+        return jackknifed(duration_s, without, "s").wider(math.hypot(sampled_s, self.half_bins * self.bin_s))
 
-    def _long_s(self, counts: Floats, sums: Floats) -> float:
+    def _duration_s(self, counts: Floats, sums: Floats) -> float:
         course = _smooth(counts, sums, self.half_bins)
         middle = len(course) // 2
         reach = int(_REACH * _BINS)
@@ -100,9 +100,9 @@ def _falls_of(slips: RecordSlips) -> _Falls | None:
 
 
 def _smooth(counts: Floats, sums: Floats, half_bins: int) -> Floats:
-    """The value in each bin of a parabola through the samples around it, [bins]; NaN where none is near.
+    """The value in each bin of a parabola through the samples around it, [bins]; NaN without a sample in its span.
 
-    Weights fall to nothing at the ends of the span (W. Cleveland, Robust locally weighted regression, 1979).
+    Weights fall to zero at the ends of the span (W. Cleveland, Robust locally weighted regression, 1979).
     """
     x = np.arange(-half_bins, half_bins + 1) / (half_bins + 1)
     weight = (1.0 - x**2) ** 2

@@ -1,7 +1,7 @@
-"""Slips of a part of a record, on its own scale of time: falls of 10 ms and of 10 s are found alike.
+"""Slips of a part of a record. The time scale comes from the part: falls of 10 ms and of 10 s are found alike.
 
-A fall that begins at a straight climb is a slip; a swing without a straight climb is not a slip. The ratio of fall time to climb
-time does not count, so a slip may take longer than the stick before it.
+A fall after a straight climb is a slip; a swing without a straight climb is not a slip. A slip may take longer than the stick
+before it.
 """
 
 from typing import NamedTuple
@@ -15,18 +15,18 @@ from diagnosis.slips import NOISE_SPANS, turning_points
 # Smallest fall as a share of the range between the 1st and the 99th percentile. Smaller: ripple counts; larger: small slips of a
 # record with large ones are lost.
 _SHARE = 0.04
-_SMOOTH = 10  # samples of a smoothing in a fall: it cuts a round peak by 0.2 % of the fall
-_WIDEST = 0.02  # of the part, of a smoothing
-_NOISE_OF_MANY = 3.0  # standard deviations that some of many samples reach
-# Distance of the inner 80 % of a climb from its chord, as a share of the climb, up to which it is straight. A stiff contact that
-# creeps gives 0.07, a sine 0.056: a climb that lasts as long as its fall must be straighter.
+_SMOOTH = 10  # duration of a fall in widths of the smoothing: a round peak is cut by 0.2 % of the fall
+_WIDEST = 0.02  # largest width of the smoothing, as a share of the part
+_NOISE_OF_MANY = 3.0  # standard deviations that the largest of many samples reaches
+# Largest distance of the inner 80 % of a climb from its chord, as a share of the climb, for a straight climb. A stiff contact
+# that creeps gives 0.07, a sine 0.056: a climb that lasts as long as its fall must be straighter.
 _STRAIGHT, _STRAIGHTER = 0.08, 0.04
-_QUICK = 3.0  # times that the climb lasts as long as the fall, from which it is a stick, bent by creep or not
-_ALIKE = 1.15  # factor between the times of climb and fall, up to which they are alike
-_AS_QUICK = 3.0  # times that a fall lasts as long as the climb, from which the climb is not judged
-_FEWEST_OF_FALL = 8  # samples of a fall whose course is seen
-_POINTS = 41  # of a fall, in which the falls are averaged
-_LEAST_STRAIGHT = 0.5  # share of the climbs that are straight, from which it is stick-slip and no swing
+_QUICK = 3.0  # ratio of climb to fall duration above which every climb is a stick, even if creep bends it
+_ALIKE = 1.15  # largest ratio of the durations of climb and fall that count as equal
+_AS_QUICK = 3.0  # ratio of fall to climb duration above which the shape of the fall is not judged
+_FEWEST_OF_FALL = 8  # fewest samples of a fall whose shape is judged
+_POINTS = 41  # points at which the falls are averaged
+_LEAST_STRAIGHT = 0.5  # smallest share of straight climbs in stick-slip; below it the force swings
 
 
 class RecordSlips(NamedTuple):
@@ -35,7 +35,7 @@ class RecordSlips(NamedTuple):
     part: OneWayPart
     tops: Indices  # breakaways
     bottoms: Indices  # re-sticks
-    width: int  # samples of the smoothing
+    width: int  # width of the smoothing [samples]
     straight: float  # share of climbs that are straight; 0 without a climb
 
     @property
@@ -45,18 +45,18 @@ class RecordSlips(NamedTuple):
 
     @property
     def falls(self) -> tuple[Indices, Indices]:
-        """Begin and end of each fall that ends, [falls]."""
-        whole = min(len(self.tops), len(self.bottoms))
-        return self.tops[:whole], self.bottoms[:whole]
+        """Begin and end of each complete fall, [falls]."""
+        count = min(len(self.tops), len(self.bottoms))
+        return self.tops[:count], self.bottoms[:count]
 
     def middles(self, tops: Indices, bottoms: Indices) -> Floats:
-        """The instants, in samples, at which half of each fall is done, from lines through the samples around them."""
+        """The instants [samples] at which each force has fallen by half, from lines through the samples around them."""
         falls = zip(tops.tolist(), bottoms.tolist(), strict=True)
         return np.array([_half_done(self.part.force_N, top, bottom, self.width) for top, bottom in falls])
 
 
 def find_slips(part: OneWayPart) -> RecordSlips | None:
-    """The slips of a part; None where nothing falls by more than noise does."""
+    """The slips of a part; None where no fall exceeds the noise."""
     width = 1
     widest = max(1, int(_WIDEST * len(part.force_N)))
     result: tuple[Indices, Indices] | None = None
@@ -80,7 +80,7 @@ def find_slips(part: OneWayPart) -> RecordSlips | None:
 
 
 def _turning(force_N: Floats, width: int, noise_N: float) -> tuple[Indices, Indices]:
-    """Maxima and minima that alternate and differ by more than noise does, of the smoothed force."""
+    """Alternating maxima and minima of the smoothed force that differ by more than its noise."""
     smooth = smoothed(force_N, width)
     low, high = np.quantile(smooth, (0.01, 0.99))
     drop_N = max(NOISE_SPANS * noise_N / (width | 1) ** 0.5, _SHARE * float(high - low))
@@ -91,7 +91,7 @@ def _turning(force_N: Floats, width: int, noise_N: float) -> tuple[Indices, Indi
 
 
 def _straight(part: OneWayPart, tops: Indices, bottoms: Indices, width: int, sample_noise_N: float) -> float:
-    """Share of the climbs between a re-stick and the next breakaway that are straight; of the first climb where it is alone."""
+    """Share of straight climbs, each from a re-stick to the next breakaway; with a single slip the climb before it counts."""
     smooth = smoothed(part.force_N, width)
     noise_N = _NOISE_OF_MANY * sample_noise_N / (width | 1) ** 0.5
     begins = bottoms[: len(tops) - 1]
@@ -123,7 +123,7 @@ def _straight(part: OneWayPart, tops: Indices, bottoms: Indices, width: int, sam
 
 
 def _falls_straight(smooth: Floats, tops: Indices, bottoms: Indices) -> bool:
-    """Whether the mean fall is a straight line. A free slide swings, so its fall is bent; a triangle is not a slip."""
+    """Whether the mean fall is a straight line, as in a triangle wave: a slip is bent, as a free slide swings."""
     falls = [smooth[top : bottom + 1] for top, bottom in zip(tops.tolist(), bottoms.tolist(), strict=False)]
     falls = [fall for fall in falls if len(fall) >= _FEWEST_OF_FALL and fall[0] > fall[-1]]
     if not falls:

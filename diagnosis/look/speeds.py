@@ -10,31 +10,31 @@ from diagnosis.look.numbers import Number, mean_of, slope_of
 from diagnosis.look.record import OneWayPart, smoothed
 from diagnosis.look.sticks import Cycle
 
-VARIES = 1.3  # largest speed over smallest, from which friction is reported over speed
+VARIES = 1.3  # ratio of largest to smallest speed above which friction is reported over speed
 _BINS_A_DECADE = 8.0
-_WINDOWS = 200  # of a record without slips, in which speed and force are averaged
-_STANDS = 4.0  # standard deviations of a speed by the position's noise alone, within which the drive counts as at rest
+_WINDOWS = 200  # number of windows in which speed and force between slips are averaged
+_STANDS = 4.0  # a drive slower than this many standard deviations of its speed noise counts as at rest
 _FEWEST_IN_BIN = 3
 _FEWEST_DWELLS = 5
-_MOST_INFLATED = 10.0  # Marquardt's bound: an estimate has ten times the variance that it has alone
-_ENOUGH = 0.1  # share of the dwell's variation; a rate that varies less makes at most a tenth of a slope over the dwell
-_DWELLS = 1.25  # largest dwell over smallest (of nine in ten slips), from which breakaway is reported over dwell
-_ASIDE = 0.05  # share of the dwells at each end that this ratio leaves out, one slip at least
+_MOST_INFLATED = 10.0  # Marquardt's bound: largest inflation of the slope's variance by the other regressor
+_ENOUGH = 0.1  # a rate that varies less than this share of the dwell's variation makes at most a tenth of the slope
+_DWELLS = 1.25  # ratio of largest to smallest dwell (of nine in ten slips) above which breakaway is reported over dwell
+_ASIDE = 0.05  # share of the dwells at each end that this ratio leaves out; at least one slip
 
 
 class AtSpeed(NamedTuple):
     """Friction at one speed of the drive."""
 
     speed_mps: float
-    times: int  # slips, or windows without slips
+    times: int  # number of slips, or of windows without slips
     mean_N: Number
-    breakaway_N: Number | None  # None: it slides evenly
+    breakaway_N: Number | None  # None: the slide moves evenly
     sliding: bool
     JSON_HIDDEN = ("sliding",)
 
 
 def over_speed(parts: list[OneWayPart], cycles: list[Cycle], unit: str = "N") -> list[AtSpeed]:
-    """Friction at each speed, from the lowest on; empty where the speed is not known or stays the same."""
+    """Friction at each speed, lowest speed first; empty where the speed is not known or does not vary."""
     speeds = np.array([cycle.speed_mps for cycle in cycles])
     means = np.array([cycle.mean_force_N for cycle in cycles])
     tops = np.array([cycle.breakaway_force_N for cycle in cycles])
@@ -64,7 +64,7 @@ def over_speed(parts: list[OneWayPart], cycles: list[Cycle], unit: str = "N") ->
 
 
 def _windows(part: OneWayPart, cycles: list[Cycle]) -> tuple[Floats, Floats]:
-    """Speed and mean force in windows without a slip, [windows] each; nothing where the drive's position is not known."""
+    """Speed and mean force in windows without a slip, [windows] each; empty where the drive's position is not known."""
     if part.position_m is None:
         return np.zeros(0), np.zeros(0)
     width = max(len(part.t_s) // _WINDOWS, 8)
@@ -72,8 +72,8 @@ def _windows(part: OneWayPart, cycles: list[Cycle]) -> tuple[Floats, Floats]:
     edges_s = part.t_s[: windows * width : width]
     length_s = width * part.step_s
     over = max(width // 4, 1)
-    place = smoothed(part.position_m, over)[: windows * width].reshape(-1, width)
-    speed = (place[:, -1] - place[:, 0]) / (length_s - part.step_s)
+    position = smoothed(part.position_m, over)[: windows * width].reshape(-1, width)
+    speed = (position[:, -1] - position[:, 0]) / (length_s - part.step_s)
     of_noise = noise_of(part.position_m) * (2.0 / over) ** 0.5 / (length_s - part.step_s)
     mean = part.force_N[: windows * width].reshape(-1, width).mean(axis=1)
     free = speed > _STANDS * of_noise
@@ -87,7 +87,7 @@ def _windows(part: OneWayPart, cycles: list[Cycle]) -> tuple[Floats, Floats]:
 
 
 def over_dwell(cycles: list[Cycle]) -> Number | None:
-    """Rise of the breakaway force per decade of dwell [N]; None where dwells are all alike, or hang on the speed."""
+    """Rise of the breakaway force per decade of dwell [N]; None where all dwells are alike, or depend on the speed."""
     rows = _dwells(cycles)
     if rows is None or confounded(cycles):
         return None
@@ -95,7 +95,7 @@ def over_dwell(cycles: list[Cycle]) -> Number | None:
 
 
 def confounded(cycles: list[Cycle]) -> bool:
-    """Whether dwells are long where the force climbs slowly, so that a slope over the dwell may be one over the speed.
+    """Whether dwells are long where the force climbs slowly, so that a slope over the dwell may be an effect of the speed.
 
     The criterion is the variance inflation of the two logarithms as regressors (Marquardt, Technometrics 12, 1970), where the
     rate varies enough to imitate the dwell.
@@ -110,7 +110,7 @@ def confounded(cycles: list[Cycle]) -> bool:
 
 
 def _dwells(cycles: list[Cycle]) -> Floats | None:
-    """Dwell, breakaway force and rate of loading, [slips, 3]; None where dwells are all alike, or few."""
+    """Dwell, breakaway force and rate of loading, [slips, 3]; None where all dwells are alike, or few."""
     rows = np.array(
         [
             (cycle.dwell_s, cycle.breakaway_force_N, cycle.loading_N_per_s)

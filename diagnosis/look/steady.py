@@ -1,4 +1,4 @@
-"""Whether a record is alike from its beginning to its end: a mean over a drift or over two speeds describes neither."""
+"""Whether breakaway or speed drifts over a record: a mean over a drift or over two speeds describes no state of the rig."""
 
 import numpy as np
 
@@ -7,17 +7,17 @@ from diagnosis.look.numbers import slope_of
 from diagnosis.look.speeds import VARIES
 from diagnosis.look.sticks import Cycle
 
-_FEWEST = 8  # slips: fewer show a drift by chance
-_SURE = 2.5  # half intervals of 90 % from which a drift counts
-_OF_SWING = 0.1  # of the fall in a slip: a smaller drift changes no number beyond its reading accuracy
+_FEWEST = 8  # fewest slips: fewer show a drift by chance
+_SURE = 2.5  # smallest drift that is reported, in half intervals of 90 %
+_OF_SWING = 0.1  # smallest drift, as a share of the fall in a slip: less changes no number beyond its reading accuracy
 
 
 def unsteady(cycles: list[Cycle], unit: str) -> list[str]:
-    """A line for a breakaway that drifts, and one for sticks of several speeds where only one speed is known.
+    """A message on a breakaway that drifts, and a message on sticks of several speeds where only one speed is known.
 
     Args:
         cycles: every slip of the record.
-        unit: of the force; "1" for a coefficient.
+        unit: unit of the force; "1" for a coefficient.
 
     """
     tops = [cycle for cycle in cycles if np.isfinite(cycle.restick_force_N)]
@@ -34,10 +34,10 @@ def _drift(tops: list[Cycle], unit: str) -> list[str]:
     if rate is None or abs(rate.value) < _SURE * (rate.high - rate.value) or abs(drift) < _OF_SWING * swing:
         return []
     factor, shown = prefixed(abs(drift), unit) if unit else (1.0, "")
-    way, size = "rises" if drift > 0.0 else "falls", f"{abs(drift) * factor:.3g} {shown}".rstrip()
+    verb, size = "rises" if drift > 0.0 else "falls", f"{abs(drift) * factor:.3g} {shown}".rstrip()
     return [
-        f"no steady level: the breakaway {way} by {size} over the record (running in, heat, zero of the sensor), and the numbers "
-        "are means of that; look at a part of it"
+        f"no steady level: the breakaway {verb} by {size} over the record (running in, heat, zero of the sensor), and the "
+        "numbers are means over it; look at a part of the record"
     ]
 
 
@@ -47,6 +47,6 @@ def _speeds(sticks: list[Cycle]) -> list[str]:
     if (speeds and max(speeds) > VARIES * min(speeds)) or not 0.0 < VARIES * low < high:
         return []
     return [
-        f"no single speed: sticks climb by {low:.3g} to {high:.3g} a second, so stiffness and mass are of none of them; give the "
-        "drive's position, or look at a part of one speed"
+        f"no single speed: sticks climb by {low:.3g} to {high:.3g} a second, so stiffness and mass hold for none of them; give "
+        "the drive's position, or look at a part with one speed"
     ]

@@ -9,16 +9,17 @@ from bridge.arrays import Floats
 from diagnosis.look.record import OneWayPart, parts_of, smoothed
 from diagnosis.look.slips import RecordSlips, find_slips
 
-# Share of a stick in which its slope is read: a re-stick rings, and before a breakaway it creeps.
+# Begin and end of the part of a stick in which its slope is measured: a re-stick rings, and before a breakaway the slide creeps.
 _FROM, _TO = 0.25, 0.9
-_FEWEST = 5  # samples of that
-_EVEN = 0.5  # share of its way that an even drive goes in that
-_LEVELS = (0.5, 0.6, 0.7, 0.8, 0.9)  # of the climb
-_DEGREE = 4  # of the smooth curve through a stick: a contact that gives way bends it once
-# Speed in a stick over the mean speed around it: 1 for a drive; for a slide 0, and a few hundredths where its contact gives way.
+_FEWEST = 5  # fewest samples of that part
+_EVEN = 0.5  # smallest way of the drive in that part, as a share of the way of an even drive
+_LEVELS = (0.5, 0.6, 0.7, 0.8, 0.9)  # levels of the climb between which its rate is measured
+_DEGREE = 4  # degree of the polynomial through a stick: a contact that gives way bends it once
+# Smallest speed of a drive in a stick, over the mean speed around the stick. A drive has 1; a slide has 0, or a few hundredths
+# where its contact gives way.
 _LEAST_OF_DRIVE = 0.5
 _ENOUGH = 1 << 20  # samples that are searched: a hundred slips of a slow rig at 10 kHz
-_HALVES = 4  # samples of a smoothing from which every other one finds a peak and the others measure it
+_HALVES = 4  # least width of the smoothing [samples] for which half of the samples locates a peak and half measures it
 
 
 class Cycle(NamedTuple):
@@ -28,19 +29,19 @@ class Cycle(NamedTuple):
     breakaway_force_N: float
     restick_t_s: float = math.nan
     restick_force_N: float = math.nan
-    dwell_s: float = math.nan  # of the stick before
-    slope_N_per_s: float = math.nan  # of that stick
-    loading_N_per_s: float = math.nan  # of its last half, where the force climbs fastest: without a halt of the drive
-    speed_mps: float = math.nan  # of the drive in that stick
-    stiffness_N_per_m: float = math.nan  # of that stick, over the way of the drive: of drive and contact in series
+    dwell_s: float = math.nan  # duration of the stick before the slip
+    slope_N_per_s: float = math.nan  # slope of the force in that stick
+    loading_N_per_s: float = math.nan  # largest slope in the last half of the stick, without halts of the drive
+    speed_mps: float = math.nan  # speed of the drive in that stick
+    stiffness_N_per_m: float = math.nan  # slope over the way of the drive: drive and contact in series
     drive_m_per_N: float = math.nan  # compliance of the drive in that stick
     contact_m_per_N: float = math.nan  # compliance of the contact, before it nears its breakaway
-    mean_force_N: float = math.nan  # from this breakaway to the next
-    sign: float = 1.0  # of the force as measured
+    mean_force_N: float = math.nan  # mean from this breakaway to the next
+    sign: float = 1.0  # sign of the measured force
 
 
 def cycles_of(slips: RecordSlips, speed_mps: float | None) -> list[Cycle]:
-    """Every slip of a part. `speed_mps` is the drive's speed, used where its position was not measured."""
+    """Values of every slip of a part. `speed_mps` is the drive's speed, used where its position was not measured."""
     part = slips.part
     top_N, bottom_N = _peaks(slips)
     tops, bottoms = slips.tops.tolist(), slips.bottoms.tolist()
@@ -63,7 +64,7 @@ def cycles_of(slips: RecordSlips, speed_mps: float | None) -> list[Cycle]:
 def is_of_slide(t_s: Floats, force_N: Floats, position_m: Floats) -> bool:
     """Whether a position belongs to the slide, which rests in the sticks while the drive moves; [samples] each, SI units.
 
-    False where no stick shows it.
+    False where no stick has a known speed.
     """
     few = slice(_ENOUGH)
     shares: list[float] = []
@@ -82,7 +83,7 @@ def is_of_slide(t_s: Floats, force_N: Floats, position_m: Floats) -> bool:
 def _peaks(slips: RecordSlips) -> list[Floats]:
     """Forces at breakaways and at re-sticks, [slips] each.
 
-    The largest of several noisy samples is too large. So one half of the samples finds the peak, and the other half measures it.
+    The largest of several noisy samples is too large. So one half of the samples locates the peak, the other half measures it.
     """
     force_N, noise_N, width = slips.part.force_N, slips.part.noise_N, slips.width | 1
     if width < _HALVES or noise_N == 0.0:
@@ -90,13 +91,15 @@ def _peaks(slips: RecordSlips) -> list[Floats]:
         courses, thinned, reach = [(smooth, smooth)], 1, max(width // 2, 1)
     else:
         halves = force_N[: len(force_N) // 2 * 2].reshape(-1, 2)
-        even, other = (smoothed(np.ascontiguousarray(halves[:, i]), width // 2) for i in (0, 1))
-        courses, thinned, reach = [(even, other), (other, even)], 2, width
+        even, odd = (smoothed(np.ascontiguousarray(halves[:, i]), width // 2) for i in (0, 1))
+        courses, thinned, reach = [(even, odd), (odd, even)], 2, width
     result: list[Floats] = []
     for ends, sign in ((slips.tops, 1.0), (slips.bottoms, -1.0)):
         at = np.minimum(ends // thinned, len(courses[0][0]) - 1).tolist()
         near = [slice(max(i - reach, 0), i + reach + 1) for i in at]
-        values = [[measures[span][np.argmax(sign * finds[span])] for finds, measures in courses] for span in near]
+        values = [
+            [measuring[span][np.argmax(sign * locating[span])] for locating, measuring in courses] for span in near
+        ]
         result.append(np.array(values).reshape(-1, len(courses)).mean(axis=1))
     return result
 
@@ -104,7 +107,7 @@ def _peaks(slips: RecordSlips) -> list[Floats]:
 def _stick(
     part: OneWayPart, began: int, top: int, breakaway_N: float, speed_mps: float | None, width: int
 ) -> dict[str, float]:
-    """The numbers of the middle of a stick, by their names in `Cycle`; none for a short stick, the slope for an unknown speed."""
+    """Numbers of the middle of a stick by their names in `Cycle`: none of a short stick, the slope alone of an unknown speed."""
     first, last = began + int(_FROM * (top - began)), began + int(_TO * (top - began))
     if last - first < _FEWEST:
         return {}
@@ -117,36 +120,36 @@ def _stick(
     known = {"slope_N_per_s": slope, "speed_mps": speed}
     if not speed > 0.0 or (part.position_m is not None and _halted(part.position_m, began, top, first, last)):
         return known
-    # a breakaway is known to the width of the smoothing that found it: nearer to it the slip may have begun
-    whole = slice(0, max(min(last, top - width) - first, 0))
-    drive, contact = _both(speed * (t_s - t_s[0])[whole], force_N[whole], breakaway_N)
+    # the smoothing locates a breakaway to its width: nearer to it the slip may have begun
+    stuck = slice(0, max(min(last, top - width) - first, 0))
+    drive, contact = _compliances(speed * (t_s - t_s[0])[stuck], force_N[stuck], breakaway_N)
     return known | {"stiffness_N_per_m": slope / speed, "drive_m_per_N": drive, "contact_m_per_N": contact}
 
 
 def _halted(position_m: Floats, began: int, top: int, first: int, last: int) -> bool:
-    """Whether the drive goes much less of its way in the part that is read than an even drive does."""
-    way, whole = position_m[last - 1] - position_m[first], position_m[top] - position_m[began]
-    return bool(way < _EVEN * (_TO - _FROM) * whole)
+    """Whether the drive moves much less in the measured part of a stick than an even drive would."""
+    in_part_m, in_stick_m = position_m[last - 1] - position_m[first], position_m[top] - position_m[began]
+    return bool(in_part_m < _EVEN * (_TO - _FROM) * in_stick_m)
 
 
 def _loading(part: OneWayPart, began: int, top: int, width: int) -> float:
-    """How fast the force climbs in the last half of a stick: in the quickest of its steps. NaN for too few samples."""
+    """Largest rate of the force between levels in the last half of a stick [N/s]. NaN for too few samples."""
     climb = smoothed(part.force_N[began : top + 1], width)
     if len(climb) < _FEWEST:
         return np.nan
     levels = climb[0] + np.array(_LEVELS) * (climb[-1] - climb[0])
-    # from the top back, as noise crosses a level now and again
+    # searched from the top back, as noise crosses a level several times
     reached = np.array([len(climb) - 1 - np.argmax(climb[::-1] <= level) for level in levels])
     quickest = float(np.diff(reached).min()) * part.step_s
     return float(levels[1] - levels[0]) / quickest if quickest > 0.0 else np.nan
 
 
-def _both(way_m: Floats, force_N: Floats, breakaway_N: float) -> tuple[float, float]:
-    """Compliance of drive and contact [m/N]; NaN where the stick does not show it.
+def _compliances(way_m: Floats, force_N: Floats, breakaway_N: float) -> tuple[float, float]:
+    """Compliances of drive and contact [m/N]; NaN where the stick does not show them.
 
     A contact whose stiffness falls from S to 0 as the force nears its breakaway F_b moves by -F_b / S * ln(1 - F / F_b)
-    (Dahl, A solid friction model, 1968), the drive by F / k: a line in two columns. The force in both is a smooth curve through
-    the samples, as noise in a column would draw its factor towards zero.
+    (Dahl, A solid friction model, 1968), the drive by F / k: a linear fit in two columns. The force in both is a smooth curve
+    through the samples, as noise in a column would bias its factor towards zero.
     """
     if len(way_m) <= 2 * _DEGREE:
         return np.nan, np.nan

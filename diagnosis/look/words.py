@@ -11,7 +11,7 @@ from diagnosis.look.steady import unsteady
 # in the order of the output
 TITLES = {
     "static_force_N": ("F_s", "force at breakaway"),
-    "kinetic_force_N": ("F_k", "force while it slides in a slip"),
+    "kinetic_force_N": ("F_k", "sliding friction in a slip"),
     "restick_force_N": ("F_min", "force at re-stick"),
     "mu_s": ("mu_s", "static friction coefficient"),
     "mu_k": ("mu_k", "kinetic friction coefficient"),
@@ -21,13 +21,13 @@ TITLES = {
     "mu_slope_per_s": ("climb", "rise of the coefficient in a stick"),
     "mu_dwell_per_decade": ("ageing", "rise of the coefficient at breakaway per decade of stick time"),
     "swing_N": ("swing", "fall of the force in a slip"),
-    "period_s": ("period", "from breakaway to breakaway"),
-    "dwell_s": ("stick", "from re-stick to breakaway"),
-    "slip_s": ("slip", "from breakaway to re-stick"),
+    "period_s": ("period", "time from breakaway to breakaway"),
+    "dwell_s": ("stick", "time from re-stick to breakaway"),
+    "slip_s": ("slip", "time from breakaway to re-stick"),
     "slope_N_per_s": ("climb", "rise of the force in a stick"),
     "series_N_per_m": ("in series", "rise of the force over the way of the drive: drive and contact in series"),
-    "stiffness_N_per_m": ("stiffness", "of the drive, from its way in a stick"),
-    "mass_kg": ("mass", "from the swing in a slip, on that stiffness"),
+    "stiffness_N_per_m": ("stiffness", "stiffness of the drive, from its way in a stick"),
+    "mass_kg": ("mass", "mass of the slide, from the swing in a slip and that stiffness"),
     "dwell_N_per_decade": ("ageing", "rise of the breakaway force per decade of stick time"),
 }
 
@@ -38,7 +38,7 @@ def with_interval(number: Number) -> str:
     value, low, high = number.value * factor, number.low * factor, number.high * factor
     digits = _digits(value, high - low)
     if not math.isfinite(low):
-        return f"{fixed_digits(value, None)} {unit}".rstrip() + " (one value alone: no interval)"
+        return f"{fixed_digits(value, None)} {unit}".rstrip() + " (single value: no interval)"
     return f"{value:.{digits}f} {unit}".rstrip() + f" ({low:.{digits}f} to {high:.{digits}f})"
 
 
@@ -51,19 +51,21 @@ def _digits(value: float, width: float) -> int:
 
 
 def headline(seen: LookResult) -> str:
-    """The answer in one line."""
+    """The result in one line."""
     if not seen.cycles:
         if seen.known.coefficient:
             level = f"the friction coefficient is {seen.mean_force_N:.4g} on average, with {seen.noise_N:.2g} of noise"
             return f"no slip in {seen.seconds:.3g} s: {level}"
-        what, unit = ("torque" if seen.known.torsion else "force"), seen.known.force_unit
-        level = f"the {what} is {seen.mean_force_N:.4g} {unit} on average, with {seen.noise_N:.2g} {unit} of noise"
+        quantity, unit = ("torque" if seen.known.torsion else "force"), seen.known.force_unit
+        level = f"the {quantity} is {seen.mean_force_N:.4g} {unit} on average, with {seen.noise_N:.2g} {unit} of noise"
         return f"no slip in {seen.seconds:.3g} s: {level}"
     if not seen.sticks:
         swings = f"{counted(len(seen.cycles), 'swing')} in {seen.seconds:.3g} s"
         both_ways = len({part.sign for part in seen.parts}) > 1
-        tared = "; where the force was tared about zero, give its zero back by the offset in a map" if both_ways else ""
-        return f"{swings} without a straight climb: it swings, and no stick is seen{tared}"
+        tared = (
+            "; if the force was tared to a mean of zero, restore its zero by an offset in a map" if both_ways else ""
+        )
+        return f"{swings} without a straight climb: the force swings without a stick{tared}"
     rate = 60.0 * seen.slips / seen.seconds
     text = f"{counted(seen.slips, 'slip')} in {seen.seconds:.3g} s, {rate:.3g} per minute"
     period = seen.numbers.get("period_s")
@@ -71,7 +73,7 @@ def headline(seen: LookResult) -> str:
 
 
 def sentences(seen: LookResult) -> list[str]:
-    """A line for each number, and one for each number that the record cannot give."""
+    """A line for each number, and a line for each number that the record cannot give."""
     lines: list[str] = []
     for name, (symbol, meaning) in TITLES.items():
         if name in seen.numbers:
@@ -96,7 +98,7 @@ def limits_of_look(seen: LookResult) -> list[str]:
         lines.append(f"no stiffness and no mass: the drive's speed is not known; add --speed {example}")
     if "stiffness_N_per_m" in seen.numbers and "series_N_per_m" not in seen.numbers:
         lines.append(
-            "no stiffness of the contact: the sticks are straight, so the stiffness above is of drive and contact in series"
+            "no stiffness of the contact: the sticks are straight, so the stiffness above holds for drive and contact in series"
         )
     if seen.known.coefficient:
         lines.append("no force: the normal load is not known; add --load 94.5N")
@@ -105,12 +107,12 @@ def limits_of_look(seen: LookResult) -> list[str]:
     if seen.slips >= 2 and not {"dwell_N_per_decade", "mu_dwell_per_decade"} & seen.numbers.keys():
         why = "all sticks last alike"
         if confounded(seen.cycles):
-            why = "sticks last long where the force climbs slowly, so it may be one on the speed"
+            why = "sticks last long where the force climbs slowly, so the speed may be the cause"
         lines.append(f"no dependence on the stick time: {why}; stop the drive for different times, at one speed")
     lines += unsteady(seen.cycles, seen.known.force_unit)
     static = seen.numbers[names[0]]
     if names[1] in seen.numbers and static.value - static.low > 0.1 * (static.value - seen.numbers[names[1]].value):
         lines.append(
-            "F_s may be lower than the force at breakaway: a slide that moves off slowly lets the force rise further"
+            "F_s may be lower than the force at breakaway: the force rises further while the slide starts slowly"
         )
     return lines

@@ -1,9 +1,9 @@
-"""Prediction of one run under the commands of that run, as its sensors would show it.
+"""Prediction of a run: the signals that its sensors would show under its commands.
 
 rig                            the rig to predict: numbers, effects, start, surface
 predict                        one run of one rig, or of four rigs at once, by the plant's equations
 segment_starts                 force and contact age with which every segment of the model begins
-sensor_chain                   a prediction as the sensors show it: faults, and ordinary lags
-true_force                     the true force on a force-driven axis, from the measured one and the faults of its sensor
+sensor_chain                   sensor faults and ordinary lags, applied to a prediction
+true_force                     the true force on a force-driven axis, from the measured force and the faults of its sensor
 per_run                        parameters of an effect that differ from run to run
 """

@@ -1,6 +1,6 @@
 """Parameters of an effect that differ from run to run: `NAME of FILE`, for the fitted runs. No rig file has them.
 
-One kind is the phase of a wave over time: a turning load has any phase when a log begins. Such a form has a phase for every
+An example is the phase of a wave over time: a rotating load has any phase when a log begins. Such a form has a phase for every
 fitted run, `phase_rad` for the first and `phase_rad of FILE` for the others. The phase in a held-out run is unknown: a draw has a
 random phase there, and a prediction leaves the wave out, as its mean over all phases is 0.
 """
@@ -21,7 +21,7 @@ def of_run(name: str, file: str) -> str:
 
 
 def is_of_run(name: str, parameter: str = "") -> bool:
-    """Whether a name belongs to one run; with `parameter`, whether it is this parameter in one run."""
+    """Whether a name belongs to a single run; with `parameter`, whether it is this parameter in a single run."""
     return name.startswith(parameter + _OF) if parameter else _OF in name
 
 
@@ -41,12 +41,12 @@ OTHER_PHASE = "other_phase_rad"  # phase of a second wave
 
 
 def phase_of(file: str) -> str:
-    """The name of the phase in the run `file`, which is not the first."""
+    """The name of the phase in the run `file`, for every run but the first."""
     return of_run(PHASE, file)
 
 
 def is_phase(name: str) -> bool:
-    """Whether a parameter is a phase, of all runs or of one run."""
+    """Whether a parameter is a phase, for all runs or for a single run."""
     return name in {PHASE, OTHER_PHASE} or is_of_run(name, PHASE)
 
 
@@ -60,9 +60,9 @@ def in_run(table: Table, file: str, held_out: bool, seed: int | None) -> dict[st
 
     Args:
         table: the effect.
-        file: of the run.
+        file: file of the run.
         held_out: whether the run is held out, so that its phase is unknown.
-        seed: of the draw that takes an unknown phase; None in a prediction.
+        seed: seed of the draw of an unknown phase; None in a prediction.
 
     """
     plain = as_in_rig_file(table)

@@ -1,11 +1,11 @@
-"""Prediction of one run under the commands of that run, reduced to the 1 ms grid.
+"""Prediction of a run under its commands, reduced to the 1 ms grid.
 
-The equations are the plant's own: `plant.core` with a force drive, `plant.four_rigs` with a spring drive. The bandwidths of the
-plant's sensors are set very wide, since a manifest states none.
+The equations belong to the plant: `plant.core` with a force drive, `plant.four_rigs` with a spring drive. The bandwidths of
+the plant's sensors are set very wide, since a manifest states none.
 
 Every segment of the model begins with the force that was measured there. The phase of the stick-slip cycle at which the vibration
-changes is chance. For seconds this phase decides how the force settles where nothing slips, and how many slips a segment has; a
-model that began with its own phase would differ by chance.
+changes is random. For seconds this phase determines how the force settles without slips, and the number of slips in a segment; a
+model with another phase would differ by chance.
 """
 
 import math
@@ -43,8 +43,8 @@ def predict(
 
     Args:
         config: the rig.
-        force_driven: whether a force drives the rig; it is then led along the measured motion of `commands`.
-        commands: of the run.
+        force_driven: whether a force drives the rig; the model then follows the measured motion of `commands`.
+        commands: commands of the run.
         start: state at the first block.
         entries: states at the start of the segments; with a force drive there are none.
 
@@ -62,9 +62,9 @@ def predict_many(
     entries: Sequence[Sequence[StartState]],
     wanted: int | None = None,
 ) -> list[dict[str, Floats] | None]:
-    """Signals as from `predict` for each of many rigs in the same run; the entries of all rigs are at the same blocks.
+    """Result of `predict` for each of many rigs in the same run; the entries of all rigs are at the same blocks.
 
-    With `wanted`, the first `wanted` rigs are predicted, and as many others as fill empty lanes; the rest is None.
+    With `wanted`, the first `wanted` rigs are predicted, and further rigs only in empty lanes; the rest is None.
     """
     rigs = [built(config, force_driven, commands, start) for config, start in zip(configs, starts, strict=True)]
     if force_driven:
@@ -90,7 +90,7 @@ def predict_many(
 
 
 def _led(rig: Rig, commands: CommandedRun) -> Floats:
-    """Signals of a rig with a force drive, led along the measured motion, [signals, blocks]."""
+    """Signals of a rig with a force drive that follows the measured motion, [signals, blocks]."""
     assert commands.motion is not None, "a force drive without a motion is refused when it is read"  # noqa: S101
     params, state, steps = rig
     p: Any = params[0]
@@ -139,7 +139,7 @@ def _predict(
         p.samples_per_block = samples
         p.steps_per_sample = 1
         p.dt_s = BLOCK_S / samples
-        # contiguous, as in all other calls: for other arrays it would be compiled again
+        # contiguous, as in all other calls: other arrays would make Numba compile the kernel again
         block_analogue = analogue.ravel()[: channels * samples].reshape((channels, samples))
         block_truth = truth.ravel()[: truths * samples].reshape((truths, samples))
         advance_disturbed(
@@ -173,7 +173,7 @@ def _follow(
     stiffness: float,
     damping: float,
 ) -> None:
-    """As `_predict`, along a measured motion; the force in `out` is the force that keeps the model on this motion."""
+    """Kernel `_predict` along a measured motion; the force in `out` is the force that keeps the model on this motion."""
     s: PlantMemory = state[0]
     column = np.empty((out.shape[0], 1))
     force = np.empty(1)

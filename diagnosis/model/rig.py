@@ -14,34 +14,36 @@ from plant.effects.drive import even_m, extension_m
 from plant.records import build
 
 Effects = dict[str, dict[str, float | str]]
-# Age of the contact when a run begins, and the standard deviation of its logarithm in replicates: three of them reach from a
-# stick under way to a quarter of an hour. A smaller spread makes the first breakaway a gap; a larger one hides ageing.
+# Age of the contact when a run begins, and the standard deviation of its logarithm in replicates: three standard deviations
+# reach from 0.1 s to a quarter of an hour. A smaller spread makes the first breakaway a gap; a larger spread hides ageing.
 AGE_BEFORE_S, AGE_SPREAD = 10.0, 1.5
 # Longest step without vibration. Larger: features change. Smaller: only slower. Counted: docs/method/diagnosis.md.
 _COARSEST_STEP_S = 7e-5
 # Steps in a period of the vibration. Fewer: features change. More: only slower. Counted: docs/method/diagnosis.md.
 _STEPS_PER_PERIOD = 16
-_CONTACT_STEP = 0.5  # longest step, in 1 / natural frequency [rad/s] of the mass on the contact: stability
-_LED_STEP_S = 1e-4  # longest step with a force drive: features are equal to 1e-3 N to those at 10 us
+_CONTACT_STEP = 0.5  # longest stable step, times the natural frequency [rad/s] of the mass on the contact
+_LED_STEP_S = 1e-4  # longest step with a force drive: features differ by 1e-3 N from those at 10 us
 
 
 class Start(NamedTuple):
     """State of the rig at the first block, where the time of the model begins."""
 
-    force_N: float  # in the drive's spring; with a force drive, in the contact
+    force_N: float  # force in the drive's spring; with a force drive, in the contact
     position_m: float
     velocity_mps: float = 0.0
-    age_s: float = AGE_BEFORE_S  # of the contact
-    drive_m: float | None = None  # position that the drive's own sensor shows; its zero differs from the slide sensor's
+    age_s: float = AGE_BEFORE_S  # age of the contact
+    drive_m: float | None = (
+        None  # position by the drive's sensor, whose zero differs from the zero of the slide's sensor
+    )
 
 
 class StartState(NamedTuple):
     """State of the rig at the start of a segment."""
 
     block: int
-    force_N: float  # in the drive's spring
-    age_s: float | None  # of the contact, where the slide sticks; None: the slide is sliding
-    from_before: bool = False  # the slide has stuck since before the run: the age at the start is added
+    force_N: float  # force in the drive's spring
+    age_s: float | None  # age of the contact; None: the slide is sliding
+    from_before: bool = False  # whether the slide has stuck since before the run, so that the age at its start is added
 
 
 class Rig(NamedTuple):
@@ -56,7 +58,7 @@ class Roughness(NamedTuple):
     """A rough surface."""
 
     ratio: float  # scatter of the friction along the track, as a share of the friction
-    length_m: float  # over which the friction stays alike
+    length_m: float  # correlation length of the friction
     seed: int
 
 
@@ -87,13 +89,13 @@ def rig_config(rig: RigTable, values: dict[str, float], effects: Effects, roughn
             "stiffness_N_per_m": value["drive_stiffness_N_per_m"],
             "damping_Ns_per_m": value["drive_damping_Ns_per_m"],
         }
-    # the exciter of the model follows its command at once and without limit; an exciter that does not is a gap
+    # the exciter of the model follows its command at once and without limit; any deviation from this is a gap
     table["piezo"] = {"amplitude_max_m": 1.0, "amplitude_slew_m_per_s": 0.0}
     return RigConfig.model_validate(table)
 
 
 def built(config: RigConfig, force_driven: bool, commands: CommandedRun, start: Start) -> Rig:
-    """Records of a rig for the kernels, at the start of a run, and the steps in each of its blocks."""
+    """Kernel records of a rig at the start of a run, and the number of steps in each of its blocks."""
     params, state = build(config)
     p: Any = params[0]
     p.force_keep = p.accel_keep = p.position_keep = 0.0

@@ -1,4 +1,4 @@
-"""The measured force with which every segment begins; the model begins with the same (reason: `diagnosis.model.predict`)."""
+"""The measured force with which every segment begins; the model begins with this force (reason: `diagnosis.model.predict`)."""
 
 from itertools import pairwise
 
@@ -13,7 +13,7 @@ from diagnosis.features.segments import CommandedRun, Segment
 from diagnosis.features.slips import find_slips
 from diagnosis.model.rig import StartState
 
-# Most and fewest blocks of the line through the force whose begin is read. Fewer: noise; more: the line runs into the slip.
+# Most and fewest blocks of the line whose value at its begin is the force. Fewer: noise; more: the line runs into the slip.
 # 40 blocks reduce noise of 30 mN a block to 10 mN.
 _MOST, _FEWEST = 40, 10
 
@@ -38,13 +38,13 @@ def entries_of(signals: Signals, commands: CommandedRun, scales: Scales) -> tupl
 
 
 def misread(entry: StartState, noise: RunNoise, random: np.random.Generator) -> StartState:
-    """The entry with the reading error that a draw of the force's noise makes."""
+    """The entry with a random error of its force, from a draw of the measured noise."""
     error_N, _ = _line(noise.drawn("drive_force_N", _MOST, random))
     return entry._replace(force_N=entry.force_N + error_N)
 
 
 def _renewed(signals: Signals, commands: CommandedRun, scales: Scales) -> npt.NDArray[np.int64]:
-    """Blocks at which the contact was new, because a slip or even sliding ended there; in time order."""
+    """Blocks at which a slip or even sliding ended, so that the contact was new; in time order."""
     slid = [segment.last for segment in commands.segments if segment.still]
     sign = np.sign(commands.drive)
     turns = [0, *(np.flatnonzero(np.diff(sign)) + 1).tolist(), len(sign)]

@@ -1,7 +1,7 @@
-"""Predicted signals as the sensors show them: with the sensor effects of the library, and small lags that no manifest states.
+"""Sensors of a prediction: the sensor effects of the library, and small lags that no manifest states.
 
-The plant's kernel has the same effects, sample by sample. Here they act on the 1 ms grid after the kernel, so a trial of a sensor
-effect needs no simulation. A slip lasts tens of blocks, so the grid resolves a lag far below 1 ms.
+The plant's kernel applies the same effects to each sample. Here they are applied to blocks of 1 ms after the kernel, so a trial
+of a sensor effect needs no simulation. A slip lasts tens of blocks, so the blocks resolve a lag far below 1 ms.
 """
 
 import math
@@ -27,19 +27,19 @@ class SensorChain(NamedTuple):
     position_delay_s: float = 0.0
     position_scale: float = 1.0
     drive_slope: float = 0.0  # relative error of the drive's displacement sensor against the slide's, at position 0
-    drive_bow_per_m: float = 0.0  # change of this error along the track
-    accel_lowest_Hz: float = 0.0  # corner of the high-pass that every piezoelectric accelerometer has
+    drive_bow_per_m: float = 0.0  # change of `drive_slope` along the track
+    accel_lowest_Hz: float = 0.0  # corner of the high-pass of a piezoelectric accelerometer
     accel_rolled_off: float = 0.0  # the accelerometer's gain is 1 / sqrt(1 + accel_rolled_off (f / 10 kHz)^2)
 
 
 def sensed(signals: Signals, frequency_Hz: Floats, effects: Effects, chain: SensorChain) -> Signals:
-    """Predicted signals as a chain with these sensor effects would show them; new arrays, [blocks] each.
+    """Predicted signals behind a measuring chain with sensor effects; new arrays, [blocks] each.
 
     Args:
         signals: all of the grid's signals, [blocks] each.
-        frequency_Hz: of the commanded vibration, [blocks].
-        effects: only the sensor effects among them act.
-        chain: of the measurement.
+        frequency_Hz: frequency of the commanded vibration, [blocks].
+        effects: effects of the model; only sensor effects are applied.
+        chain: the measuring chain.
 
     """
     result = dict(signals)
@@ -98,16 +98,16 @@ def _force_offset_N(effects: Effects, t_s: Floats) -> Floats:
 
 
 def delayed(values: Floats, delay_s: float) -> Floats:
-    """`values` [blocks] later by `delay_s` (of any sign): a cubic through four blocks; constant beyond the ends.
+    """`values` [blocks], delayed by `delay_s` (of any sign): a cubic through four blocks; constant beyond the ends.
 
     Linear interpolation would also smooth, as a slow sensor does: by up to 0.125 ms2 of `spring bend`. A delay and two equal
     low-passes with a total of 1 ms differ by only 0.25 ms2.
     """
     if delay_s == 0.0:
         return values
-    whole = math.floor(delay_s / BLOCK_S)
-    f = delay_s / BLOCK_S - whole
-    later, earlier = max(whole + 2, 0), max(1 - whole, 0)
+    shift = math.floor(delay_s / BLOCK_S)
+    f = delay_s / BLOCK_S - shift
+    later, earlier = max(shift + 2, 0), max(1 - shift, 0)
     padded = np.concatenate([np.full(later, values[0]), values, np.full(earlier, values[-1])])
     weights = (
         -f * (f - 1.0) * (f - 2.0) / 6.0,
@@ -115,7 +115,7 @@ def delayed(values: Floats, delay_s: float) -> Floats:
         -(f + 1.0) * f * (f - 2.0) / 2.0,
         (f + 1.0) * f * (f - 1.0) / 6.0,
     )
-    starts = range(later - whole + 1, later - whole - 3, -1)
+    starts = range(later - shift + 1, later - shift - 3, -1)
     terms = (weight * padded[start : start + len(values)] for weight, start in zip(weights, starts, strict=True))
     return sum(terms, np.zeros(len(values)))
 
@@ -123,7 +123,7 @@ def delayed(values: Floats, delay_s: float) -> Floats:
 def low_pass(values: Floats, lag_s: float) -> Floats:
     """First-order low-pass of `values` [blocks] by the trapezoidal rule, which is exact up to the second derivative.
 
-    A low-pass that is exact for straight lines between blocks would also smooth: by another 0.08 ms2 of `spring bend`.
+    A low-pass that is exact for straight lines between blocks would smooth by another 0.08 ms2 of `spring bend`.
     """
     if lag_s < 1e-9:
         return values

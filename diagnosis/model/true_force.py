@@ -1,6 +1,6 @@
-"""The true force on a force-driven axis, where the force sensor's effects and the chain's delays hide the input.
+"""The true force on a force-driven axis, from the measured force, the force sensor's effects and the chain's delays.
 
-`sensor_chain.sensed` turns a true force into a measured one; this file goes the other way.
+This is the inverse of `sensor_chain.sensed`.
 """
 
 import numpy as np
@@ -12,12 +12,12 @@ from diagnosis.features.segments import CommandedRun
 from diagnosis.model.rig import Effects
 from diagnosis.model.sensor_chain import SensorChain, delayed, true_force_N
 
-# Standard deviation of the smoothing before the force's rate undoes a low-pass. Too small: noise; too large: smeared reversals.
+# Standard deviation of the smoothing of the rate that inverts a low-pass. Too small: noise; too large: smeared reversals.
 _DERIVATIVE_S = 2e-3
 
 
 def relative(chain: SensorChain) -> SensorChain:
-    """The same chain with all delays relative to the position sensor: along a measured motion only their difference shows."""
+    """The chain with all delays relative to the position sensor: along a measured motion only their difference shows."""
     return chain._replace(force_delay_s=chain.force_delay_s - chain.position_delay_s, position_delay_s=0.0)
 
 

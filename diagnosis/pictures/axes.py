@@ -1,4 +1,4 @@
-"""Labels of residuals and variables, and the variable that a residual is drawn over where no effect gives it."""
+"""Labels of residuals and variables, and the default variable over which each residual is drawn."""
 
 from typing import Final, NamedTuple
 

@@ -22,7 +22,7 @@ def slips_of(signals: Signals, segment: Segment, scales: Scales) -> SegmentSlips
 def breakaways(rig: RigTable, run: Prepared, scales: Scales) -> tuple[Floats, dict[str, Floats]]:
     """Breakaway forces less the rig's static friction [N], and the variables that they could depend on; [breakaways] each.
 
-    The variables go by name with unit. Segments under vibration are left out, as vibration lowers the breakaway force.
+    The names of the variables contain the unit. Segments under vibration are left out, as vibration lowers the breakaway force.
     """
     above: list[float] = []
     at: list[int] = []

@@ -1,7 +1,7 @@
 """Relations between channels that hold for any friction, and one relation with the friction law; no fit, no simulation.
 
-A relation that fails shows which part of the rig or of the measurement is not as described. The variable over which it fails
-shows the effect. Every residual comes with its noise: the measured noise of the channels, and the errors of ordinary sensors.
+A relation that fails shows which part of the rig or of the measurement differs from its description. The variable over which it
+fails shows the effect. Every residual has a noise: the measured noise of the channels, and the errors of ordinary sensors.
 """
 
 import math
@@ -26,29 +26,31 @@ from diagnosis.pictures.derivatives import (
 )
 from diagnosis.relations.relation import kept_blocks
 
-# Error that an ordinary measuring chain makes in each relation, as a share of the signal in the relation (rms, or peak to peak in
-# `_spring`). Too small: good sensors stand out; too large: an effect does not. Displacement sensors are linear to 0.2 to 0.4 % in
+# Error of an ordinary measuring chain in each relation, as a share of the signal in the relation (rms, or peak to peak in
+# `_spring`). Too small: good sensors stand out; too large: effects do not. Displacement sensors are linear to 0.2 to 0.4 % in
 # slope, a force channel lags by 40 us (0.35 % of a slip on the paper's spring), a displacement channel by up to 200 us (1.8 %),
 # and an accelerometer that begins at 0.5 Hz loses 1 % of a slip.
 _SPRING_SHARE = 0.002
 _CURVATURE_SHARE = 0.012
 _MOTION_SHARE = 0.04
 _DRIVE_SHARE = 0.002
-_ROUGH_SHARE = 0.006  # of the friction: scatter of a rough surface along the track
+_ROUGH_SHARE = 0.006  # scatter of the friction on a rough surface, as a share of the friction
 _EXCITER_SHARE = 0.01
 _ROLLED_OFF = 0.5  # roll-off of ordinary accelerometers, see `accel_rolled_off` in `diagnosis.model.sensor_chain`
-_VIBRATION_BLOCKS = 20  # blocks that make one point of the exciter's relation
-_SLIDES_FROM = 2.0  # Stribeck velocities from which the friction law holds; below, presliding decides the force
-_EDGE_MARGIN = 3.0  # standard deviations of the smoothing, kept away from the edges of a slip
+_VIBRATION_BLOCKS = 20  # blocks for each point of the exciter's relation
+_SLIDES_FROM = (
+    2.0  # lowest speed at which the friction law holds, in Stribeck velocities; below, presliding sets the force
+)
+_EDGE_MARGIN = 3.0  # distance from the edges of a slip, in standard deviations of the smoothing
 
 
 class Residual(NamedTuple):
-    """One relation along a run. Arrays are [points]; every array of `over` belongs to `values`."""
+    """Residual of a relation along a run. Arrays are [points]."""
 
     name: str  # spring, curvature, motion, exciter, drive, friction
     values: Floats  # 0 where the relation holds, in the unit of the relation
-    noise: float  # one standard deviation
-    over: dict[str, Floats]  # variables that could explain it, by name with unit
+    noise: float  # standard deviation of the noise
+    over: dict[str, Floats]  # variables that could explain the residual, by name with unit
 
     @property
     def rms(self) -> float:
@@ -57,7 +59,7 @@ class Residual(NamedTuple):
 
 
 def parity_residuals(rig: RigTable, run: Prepared) -> tuple[Residual, ...]:
-    """The residuals that the channels of a run allow, with the numbers of `rig` (best: of the baseline)."""
+    """The residuals that can be computed from the channels of a run; `rig` should hold the numbers of the baseline."""
     residuals: list[Residual | None] = []
     if rig.drive == "spring":
         residuals += [_spring(rig, run), _curvature(rig, run), _exciter(run), _drive(rig, run)]
@@ -84,12 +86,12 @@ def _residual(
     """A residual without the blocks around changes of command.
 
     Args:
-        name: of the relation.
-        rig: for the variables of `over`.
-        run: for the commands and the variables.
-        values: of the residual, [blocks].
+        name: name of the relation.
+        rig: rig for the variables of `over`.
+        run: run with the commands and the variables.
+        values: the residual, [blocks].
         noise: the relation applied to measured noise, [blocks].
-        more: errors of ordinary sensors that the measured noise does not hold, one standard deviation.
+        sensor_error: standard deviation of sensor errors that the measured noise does not hold.
         without_vibration: whether blocks under vibration are left out too.
 
     """
@@ -167,21 +169,21 @@ def _drive(rig: RigTable, run: Prepared) -> Residual | None:
         at = np.arange(segment.first, segment.last)[kept[segment.first : segment.last]]
         if len(at) > 100:
             path_m = run.signals["drive_position_m"][at]
-            # a parabola takes out the bow of the displacement sensor
+            # subtracting a parabola removes the bow of the displacement sensor
             values[at] = path_m - np.polynomial.Polynomial.fit(at, path_m, 2)(at)
     noise = _noise_signals(run)["drive_position_m"]
-    travel_m = float(np.median(np.abs(run.commands.drive)))  # in a second
-    # a drive that rests in the log has only rounding noise: `RESOLVED_M`
+    travel_m = float(np.median(np.abs(run.commands.drive)))  # travel in a second
+    # a logged drive at rest has only rounding noise, below `RESOLVED_M`
     return _residual("drive", rig, run, values, noise, max(_DRIVE_SHARE * travel_m, RESOLVED_M))
 
 
 def _exciter(run: Prepared) -> Residual | None:
     commands = run.commands
     on = kept_blocks(run) & (commands.frequency_Hz > 0.0)
-    whole = int(on.sum()) // _VIBRATION_BLOCKS * _VIBRATION_BLOCKS
-    if "base_shake_mps2" not in run.signals or whole == 0:
+    count = int(on.sum()) // _VIBRATION_BLOCKS * _VIBRATION_BLOCKS
+    if "base_shake_mps2" not in run.signals or count == 0:
         return None
-    at = np.flatnonzero(on)[:whole]
+    at = np.flatnonzero(on)[:count]
 
     def mean(values: npt.NDArray[np.floating]) -> Floats:
         return values[at].reshape(-1, _VIBRATION_BLOCKS).mean(axis=1)
@@ -208,7 +210,7 @@ def _friction(rig: RigTable, run: Prepared) -> Residual | None:
     if "drive_force_N" not in has or not {"mass_accel_mps2", "mass_position_m"} & has:
         return None
 
-    # an accelerometer shows the edges of a slip; a displacement that is differentiated twice needs smoothing
+    # an accelerometer resolves the edges of a slip; a displacement that is differentiated twice needs smoothing
     smooth = 1.0 if "mass_accel_mps2" in has else smoothing_blocks(rig)
 
     def relation(signals: Signals) -> Floats:
@@ -223,7 +225,7 @@ def _friction(rig: RigTable, run: Prepared) -> Residual | None:
         return None
     velocity_mps = over["velocity_mps"]
     values = relation(run.signals) - friction_law(rig, velocity_mps)
-    # at rest the contact bears any force below the static friction; close to rest presliding decides, not the friction law
+    # at rest the contact carries any force below the static friction; close to rest presliding sets the force
     sliding = np.abs(velocity_mps) > _SLIDES_FROM * rig.stribeck_velocity_mps
     inner = minimum_filter1d(sliding, 2 * math.ceil(_EDGE_MARGIN * max(smooth, 0.4 * smoothing_blocks(rig))) + 1)
     # under vibration the friction law does not hold

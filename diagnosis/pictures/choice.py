@@ -1,18 +1,18 @@
-"""The pictures of a diagnosis: measured cycles over predicted ones, and residuals over the variable that explains them."""
+"""The pictures of a diagnosis: measured and predicted cycles, and residuals over the variable that explains them."""
 
 from diagnosis.gap.problem import Point, Problem
 from diagnosis.pictures.cycles import ShownSegment, Version, force_picture, most_telling, slip_difference, slip_picture
 from diagnosis.pictures.residuals import Overlay, residual_pictures
 from diagnosis.result import Picture
 
-_MOST_RUNS = 5  # runs with a picture of a cycle
-_SLIP_DIFFERS = 0.03  # relative difference of two mean slips from which a close-up is drawn; below, it shows nothing
+_MOST_RUNS = 5  # most runs with a picture of a cycle
+_SLIP_DIFFERS = 0.03  # smallest relative difference of two mean slips for which a close-up is drawn
 
 
 def pictures(
     problem: Problem, nominal: Point, baseline: Point, named: Point | None, effects: tuple[str, ...]
 ) -> tuple[Picture, ...]:
-    """At most ten pictures: the most telling segment of each run, slips in close-up where they differ, residuals.
+    """At most ten pictures: the segment of each run that differs most, slips in close-up where they differ, residuals.
 
     Args:
         problem: the runs to show.

@@ -1,4 +1,4 @@
-"""Measured cycles laid over predicted ones, for the segment of each run in which they differ most."""
+"""Measured and predicted cycles in one picture, for the segment of each run in which they differ most."""
 
 from typing import Literal, NamedTuple
 
@@ -15,12 +15,12 @@ from diagnosis.pictures.breakaways import slips_of
 from diagnosis.result import Curve, Picture
 
 Style = Literal["measured", "nominal", "retuned", "effect"]
-_POINTS = 700  # of a curve
+_POINTS = 700  # points of a curve
 _AXES = {"drive_force_N": "drive force [N]", "mass_accel_mps2": "acceleration of the mass [m/s²]"}
 
 
 class Version(NamedTuple):
-    """The signals of one run, [blocks] each, as measured or as one model predicts them."""
+    """The signals of a run, [blocks] each: measured, or predicted by a model."""
 
     label: str
     style: Style
@@ -32,7 +32,7 @@ class ShownSegment(NamedTuple):
 
     run: Prepared
     segment: Segment
-    versions: tuple[Version, ...]  # the measured one first
+    versions: tuple[Version, ...]  # measured signals first
     difference: float
 
 
@@ -42,15 +42,15 @@ def most_telling(run: Prepared, versions: tuple[Version, ...], scales: Scales) -
     best = ShownSegment(run, run.commands.segments[0], versions, -1.0)
     for segment in run.commands.segments:
         difference = _difference(versions[0].signals, baseline.signals, segment, scales)
-        # where any detail decides whether or when the slide slips, a difference means little
-        if segment.at_the_edge or not _cycles_there(versions[0].signals, segment, scales):
+        # where small details decide whether or when the slide slips, a difference means little
+        if segment.at_the_edge or not _is_regular(versions[0].signals, segment, scales):
             difference *= 0.3
         if difference > best.difference:
             best = ShownSegment(run, segment, versions, difference)
     return best
 
 
-def _cycles_there(signals: Signals, segment: Segment, scales: Scales) -> bool:
+def _is_regular(signals: Signals, segment: Segment, scales: Scales) -> bool:
     """Whether the segment has no slip, or two or more."""
     return "drive_force_N" not in signals or len(slips_of(signals, segment, scales).tops) != 1
 
@@ -76,7 +76,7 @@ def _summary(signals: Signals, segment: Segment, scales: Scales) -> Floats:
 
 
 def force_picture(shown: ShownSegment, scales: Scales) -> Picture:
-    """The mean cycle, from slip to slip, where every version has one; else the signal over time."""
+    """The mean cycle, from slip to slip, if every version has two slips; else the signal over time."""
     name = "drive_force_N" if "drive_force_N" in shown.run.signals else "mass_accel_mps2"
     # with a force drive the force is not a saw tooth, and its phase follows the measured motion
     if name == "drive_force_N" and shown.segment.drive_velocity_mps != 0.0:
@@ -88,9 +88,9 @@ def force_picture(shown: ShownSegment, scales: Scales) -> Picture:
             title = f"{_place(shown)}: {cycles} from slip to slip"
             return Picture("cycle", title, "time after the middle of the slip [ms]", _AXES[name], tuple(curves))
         if max(counts) == min(counts) == 1 or (shown.segment.first and min(counts)):
-            # the phase of stick-slip is chance, so the first slips are aligned
+            # the phase of stick-slip is random, so the first slips are aligned
             zeros = [float(slip.middles[0]) for slip in slips]
-            title = f"{_place(shown)}: first slips laid on each other"
+            title = f"{_place(shown)}: first slips aligned"
             curves = [
                 _over_time(version, name, shown, zero) for version, zero in zip(shown.versions, zeros, strict=True)
             ]
@@ -119,7 +119,7 @@ def slip_picture(shown: ShownSegment, name: str, scales: Scales) -> Picture | No
 
 
 def slip_difference(shown: ShownSegment, name: str, scales: Scales) -> float:
-    """Difference of measurement and baseline in the mean slip, relative to the slip; 0 where one of them does not slip."""
+    """Difference of measurement and baseline in the mean slip, relative to the slip; 0 if one of them does not slip."""
     picture = slip_picture(shown, name, scales)
     if picture is None:
         return 0.0
@@ -142,12 +142,12 @@ def _whole_cycle(version: Version, slips: SegmentSlips) -> Curve:
 
 
 def _over_time(version: Version, name: str, shown: ShownSegment, zero: float | None) -> Curve:
-    """A whole segment over time: in the run [s], or with `zero` after this block [ms]."""
+    """All of a segment over the time in the run [s]; with `zero`, over the time since this block [ms]."""
     segment = shown.segment
     values = version.signals[name][segment.first : segment.last]
     block = max(len(values) // _POINTS, 1)
-    whole = len(values) // block * block
-    mean = values[:whole].reshape(-1, block).mean(axis=1)
+    kept = len(values) // block * block
+    mean = values[:kept].reshape(-1, block).mean(axis=1)
     at = segment.first + (np.arange(len(mean), dtype=np.float64) + 0.5) * block
     x = at * BLOCK_S if zero is None else (at - zero) * BLOCK_S * 1e3
     return Curve(version.label, x, mean, version.style)

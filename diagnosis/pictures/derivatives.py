@@ -1,4 +1,4 @@
-"""Motion of the mass and the spring of a reduced run, from the channels that it has; smooth derivatives on the 1 ms grid."""
+"""Motion of mass and spring of a reduced run from its channels; smooth derivatives on the 1 ms grid."""
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -13,9 +13,9 @@ from diagnosis.model.sensor_chain import low_pass
 # Standard deviation of the smoothing, as a share of a slip. Too small: noise of the second derivative; too large: slips are cut.
 # 0.14 is 5 ms on the paper's spring, where a slip keeps 90 % of its acceleration.
 _SMOOTH_SHARE = 0.14
-_SMOOTH_FREE = 5.0  # blocks, with a force drive, where no slip gives a time scale
+_SMOOTH_FREE = 5.0  # standard deviation with a force drive [blocks], where no slip gives a time scale
 _FIRST_SHARE = 0.4  # share of this smoothing for a first derivative, which needs less
-_SLOW_S = 0.08  # time constant of a high-pass at 2 Hz: accelerometers show nothing slower than 0.5 Hz
+_SLOW_S = 0.08  # time constant of a high-pass at 2 Hz: accelerometers may begin at 0.5 Hz
 _MOVES_MPS = 2e-3  # speed above which the mass has moved; a slip of the paper's rig reaches 22 mm/s
 
 
@@ -34,7 +34,7 @@ def derivative(values: Floats, smooth_blocks: float) -> Floats:
 def second_derivative(values: Floats, smooth_blocks: float) -> Floats:
     """Smoothed second derivative of `values` [blocks], in their unit per s2; 0 at the ends.
 
-    By differences: the truncated kernel of a smoothed derivative would keep a part of an offset of 0.5 m.
+    It uses differences: the truncated kernel of a smoothed derivative would keep a part of an offset of 0.5 m.
     """
     smooth = gaussian_filter1d(values, smooth_blocks, mode="nearest")
     result = np.zeros_like(smooth)
@@ -48,7 +48,7 @@ def without_slow(values: Floats) -> Floats:
 
 
 def with_drive_path(run: Prepared) -> Signals:
-    """The signals, with the commanded path in place of a drive position that was not measured."""
+    """The signals, with the commanded path in place of a missing drive position."""
     if "drive_position_m" in run.signals:
         return run.signals
     path_m = np.cumsum(run.commands.drive) * BLOCK_S
@@ -56,7 +56,7 @@ def with_drive_path(run: Prepared) -> Signals:
 
 
 def motion(rig: RigTable, run: Prepared) -> dict[str, Floats]:
-    """Variables that a residual can be drawn over, by name with unit, [blocks] each; those that the channels allow."""
+    """Variables over which a residual can be drawn, by name with unit, [blocks] each, as far as the channels give them."""
     signals = run.signals
     blocks = len(run.commands.drive)
     over: dict[str, Floats] = {"time_s": (np.arange(blocks, dtype=np.float64) + 0.5) * BLOCK_S}
@@ -75,7 +75,7 @@ def motion(rig: RigTable, run: Prepared) -> dict[str, Floats]:
             extension_m = drive_m - position_m
             force_N = signals.get("drive_force_N")
             if force_N is not None:
-                # the zero of the extension is not known: chosen so that the spring law holds on average
+                # the zero of the extension is unknown, and chosen so that the spring law holds on average
                 extension_m = extension_m - extension_m.mean() + force_N.mean() / (rig.drive_stiffness_N_per_m or 1.0)
             over["extension_m"] = extension_m
             over["extension_rate_mps"] = derivative(extension_m, smooth_first)

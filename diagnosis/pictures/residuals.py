@@ -1,4 +1,4 @@
-"""Residuals drawn over the variable that explains them; the named effect decides which residual and which variable."""
+"""Residuals drawn over the variable that explains them; the named effect selects the residual and the variable."""
 
 from typing import NamedTuple
 
@@ -16,15 +16,15 @@ from diagnosis.pictures.channel_relations import parity_residuals
 from diagnosis.pictures.cycles import Style
 from diagnosis.result import Curve, Picture
 
-_ROUNDING = 1e-3  # rms in units of the noise, up to which a residual is rounding: a drive that was logged as commanded
-_CLOUD = 900  # points of a measured cloud
-_BINS = 50  # of a mean line
-_BINS_OF_A_TRACK = 160  # of a mean line over a position: on a track of 15 mm a ripple of 1 mm still shows
-_FEWEST = 3  # points that a bin needs
+_ROUNDING = 1e-3  # largest rms of rounding, in units of the noise: the logged drive position is the commanded one
+_CLOUD = 900  # most points of a measured cloud
+_BINS = 50  # bins of a mean line
+_BINS_OF_A_TRACK = 160  # bins of a mean line over a position: on a track of 15 mm a ripple of 1 mm still shows
+_FEWEST = 3  # fewest points of a bin
 
 
 class Overlay(NamedTuple):
-    """A model to compare the measured residual with: its predicted signals by file."""
+    """A model that is compared with the measured residual: its predicted signals by file."""
 
     label: str
     style: Style
@@ -34,18 +34,18 @@ class Overlay(NamedTuple):
 class _Series(NamedTuple):
     x: Floats
     y: Floats
-    rms: float  # in units of the noise
+    rms: float  # rms in units of the noise
 
 
 def residual_pictures(
     rig: RigTable, runs: list[Prepared], scales: Scales, models: list[Overlay], effects: tuple[str, ...]
 ) -> list[Picture]:
-    """One or two pictures for each named effect, then of the residuals with the largest rms; without effects, two.
+    """One or two pictures for each named effect, then pictures of the residuals with the largest rms; two without effects.
 
     Args:
-        rig: with the numbers of the baseline.
-        runs: measured.
-        scales: of the rig.
+        rig: rig with the numbers of the baseline.
+        runs: the measured runs.
+        scales: scales of the rig.
         models: predictions to compare with, for every run.
         effects: the named effects.
 
@@ -106,7 +106,7 @@ def _picture(rig: RigTable, runs: list[Prepared], scales: Scales, models: list[O
     title = TITLES[name]
     measured = _all(rig, runs, scales, over)
     if variable == "time_s" or name == "spring":
-        # time and the zero of an extension are of one run: only the run with the largest residual is drawn
+        # time and the zero of an extension differ from run to run, so only the run with the largest residual is drawn
         worst = max(range(len(runs)), key=lambda i: measured[i].rms)
         runs, measured = [runs[worst]], [measured[worst]]
         title += f" ({runs[0].file.rsplit('.', 1)[0]})"

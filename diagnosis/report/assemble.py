@@ -35,8 +35,8 @@ from diagnosis.verdict.lookalikes import imitators
 from diagnosis.verdict.selection import Contest
 
 R = TypeVar("R")
-# Share of a run in which speed or vibration may change without a finding. Smaller: the ramps of a drive and a piezo raise the
-# finding. Larger: most of a run is left out of the comparison without a finding.
+# Largest share of a run with changing speed or vibration without a finding. Smaller: ordinary ramps of drive and piezo cause the
+# finding. Larger: most of a run may be left out of the comparison without a finding.
 _MUCH_CHANGING = 0.2
 
 
@@ -52,7 +52,7 @@ def assembled(
     """The diagnosis of an evidence, still without its relations and without sentences.
 
     Args:
-        evidence, runs: the evidence as read, and all its runs, held-out runs among them.
+        evidence, runs: the evidence, and all its prepared runs, including held-out runs.
         contest: all fits, and the verdict over them.
         outcome: the final verdict, after the held-out runs.
         tried: the library's trials.
@@ -92,7 +92,9 @@ def assembled(
     leaders = [fit for fit in (verdict.named or baseline, verdict.runner_up) if fit is not None]
     if verdict.outside:
         if any(run.pick_up for run in evidence.runs):
-            following = Experiment(UNCOUPLE, "No effect of the library makes the force signal vibrate so.", None)
+            following = Experiment(
+                UNCOUPLE, "No effect of the library makes such a vibration of the force signal.", None
+            )
         else:
             following = Experiment(SINE, "Every effect of the library shakes the base with a sine.", None)
     else:
@@ -160,12 +162,12 @@ def _judged(contest: Contest, outcome: Confirmation, held_out: HeldOut, tried: l
 
 
 def _changing(runs: list[Prepared]) -> Iterator[Finding]:
-    """A finding for every run of which too little is compared because speed or vibration keep changing."""
+    """A finding for every run in which speed or vibration change too much of the time to be compared."""
     for run in runs:
         seconds, length_s = run.commands.changing_s, len(run.commands.drive) * BLOCK_S
         if seconds > _MUCH_CHANGING * length_s:
             text = f"in {seconds:.3g} of {length_s:.3g} s speed or vibration change within {SHORTEST_S:g} s: not compared there"
-            yield Finding("changing", f"{run.file}: commands", f"{text}; hold each one longer")
+            yield Finding("changing", f"{run.file}: commands", f"{text}; hold each command longer")
 
 
 def _shrinkage(who: str, closed: GapLeft) -> Shrinkage:
@@ -178,7 +180,7 @@ def _cells_left(fitter: Fitter, fit: Fit) -> list[Cell]:
 
 
 def _cells(floor: Floor, z: Floats) -> list[Cell]:
-    """Cells with their squared differences above the floor; with all of them where no cell is above the floor."""
+    """Cells with their squared differences above the floor; if no cell is above the floor, with their squared differences."""
     squares = cell_squares(floor, z)
     above = np.maximum(squares - floor.level**2, 0.0)
     shares = above if above.sum() > 0.0 else squares
@@ -190,7 +192,7 @@ def _cells(floor: Floor, z: Floats) -> list[Cell]:
 
 
 def _vibrating(evidence: Evidence) -> list[Cell]:
-    """Cells for vibrations that no model makes: sizes in ordinary vibrations, where other cells count in floors."""
+    """Cells for vibrations that no model makes; their unit is the reported limit, as the floor is the unit of other cells."""
     vibrations = [
         (signal, run.file, vibration)
         for run in evidence.runs
@@ -219,7 +221,7 @@ def _candidate(name: str, probability: float, fit: Fit | None) -> Candidate:
 def estimate_of(coordinate: Coordinate, w: float, deviation: float) -> Estimate:
     """A parameter with its 90 % interval, from the value of its coordinate and that value's standard deviation."""
     value, half = coordinate.value(w), 1.645 * deviation
-    if is_phase(coordinate.name):  # half a turn either way at most, and no wrap where an end passes pi
+    if is_phase(coordinate.name):  # at most half a turn to either side, without wrapping at pi
         half = min(half * coordinate.scale, math.pi)
         return Estimate(value, (value - half, value + half))
     low, high = sorted((coordinate.value(w - half), coordinate.value(w + half)))

@@ -1,4 +1,4 @@
-"""The latent friction's part of an answer: shares, sizes, and causes that these runs cannot separate."""
+"""Latent friction in an answer: shares, sizes, and causes that these runs cannot separate."""
 
 from collections.abc import Sequence
 
@@ -12,12 +12,12 @@ from diagnosis.result import Diagnosis, RelationRow, Remainder, Share
 from diagnosis.verdict.by_latent import MOST
 from plant.effects.library import EFFECTS
 
-_LEAST_SHARE = 0.02  # share from which a process is reported
-_MOST_IN_SENTENCE = 3  # processes in a sentence
+_LEAST_SHARE = 0.02  # smallest share of a cause that is reported
+_MOST_IN_SENTENCE = 3  # most causes in a sentence
 
 
 def latent_shares(latent: Sequence[LatentSignal]) -> tuple[Share, ...]:
-    """The shares of every signal as the contract has them."""
+    """The shares of every signal, in the format of the diagnosis."""
     return tuple(
         Share(signal.signal, share.what, share.share, None if share.what == NOISE else share.interval_90, share.null_90)
         for signal in latent
@@ -35,7 +35,7 @@ def latent_rows(latent: Sequence[LatentSignal]) -> tuple[RelationRow, ...]:
 
 
 def latent_remainder(latent: Sequence[LatentSignal]) -> Remainder | None:
-    """The largest scatter that follows no variable."""
+    """The largest scatter that depends on no variable."""
     if not latent:
         return None
     worst = max(latent, key=lambda signal: signal.left)
@@ -44,8 +44,8 @@ def latent_remainder(latent: Sequence[LatentSignal]) -> Remainder | None:
 
 
 def latent_findings(latent: Sequence[LatentSignal]) -> tuple[Finding, ...]:
-    """Signals in which a dependence on place cannot be separated from a dependence on time."""
-    text = "no place is passed twice, so a dependence on place cannot be separated from one on time"
+    """A finding for each signal in which a dependence on position cannot be separated from a dependence on time."""
+    text = "no position is passed twice, so a dependence on position cannot be separated from a dependence on time"
     return tuple(Finding("one-pass", signal.signal, text) for signal in latent if not signal.revisited)
 
 

@@ -1,4 +1,4 @@
-"""The report of a diagnosis: one HTML file that needs no other file, with the answer first."""
+"""The report of a diagnosis: a single HTML file that needs no other file, with the answer first."""
 
 import math
 from collections.abc import Iterable
@@ -32,11 +32,11 @@ class GapBar(NamedTuple):
     label: str
     value: float
     width: float
-    style: str  # of `diagnosis.report.page_plots`
+    style: str  # a style of `diagnosis.report.page_plots`
 
 
 class MapRow(NamedTuple):
-    """One row of the map: the place of a cell, and its share of the gap in every run (None where a run has no such cell)."""
+    """A row of the map: signal, regime and band, and their share of the gap in every run (None: the run has no such cell)."""
 
     signal: str
     regime: str
@@ -45,7 +45,7 @@ class MapRow(NamedTuple):
 
 
 class RigRow(NamedTuple):
-    """One number of the rig, in words.
+    """A number of the rig, as text.
 
     `shift_sd` is the refitted less the described number, in tolerances; None for a number that is known exactly or not finite.
     """
@@ -58,9 +58,9 @@ class RigRow(NamedTuple):
 
 
 def write_report(diagnosis: Diagnosis, evidence_name: str, path: Path, files: Iterable[Path] = ()) -> None:
-    """Write the report to `path`, whole or not at all; at its foot are the hashes of `files`, which the evidence is.
+    """Write the report to `path`, completely or not at all; its footer has the hashes of `files`, the evidence's files.
 
-    Raises OSError when it cannot be written, or one of the files not be read.
+    Raises OSError when it cannot be written, or a file cannot be read.
     """
     write_whole(path, report_page(diagnosis, evidence_name, provenance(files).footer()))
 
@@ -105,7 +105,7 @@ def report_page(diagnosis: Diagnosis, evidence_name: str, footer: str = "") -> s
 
 
 def gap_bars(gap: Gap, named: bool) -> list[GapBar]:
-    """Bars for the rig as described, the baseline, and the named effect if there is one; a gap of NaN has no width."""
+    """Bars for the rig as described, the baseline, and the named effect if there is one; the width of NaN is 0."""
     bars = [("the rig as described", gap.nominal, "nominal"), ("baseline", gap.retuned, "retuned")]
     if named:
         bars.append(("with the best explanation", gap.with_effect, "effect"))
@@ -131,7 +131,7 @@ def _widest(gap: Gap) -> float:
 
 
 def where_map(cells: tuple[Cell, ...]) -> tuple[list[str], list[MapRow], float]:
-    """The runs, the rows above `_SMALL`, and the summed share of the rows that were left out."""
+    """The runs, the rows above `_SMALL`, and the total share of the rows that are left out."""
     runs = sorted({cell.file for cell in cells})
     table: dict[tuple[str, str, tuple[float, float]], dict[str, float]] = {}
     for cell in cells:
@@ -156,7 +156,7 @@ def _cell_in_words(cell: Cell) -> str:
 
 
 def _place(regime: str) -> tuple[int, str]:
-    """The place of a regime in the order of a cycle; unknown regimes come last."""
+    """Sort key of a regime in the order of a cycle; unknown regimes are last."""
     return (_REGIMES.index(regime) if regime in _REGIMES else len(_REGIMES), regime)
 
 

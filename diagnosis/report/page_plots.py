@@ -1,4 +1,4 @@
-"""The pictures of a diagnosis as PNG inside the page, together small enough for a mail."""
+"""The pictures of a diagnosis as PNG inside the page, with a total size that fits into a mail."""
 
 import math
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _DPI = 110.0
-# Bytes of base64 for all pictures. Larger: the page grows beyond 5 MB and mail servers refuse it. Smaller: coarse pictures.
+# Most bytes of base64 for all pictures. Larger: the page exceeds 5 MB and mail servers refuse it. Smaller: coarse pictures.
 _ALL_BYTES = 3_500_000
 # the bars in page.css have the same colours; line styles differ as well, for readers who do not see the colours
 _STYLES: Final[dict[str, dict[str, Any]]] = {
@@ -33,7 +33,7 @@ class Drawn(NamedTuple):
 
 
 def draw(pictures: tuple[Picture, ...]) -> list[Drawn]:
-    """Draw every picture; all together take at most 3.5 MB, so many pictures are drawn with fewer pixels."""
+    """Draw every picture, with fewer pixels if their total size would exceed 3.5 MB."""
     dpi = _DPI
     while True:
         drawn = [Drawn(picture.title, picture.kind, png(_figure(picture), dpi)) for picture in pictures]

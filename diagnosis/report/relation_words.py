@@ -24,7 +24,7 @@ def number_lines(diagnosis: Diagnosis) -> list[str]:
 
 
 def sizes_in_words(row: RelationRow) -> str:
-    """Residuals of a relation as described, refitted and with its causes, and its noise."""
+    """Residuals of a relation for the described rig, the refitted rig and with its causes; and its noise."""
     described, refitted, left, noise = (
         _size(size, row.unit) for size in (row.described, row.refitted, row.left, row.noise)
     )
@@ -39,7 +39,7 @@ def _size(size: float, unit: str) -> str:
 
 
 def share_in_words(share: Share) -> str:
-    """One share with its interval, and the share that chance alone reaches."""
+    """A share with its interval, and the share that chance alone reaches."""
     text = f"{share.what} {_percent(share.share)}"
     if known := _between(share.interval_90):
         text += f" (90 %: {known})"
@@ -59,13 +59,12 @@ def remainder_in_words(remainder: Remainder) -> str:
     size, noise = _size(remainder.size, remainder.unit), _size(remainder.noise, remainder.unit)
     if not remainder.what:
         return f"largest remainder: {size} in the {remainder.where}, where noise is {noise}: no pattern"
-    what = remainder.what.removeprefix("over ")
-    how = f"{remainder.what}" if remainder.what.startswith(("over ", "in ")) else f"({what})"
+    how = f"{remainder.what}" if remainder.what.startswith(("over ", "in ")) else f"({remainder.what})"
     return f"{size} remain in the {remainder.where} {how}, where noise is {noise}: nothing in the library"
 
 
 def number_in_words(number: RelationNumber) -> str:
-    """A number of the rig as a relation shows it."""
+    """A number of the rig, fitted by a relation."""
     word, unit = name_and_unit(number.name)
     low, high = number.interval_90
     factor, shown = prefixed(max(abs(number.refitted), abs(number.described)), unit)
@@ -76,6 +75,6 @@ def number_in_words(number: RelationNumber) -> str:
 
 
 def rig_number_in_words(number: RigNumber) -> str:
-    """A number of the rig as the fits have it."""
+    """A number of the rig in the fits."""
     word, unit = name_and_unit(number.name)
     return f"{word} {quantity(number.retuned, unit)}, described {quantity(number.described, unit)}"

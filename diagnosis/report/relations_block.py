@@ -1,4 +1,4 @@
-"""The relations' part of an answer: shares of the difference, the remainder, refitted numbers, one picture."""
+"""Relations in an answer: shares of the difference, the remainder, refitted numbers, a picture."""
 
 from collections.abc import Sequence
 
@@ -23,7 +23,7 @@ from diagnosis.result import (
 )
 
 _SIGNALS = {"spring": "spring relation", "motion": "motion relation", "drive": "drive relation"}
-_POINTS = 1500  # of a curve
+_POINTS = 1500  # most points of a curve
 _TWO_SIDED_90 = 1.645
 
 
@@ -63,7 +63,7 @@ def with_relations(
 
 
 def signal_of(relation: str) -> str:
-    """The name of a relation as the contract of the diagnosis has it."""
+    """The name of a relation in the format of the diagnosis."""
     return _SIGNALS.get(relation, relation)
 
 
@@ -71,7 +71,7 @@ def in_a_line(decision: Decision) -> str:
     """The decision of the relations as a progress message; empty without a decision."""
     if decision.outside:
         first = decision.outside[0]
-        return f"{signal_of(first.relation)}: {first.what}, which nothing in the library makes"
+        return f"{signal_of(first.relation)}: {first.what}, which no effect of the library causes"
     if decision.decided:
         first = decision.decided[0]
         return f"{signal_of(first.relation)}: {first.cause}"
@@ -132,7 +132,7 @@ def _numbers(answered: Answered, rig: RigTable) -> list[RelationNumber]:
 
 
 def _pictures(relations: Relations, runs: list[Prepared]) -> list[Picture]:
-    """The relation that leaves most above its noise, with and without its causes, over time."""
+    """The residual that exceeds its noise most, with and without its causes, over time."""
     if not relations.answered:
         return []
     worst = max(relations.answered, key=lambda answered: answered.refitted / answered.noise)

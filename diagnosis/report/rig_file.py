@@ -31,7 +31,7 @@ RIG_BEGINS = "# Written by `stickslip diagnose` "
 
 
 def write_rig(diagnosis: Diagnosis, evidence: Evidence, path: Path) -> None:
-    """Write the corrected rig to `path`, whole or not at all; `stickslip run --rig` reads it.
+    """Write the corrected rig to `path`, completely or not at all; `stickslip run --rig` reads it.
 
     Raises Fault CONFIG where the diagnosis gives no rig that the plant can simulate, OSError when the file cannot be written.
     """
@@ -63,7 +63,7 @@ def rig_table(diagnosis: Diagnosis, evidence: Evidence) -> dict[str, Any]:
     """The corrected rig as the tables of a rig file, named after the evidence's folder."""
     values = {name: value for name, value in evidence.rig.values().items() if value is not None}
     values |= {parameter.name: parameter.retuned for parameter in diagnosis.rig}
-    # The two forces are refitted one by one and may cross; the plant refuses a static force below the Coulomb force.
+    # The two forces are refitted independently and may cross; the plant refuses a static force below the Coulomb force.
     values["static_force_N"] = max(values["static_force_N"], values["coulomb_force_N"])
     table: dict[str, Any] = {"name": f"{_word(evidence.folder.name)}-diagnosed"}
     for name, (part, key) in _PLACES.items():
@@ -112,5 +112,5 @@ def _line(key: str, value: float | str) -> str:
 
 
 def _word(text: str) -> str:
-    """A folder's name without the characters that a quoted name or a comment cannot hold."""
+    """A folder's name, with dashes in place of characters that a quoted name or a comment cannot hold."""
     return "".join(letter if letter.isprintable() and letter not in '"\\' else "-" for letter in text) or "evidence"

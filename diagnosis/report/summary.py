@@ -12,8 +12,10 @@ from diagnosis.report.words import EFFECT_WORDS, closed_between, closed_in_words
 from diagnosis.result import Diagnosis
 from diagnosis.verdict.held_out import MORE_THAN_RIGHT
 
-_WORSE = 1.1  # times the gap as described from which a refit makes held-out runs worse, and not by chance
-_SMALL_SHARE = 0.05  # of the gap: regimes with less are not reported
+_WORSE = (
+    1.1  # gap of the baseline over the gap as described from which a refit makes held-out runs worse, not by chance
+)
+_SMALL_SHARE = 0.05  # smallest share of the gap of a regime that is reported
 
 
 def summary(diagnosis: Diagnosis) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""A diagnosis from relations and latent friction alone, for runs that no fit can compare or a budget too short for a fit."""
+"""A diagnosis from relations and latent friction alone, if no fit can compare the runs or the budget is too short."""
 
 import math
 import time
@@ -19,12 +19,12 @@ LONGER = Experiment("Diagnose the same runs with a longer --budget.", "No effect
 
 
 def comparable(runs: list[Prepared]) -> bool:
-    """Whether any run that is fitted has a stretch that simulated fits can compare."""
+    """Whether any fitted run has a segment that simulated fits can compare."""
     return any(run.commands.segments for run in runs if not run.holdout)
 
 
 def unfitted() -> Verdict:
-    """The verdict before anything is known: all explanations alike."""
+    """The verdict before any result: all explanations have the same probability."""
     names = (*EFFECTS, "none", "unexplained")
     return Verdict(
         "unexplained",

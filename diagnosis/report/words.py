@@ -13,7 +13,7 @@ EFFECT_WORDS: Final = {name: row.words for name, row in CATALOGUE.items()} | {
     "none": "the rig as described, inside its tolerances, is enough",
     "unexplained": "there is a gap, and nothing in the library closes it",
 }
-_BELOW_0: Final = {("drive-hardening", "ratio"): "a softening"}  # by effect and parameter
+_BELOW_0: Final = {("drive-hardening", "ratio"): "a softening"}  # text for negative values, by effect and parameter
 
 
 def headline(diagnosis: Diagnosis) -> str:
@@ -28,7 +28,7 @@ def is_undecided(diagnosis: Diagnosis) -> bool:
 
 
 def answer(diagnosis: Diagnosis) -> str:
-    """The answer in one line, without the word of the verdict."""
+    """The answer in one line, without the verdict."""
     if diagnosis.verdict == "no-gap":
         if is_undecided(diagnosis):
             return f"the fitted runs show no gap, but the held-out runs are {times(diagnosis.gap.retuned)} noise floors off"
@@ -45,30 +45,30 @@ def answer(diagnosis: Diagnosis) -> str:
         return f"{names} explains a part of the difference; the rest is not explained"
     sure = sum(candidate.probability for candidate in diagnosis.candidates if candidate.effect in diagnosis.effects)
     others = [name for group in diagnosis.not_distinguishable if {*group} & {*diagnosis.effects} for name in group]
-    others = [fromkey for fromkey in dict.fromkeys(others) if fromkey not in diagnosis.effects]
+    others = [name for name in dict.fromkeys(others) if name not in diagnosis.effects]
     alike = f"; or {', '.join(others)}, which would explain these runs nearly as well" if others else ""
     return f"{names}, probability {percent(sure)}{alike}"
 
 
 def closed_in_words(share: float) -> str:
-    """Share of the gap that is closed, in percent, 100 at most: a fit below the noise floor closes the whole gap, not more."""
+    """Share of the gap that is closed, in percent; at most 100, also for a fit below the noise floor."""
     return percent(min(share, 1.0))
 
 
 def closed_between(interval_90: tuple[float, float] | None) -> str:
-    """`43 to 100 %` for the interval of such a share; empty where it is not known."""
+    """The interval of a closed share, such as `43 to 100 %`; empty if it is not known."""
     return interval(interval_90 and (min(interval_90[0], 1.0), min(interval_90[1], 1.0)))
 
 
 def who_in_words(who: str) -> str:
-    """A model that is compared on the held-out runs, in the glossary's word; an effect keeps its name."""
+    """Name of a model that is compared on the held-out runs, by the glossary; an effect keeps its name."""
     return "baseline" if who == PARAMETERS else who
 
 
 def estimate_in_words(effect: str, name: str, estimate: Estimate) -> str:
     """A parameter in words, such as `gap 81 µm (90 %: 76 to 86)`; an interval that is not finite is left out.
 
-    A number below 0 whose effect is named after the opposite gets the right word, such as "a softening".
+    A negative number whose effect is named after the opposite gets an explanation, such as "a softening".
     """
     word, unit = name_and_unit(name)
     low, high = estimate.interval_90

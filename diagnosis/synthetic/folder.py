@@ -1,7 +1,7 @@
-"""Evidence folders made from the plant: a rig as its owner describes it, and measurements of the drawn rig.
+"""Evidence folders made from the plant: a described rig, and measurements of the drawn rig.
 
-The two rigs differ as any rig differs from its description: rig numbers within their tolerances, a rough surface, a measuring
-chain, the start of a run; and by the effects of the case. The folder holds the description and the measurements, nothing else.
+The two rigs differ like any rig from its description: rig numbers within their tolerances, a rough surface, a measuring chain,
+the start of a run; and by the effects of the case. The folder holds only the description and the measurements.
 """
 
 import math
@@ -23,7 +23,7 @@ from plant.config import RigConfig
 
 Numbers = Mapping[str, float | str]
 
-TOLERANCES: Mapping[str, float] = {  # relative, one standard deviation; a damping of 0 has none
+TOLERANCES: Mapping[str, float] = {  # relative standard deviations; a damping of 0 has no tolerance
     "mass_kg": 0.005,
     "drive_stiffness_N_per_m": 0.02,
     "contact_stiffness_N_per_m": 0.05,
@@ -32,10 +32,10 @@ TOLERANCES: Mapping[str, float] = {  # relative, one standard deviation; a dampi
     "static_force_N": 0.03,
     "stribeck_velocity_mps": 0.10,
 }
-_MOST_DEVIATION = 3.0  # tolerances that a rig number is drawn away at most; a larger deviation is a gap
+_MOST_DEVIATION = 3.0  # largest deviation of a drawn rig number, in tolerances; a larger deviation is a gap
 _LEAST_STATIC = 1.02  # least static friction, in Coulomb forces; below, the slide does not stick
-_PAPER_STATIC_N = 17.38  # static friction of the paper's first pair, to which the noise of the force belongs
-# A slower record would give the plant too few samples in a block of 1 ms: the plant then runs faster and is averaged.
+_PAPER_STATIC_N = 17.38  # static friction of the paper's first pair, to which the noise of the force is scaled
+# A lower rate would give the plant too few samples in a block of 1 ms: the plant is then oversampled and averaged.
 _FASTEST_BLOCK_HZ = 4000.0
 _OVERSAMPLED_HZ = 20_000.0  # rate of the plant in that case
 
@@ -44,14 +44,14 @@ class Case(NamedTuple):
     """A synthetic evidence to make."""
 
     protocol: str = "ladder"
-    effects: Mapping[str, Numbers] = {}  # as `[effects]` of a rig file
-    rig: RigConfig | None = None  # as described; None: the paper's, or with the protocol "force" a linear axis
+    effects: Mapping[str, Numbers] = {}  # table `[effects]` of a rig file
+    rig: RigConfig | None = None  # described rig; None: the paper's rig, or with the protocol "force" a linear axis
     tolerances: Mapping[str, float] = TOLERANCES
-    leave_out: tuple[str, ...] = ()  # columns
-    rate_Hz: float = 20_000.0  # a force-driven axis is sampled with its control, at 1 kHz
-    drawn: bool = True  # False: the true parameters are the described ones
-    spread: float = 1.0  # standard deviation of the drawn rig numbers, in tolerances; none is drawn beyond three
-    rough: bool = True  # False: the friction is the same everywhere on the track
+    leave_out: tuple[str, ...] = ()  # columns that are not written
+    rate_Hz: float = 20_000.0  # sampling rate; a force-driven axis is sampled with its control, at 1 kHz
+    drawn: bool = True  # False: the true parameters equal the described parameters
+    spread: float = 1.0  # standard deviation of the drawn rig numbers, in tolerances; cut off at three tolerances
+    rough: bool = True  # False: the friction is constant along the track
 
 
 def paper_rig() -> RigConfig:
@@ -81,9 +81,9 @@ def axis_rig() -> RigConfig:
 
 
 def make_evidence(folder: Path, case: Case, seed: int, progress: Callable[[float], None] = lambda _share: None) -> None:
-    """Make an evidence folder; the same case and seed give the same bytes. `progress` hears the share of the runs done.
+    """Make an evidence folder; the same case and seed give the same bytes. `progress` is called with the share of finished runs.
 
-    Raises ValueError when the protocol is unknown or the rate does not fit, and Fault CONFIG when the rig cannot be.
+    Raises ValueError when the protocol is unknown or the rate does not fit, and Fault CONFIG when the rig is not valid.
     """
     if case.protocol not in {*PROTOCOLS, FORCE_PROTOCOL}:
         known = ", ".join((*PROTOCOLS, FORCE_PROTOCOL))
@@ -150,7 +150,7 @@ def _draw_rig(random: np.random.Generator, described: RigConfig, table: RigTable
     average = round(rate_Hz / case.rate_Hz)
     if abs(average * case.rate_Hz - rate_Hz) > 1e-6 or abs(rate_Hz / 1000.0 % 1.0) > 1e-9:
         raise ValueError(f"rate_Hz = {case.rate_Hz:g}: must be whole kHz, or divide {_OVERSAMPLED_HZ:g} Hz")
-    # drawn for every name, used or not, so that other tolerances do not change the rest of the rig
+    # drawn for every name, so that other tolerances do not change the rest of the rig
     drawn = {name: random.standard_normal() for name in TOLERANCES}
     true = dict(table.values())
     for name, share in table.tolerance.items():

@@ -1,17 +1,17 @@
 """Protocols: the runs of a synthetic evidence folder, by name.
 
-Two lengths of drive travel decide a stick-slip run with the paper's pair: the spring turns from +17 N to -17 N over 2.9 mm, and
-one period takes about 0.5 mm. So a dwell lasts 0.25 s at 2 mm/s, 1 s at 0.5 mm/s and 5 s at 0.1 mm/s.
+Two lengths of drive travel determine a stick-slip run with the paper's pair: the spring turns from +17 N to -17 N over 2.9 mm,
+and a period takes about 0.5 mm. So a dwell lasts 0.25 s at 2 mm/s, 1 s at 0.5 mm/s and 5 s at 0.1 mm/s.
 """
 
 from typing import Final, NamedTuple
 
 _RAMP_S = 0.05  # duration of a change of velocity
-_AMPLITUDE_M = 2e-8  # of the vibration, as in the paper
+_AMPLITUDE_M = 2e-8  # amplitude of the vibration in the paper
 
 
 class Vibration(NamedTuple):
-    """Command to the piezo from a time on; an amplitude of 0 is off."""
+    """Command to the piezo from a time on; an amplitude of 0 turns it off."""
 
     from_s: float
     frequency_Hz: float
@@ -19,17 +19,17 @@ class Vibration(NamedTuple):
 
 
 class RunPlan(NamedTuple):
-    """One run with a spring drive."""
+    """A run with a spring drive."""
 
     velocity: tuple[tuple[float, float], ...]  # points [s, m/s], linear in between; one point: constant
     vibration: tuple[Vibration, ...] = ()
     duration_s: float = 10.0
     holdout: bool = False
-    track: int = 0  # runs with the same number start at the same place
+    track: int = 0  # runs with the same number start at the same position
 
 
 class AxisPlan(NamedTuple):
-    """One run of a force-driven axis: the position follows a sum of sines, [amplitude m, frequency Hz] each."""
+    """A run of a force-driven axis: the position follows a sum of sines, [amplitude m, frequency Hz] each."""
 
     sines: tuple[tuple[float, float], ...]
     duration_s: float = 12.0
@@ -80,7 +80,7 @@ PROTOCOLS: Final[dict[str, tuple[RunPlan, ...]]] = {
         RunPlan(_constant(0.0005), _vibration((2.0, 3000.0)), track=2),
         RunPlan(_constant(0.001), _vibration((2.0, 2000.0)), holdout=True, track=3),
     ),
-    # as on the paper's stand: the slide goes back to the same place before each run
+    # the paper's procedure: the slide returns to the same position before each run
     "paper": (
         RunPlan(_constant(0.0005)),
         RunPlan(_constant(0.0005), _vibration((4.0, 2000.0))),
@@ -96,7 +96,7 @@ PROTOCOLS: Final[dict[str, tuple[RunPlan, ...]]] = {
 }
 
 FORCE_PROTOCOL: Final = "force"
-# fast and long; fast and short; slow, with the contact sticking at the turns; and a mixture, held out. Peaks of 0.04 to 0.16 m/s.
+# fast and long; fast and short; slow, with a stick at each turn; and a mixture, held out. Peak speeds of 0.04 to 0.16 m/s.
 AXIS_PLANS: Final[tuple[AxisPlan, ...]] = (
     AxisPlan(((0.1, 0.25),)),
     AxisPlan(((0.02, 1.0),)),

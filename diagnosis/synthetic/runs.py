@@ -1,4 +1,4 @@
-"""One run of a synthetic rig: from a random start, through its plan, to the columns of its file."""
+"""Simulation of a run of a synthetic rig: from a random start, by its plan, to the columns of its file."""
 
 import math
 from typing import Any, NamedTuple
@@ -19,7 +19,7 @@ from plant.simulate import run_blocks
 
 Columns = dict[str, npt.NDArray[Any]]
 
-_SAME_PLACE_M = 2e-5  # standard deviation of the place at which a run starts
+_SAME_PLACE_M = 2e-5  # standard deviation of the position at which a run starts
 _PRIMER_M = 1e-15  # amplitude that turns the exciter's phase without moving the rig
 
 
@@ -28,12 +28,12 @@ class DrawnRig(NamedTuple):
 
     config: RigConfig
     chain: DrawnChain
-    rate_Hz: float  # of the simulation
-    average: int  # samples of the simulation that make one sample of the record
+    rate_Hz: float  # sampling rate of the simulation
+    average: int  # samples of the simulation in each sample of the record
 
 
 def spring_run(random: np.random.Generator, rig: DrawnRig, plan: RunPlan, start_m: float) -> Columns:
-    """Drag the slide through a spring, from about `start_m` on; the columns of the run, [samples] each, SI units."""
+    """Drag the slide by a spring, from about `start_m` on; return the columns of the run, [samples] each, SI units."""
     params, state = build(rig.config)
     blocks = round(plan.duration_s / BLOCK_S)
     force_N = random.uniform(0.3, 0.95) * float(params[0].F_c)
@@ -59,7 +59,7 @@ def spring_run(random: np.random.Generator, rig: DrawnRig, plan: RunPlan, start_
 
 
 def axis_run(random: np.random.Generator, rig: DrawnRig, plan: AxisPlan) -> Columns:
-    """Let a motor with a PD controller move the mass to and fro; the columns of the run, [samples of the controller] each.
+    """Move the mass to and fro by a motor with a PD controller; return the columns, [samples of the controller] each.
 
     The force of a sample acts from the time of that sample to the next.
     """
@@ -75,7 +75,7 @@ def axis_run(random: np.random.Generator, rig: DrawnRig, plan: AxisPlan) -> Colu
         swing_m += size_m * np.sin(2.0 * math.pi * frequency_Hz * t_s + random.uniform(0.0, 2.0 * math.pi))
     # the motion starts from rest without a jerk
     wanted_m = middle_m + swing_m * np.square(np.sin(0.5 * math.pi * np.minimum(t_s / 1.5, 1.0)))
-    omega = 2.0 * math.pi * 3.0  # of the closed loop, well damped
+    omega = 2.0 * math.pi * 3.0  # natural frequency of the closed loop, well damped
     stiffness_N_per_m, damping_Ns_per_m = float(p.m * omega * omega), float(1.4 * p.m * omega)
     limit_N = 0.8 * float(p.force_range_N)
     samples = round(rig.rate_Hz * BLOCK_S)
@@ -95,7 +95,7 @@ def axis_run(random: np.random.Generator, rig: DrawnRig, plan: AxisPlan) -> Colu
 
 
 def _at_rest(random: np.random.Generator, params: Any, state: Any, force_N: float, position_m: float) -> None:
-    """Set the state to a slide at rest under a spring force, with all other states (springs, sensors, delays) to match."""
+    """Set the state to a slide at rest under a spring force, consistent with springs, sensors and delays."""
     p, s = params[0], state[0]
     s.x, s.z = position_m, force_N / p.k_t
     s.age_s = random.uniform(1.0, 30.0)
@@ -109,7 +109,7 @@ def _at_rest(random: np.random.Generator, params: Any, state: Any, force_N: floa
 
 
 def _primed(random: np.random.Generator, frequency_Hz: Floats, amplitude_m: Floats) -> tuple[Floats, Floats]:
-    """The commands to the piezo, with a block of `_PRIMER_M` before each start, which turns the phase by a random angle."""
+    """The commands to the piezo, with a block of `_PRIMER_M` before each start, which shifts the phase by a random angle."""
     commanded_Hz, commanded_m = frequency_Hz.copy(), amplitude_m.copy()
     for start in np.flatnonzero((amplitude_m[1:] > 0.0) & (amplitude_m[:-1] == 0.0)):
         commanded_Hz[start] = random.uniform(0.5, 1.5) / BLOCK_S

@@ -1,6 +1,6 @@
 """Effects of a real rig that the nominal rig lacks: off by default, and then without any trace in the results.
 
-By the place where an effect acts, each with its forms, its numbers in the records and its formulas in one file:
+One file per place where effects act, with their forms, their numbers in the records and their formulas:
 
 friction, friction_memory            level of the friction; ageing and lag
 drive, structure, piezo, sensors     all other effects

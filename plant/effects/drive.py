@@ -1,9 +1,9 @@
 """Effects of the drive: its spring, its damping, and the ripple of its motion.
 
 Sources: hardening and ripple as in Armstrong-Helouvry, Dupont & Canudas de Wit 1994; once a turn of a screw: the travel variation
-v_2pi of ISO 3408-3. Under load: a compliance c (1 + s w(angle)) between screw and drive, as its nut or thrust bearing has where
-it sits askew, gives way by F_d c s w more, so where F_d changes little within a turn the drive's velocity swings by a share
-F_d c s 2 pi / wavelength: it grows with the load, and an unloaded drive runs evenly.
+v_2pi of ISO 3408-3. Form `load`: a nut or thrust bearing that sits askew is a compliance c (1 + s w(angle)) between screw and
+drive. Its uneven part yields by F_d c s w. Where F_d changes little within a turn, the drive's velocity swings by a share
+F_d c s 2 pi / wavelength: the swing grows with the load, and an unloaded drive runs evenly.
 """
 
 import math
@@ -14,9 +14,9 @@ from bridge.layouts import PlantParams
 from plant.effects.row import WAVE_SHAPE, Effect, Formula, Parameter, one_form, ratio, wave_shape
 from plant.effects.waves import TWO_PI, wave
 
-_EVENED = 200  # rounds with half steps: whole steps diverge if the speed more than doubles
-_HALVINGS = 44
-MOST_UNEVEN: Final = 0.95  # of the velocity's ripple: a drive does not stop
+_EVENED = 200  # rounds of `even_m` with half steps: whole steps diverge if the speed more than doubles
+_HALVINGS = 44  # rounds of `extension_m`: 10 / 2^44 is 6e-13
+MOST_UNEVEN: Final = 0.95  # largest relative ripple of the velocity; below 1, so that the drive never stops
 
 
 @kernel
@@ -55,18 +55,18 @@ def extension_m(p: PlantParams, force_N: float) -> float:
 
     The softest spring, bilinear with a ratio of -0.9, is extended ten times as far.
     """
-    found_m = 0.0
+    result_m = 0.0
     step_m = 10.0 * force_N / p.k_d + math.copysign(0.5 * p.gap_m, force_N)
     for _ in range(_HALVINGS):
         step_m *= 0.5
-        if math.fabs(spring_N(p, found_m + step_m)) < math.fabs(force_N):
-            found_m += step_m
-    return found_m
+        if math.fabs(spring_N(p, result_m + step_m)) < math.fabs(force_N):
+            result_m += step_m
+    return result_m
 
 
 @kernel
 def unevenness(p: PlantParams, t_s: float, even_m: float, force_N: float) -> float:
-    """Velocity of an uneven drive under a drive force, over the velocity of an even drive that is at `even_m`."""
+    """Velocity of an uneven drive under a drive force, divided by the velocity of an even drive at `even_m`."""
     turns = p.ripple_frequency_Hz * t_s
     if p.ripple_wavelength_m > 0.0:
         turns = even_m / p.ripple_wavelength_m
@@ -82,15 +82,15 @@ def even_m(p: PlantParams, drive_m: float) -> float:
     The errors are the integral of the velocity's ripple over the even position, without a mean. Those under load depend on the
     forces so far and are left out: they change `drive_m` by at most ratio wavelength / 2 pi.
     """
-    found_m = drive_m
+    result_m = drive_m
     if p.ripple_wavelength_m > 0.0:
         per_rad_m = p.ripple_wavelength_m / TWO_PI
         for _ in range(_EVENED):
-            sin = math.sin(found_m / per_rad_m + p.ripple_phase_rad)
-            cos = math.cos(found_m / per_rad_m + p.ripple_phase_rad)
+            sin = math.sin(result_m / per_rad_m + p.ripple_phase_rad)
+            cos = math.cos(result_m / per_rad_m + p.ripple_phase_rad)
             error = p.ripple_cos_2 * sin * cos - cos - 0.5 * p.ripple_sin_2 * (2.0 * cos * cos - 1.0)
-            found_m += 0.5 * (drive_m - p.ripple_ratio * per_rad_m * error - found_m)
-    return found_m
+            result_m += 0.5 * (drive_m - p.ripple_ratio * per_rad_m * error - result_m)
+    return result_m
 
 
 def _set_damping(p: Any, form: str, value: dict[str, float]) -> None:
@@ -148,7 +148,7 @@ DRIVE: Final = {
         "drive",
         {
             "cubic": Formula(
-                "k_d e (1 + ratio (e / 1 mm)^2); a softening one yields at its largest force",
+                "k_d e (1 + ratio (e / 1 mm)^2); a softening spring yields at its largest force",
                 (ratio(0.05, -0.2, 10.0),),
             ),
             "bilinear": Formula(
@@ -181,7 +181,7 @@ DRIVE: Final = {
                 (_UNEVEN, Parameter("frequency_Hz", 1e-3, 1e3, 1.0), *WAVE_SHAPE),
             ),
             "load": Formula(
-                "as screw, with ratio |F_d| / F_s for ratio, 0.95 at most: the screw gives way, and unloaded it is even",
+                "as screw, with ratio |F_d| / F_s (at most 0.95) in place of ratio: without load the drive runs evenly",
                 (_UNEVEN, _PITCH, *WAVE_SHAPE),
             ),
         },

@@ -26,7 +26,7 @@ def level(p: PlantParams, t_s: float, x: float, v_r: float, load_sin: float, loa
         result *= max(1.0 + p.load_ratio * load, 0.0)
     if p.roughness_ratio != 0.0:
         result *= max(1.0 + p.roughness_ratio * smooth_noise(x / p.roughness_length_m, p.roughness_seed), 0.0)
-    # the model has no slide that lifts off; and the product of two negative factors is not friction
+    # above 0: the slide never lifts off, and two negative factors must not make friction
     return max(result * (1.0 + (p.forward_ratio if v_r >= 0.0 else p.backward_ratio)), 0.01)
 
 
@@ -124,8 +124,8 @@ FRICTION: Final = {
                 ),
             ),
             "bumps": Formula(
-                "friction times 1 + ratio exp(-(d / width)^2 / 2), d of wavelength_m from the nearest of the places where "
-                "2 pi x / wavelength_m + phase is a whole turn",
+                "friction times 1 + ratio exp(-(d / width)^2 / 2), d the distance in wavelengths from the nearest place "
+                "where 2 pi x / wavelength_m + phase is a whole turn",
                 (ratio(0.05, -0.9, 0.9), _PLACES, WAVE_SHAPE[0], Parameter("width", 0.01, 0.5, 0.1)),
             ),
             "random": Formula(
@@ -178,7 +178,7 @@ FRICTION: Final = {
                 (ratio(0.05, -0.9, 0.9), Parameter("settling_s", 0.1, 1e4, 5.0)),
             ),
             "session": Formula(
-                "as settling, on from earlier runs: t + before_s for t",
+                "as settling, continued from earlier runs: t + before_s in place of t",
                 (
                     *(ratio(0.05, -0.9, 0.9), Parameter("settling_s", 0.1, 1e4, 15.0)),
                     Parameter("before_s", 0.0, 1e6, 0.0),

@@ -13,7 +13,7 @@ from bridge.layouts import PlantMemory, PlantParams
 from plant.effects.row import Effect, Formula, Parameter, ratio
 
 LONGEST_LAG_S: Final = 0.025  # longest dead time of friction behind the velocity
-LAG_CELL_S: Final = 2e-5  # of the delay line of the speed: 11 cells in a period at 4.5 kHz
+LAG_CELL_S: Final = 2e-5  # time step of the speed's delay line: 11 cells in a period at 4.5 kHz
 _LAG_LINE = round(LONGEST_LAG_S / LAG_CELL_S) + 2  # the cells of the longest lag, the previous and the present cell
 
 
@@ -42,11 +42,11 @@ def late_mps(p: PlantParams, s: PlantMemory, t_s: float, speed_mps: float) -> fl
         s.lag_at += 1
         s.lag_line[s.lag_at % length] = speed_then_mps + (speed_mps - speed_then_mps) * (s.lag_at - last) / (now - last)
     back = now - p.lag_dead_s / LAG_CELL_S
-    whole = math.floor(back)
-    older = s.lag_line[whole % length]
-    if whole >= s.lag_at:  # less than one cell ago
-        return older + (back - whole) / max(now - whole, 1e-9) * (speed_mps - older)
-    return older + (back - whole) * (s.lag_line[(whole + 1) % length] - older)
+    cell = math.floor(back)
+    older = s.lag_line[cell % length]
+    if cell >= s.lag_at:  # less than one cell ago
+        return older + (back - cell) / max(now - cell, 1e-9) * (speed_mps - older)
+    return older + (back - cell) * (s.lag_line[(cell + 1) % length] - older)
 
 
 def _set_ageing(p: Any, _form: str, value: dict[str, float]) -> None:
@@ -91,11 +91,11 @@ _LAG = Effect(
     {
         "time": Formula("the Stribeck curve sees v_r through a first-order lag", (Parameter("lag_s", 0.0, 1.0, 2e-3),)),
         "dead-time": Formula(
-            "a share of it sees |v_r| of delay_s ago",
+            "a share of the Stribeck curve sees |v_r| of delay_s ago",
             (Parameter("delay_s", 0.0, LONGEST_LAG_S, 2e-3), Parameter("share", 0.0, 1.0, 1.0)),
         ),
         "distance": Formula(
-            "a share of it sees |v_r| through a lag over the path slid, and rests while the contact does",
+            "a share of the Stribeck curve sees |v_r| through a lag over the path slid; it holds while the contact rests",
             (Parameter("distance_m", 0.0, 1.0, 3e-6), Parameter("share", 0.0, 1.0, 1.0)),
         ),
     },

@@ -79,7 +79,7 @@ PIEZO: Final = {
         {
             "mount": Formula("amplitude times the gain of a mass on a spring, in place of the rig's mount", _MODE),
             "mode": Formula(
-                "amplitude times |1 + ratio r^2 / (1 - r^2 + 2 i damping_ratio r)|, r = f / resonance_Hz, likewise instead",
+                "amplitude times |1 + ratio r^2 / (1 - r^2 + 2 i damping_ratio r)|, r = f / resonance_Hz, not the rig's mount",
                 (ratio(0.3, 0.0, 10.0), *_MODE),
             ),
         },

@@ -1,4 +1,4 @@
-"""Faults of the sensors: of the force, its gain, zero, lag and delay; of the accelerations, their gain."""
+"""Faults of the sensors: gain, zero, lag and delay of the force; gain of the accelerations."""
 
 import math
 from typing import Any, Final
@@ -7,7 +7,7 @@ from bridge.kernel import kernel
 from bridge.layouts import PlantMemory, PlantParams
 from plant.effects.row import Effect, Formula, Parameter, one_form, ratio
 
-LONGEST_DELAY: Final = 254  # samples; 12.7 ms at 20 kHz
+LONGEST_DELAY: Final = 254  # longest delay of the force [samples]; 12.7 ms at 20 kHz
 LAG_ORDERS: Final = {"first-order": 1, "second-order": 2, "fourth-order": 4}  # low-passes of a slow force sensor
 _DELAY_LINE = LONGEST_DELAY + 2  # the delayed sample, the previous and the present sample
 
@@ -23,10 +23,10 @@ def force_reading_N(p: PlantParams, s: PlantMemory, force_N: float, t_s: float) 
     if p.force_delay_s > 0.0:
         s.delay_line[s.delay_at] = force_N
         back = p.force_delay_s / (p.dt_s * p.steps_per_sample)
-        whole = math.floor(back)
-        newer = s.delay_line[(s.delay_at - int(whole)) % _DELAY_LINE]
-        older = s.delay_line[(s.delay_at - int(whole) - 1) % _DELAY_LINE]
-        force_N = newer + (back - whole) * (older - newer)
+        cells = math.floor(back)
+        newer = s.delay_line[(s.delay_at - int(cells)) % _DELAY_LINE]
+        older = s.delay_line[(s.delay_at - int(cells) - 1) % _DELAY_LINE]
+        force_N = newer + (back - cells) * (older - newer)
         s.delay_at = (s.delay_at + 1) % _DELAY_LINE
     offset_N = p.force_bias_N + p.force_drift_N_per_s * t_s
     if p.force_settling_s > 0.0:
@@ -102,7 +102,7 @@ SENSORS: Final = {
     ),
     "force-sensor-delay": Effect(
         "sensor",
-        one_form("reading comes delay_s later", Parameter("delay_s", 0.0, 0.012, 1e-3)),
+        one_form("reading is delayed by delay_s", Parameter("delay_s", 0.0, 0.012, 1e-3)),
         _set_delay,
         numbers=("force_delay_s",),
         switches=("force_delay_s",),

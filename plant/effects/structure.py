@@ -35,7 +35,7 @@ def frame_gain_mps(
 
 @kernel
 def base_give(dt: float, omega: float, loss: float, base_m_per_N: float) -> float:
-    """Mean velocity of the base over a step per newton of friction [m/(N s)]: of a mass of 1 / (c omega^2)."""
+    """Mean velocity of the base over a step per newton of friction [m/(N s)], for a base of mass 1 / (c omega^2)."""
     return 0.5 * dt * base_m_per_N * omega * omega / (1.0 + loss)
 
 

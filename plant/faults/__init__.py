@@ -1,4 +1,4 @@
-"""Injected faults of sensors, exciter, clock and bus: small objects, with the same numbers for the same seed.
+"""Injected faults of sensors, exciter, clock and bus; the same seed gives the same numbers.
 
     kinds     every kind of fault: its targets, and the meaning of its value
     table     one table `[[fault]]` of a scenario, checked

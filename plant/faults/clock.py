@@ -20,5 +20,5 @@ class ClockFault:
             return
         if self._held_ns is None:
             self._held_ns = t_ns
-        off_ns = {"jump": self._size * 1e9, "fast": self._size * since_s * 1e9}.get(self._kind, self._held_ns - t_ns)
-        message["t_ns"] = max(t_ns + round(off_ns), 0)
+        error_ns = {"jump": self._size * 1e9, "fast": self._size * since_s * 1e9}.get(self._kind, self._held_ns - t_ns)
+        message["t_ns"] = max(t_ns + round(error_ns), 0)

@@ -6,8 +6,8 @@ from typing import Any
 from plant.faults.table import FaultTable
 
 FIELDS = ("delivered_ratio", "mount_resonance_Hz", "mount_damping_ratio", "amplitude_max_m", "amplitude_slew_m_per_s")
-_WARMING_S = 1.0
-_LOOSE_DAMPING = 0.05
+_WARMING_S = 1.0  # time constant of `hot`
+_LOOSE_DAMPING = 0.05  # damping ratio of `resonant`
 
 
 class ExciterFaults:
@@ -23,7 +23,7 @@ class ExciterFaults:
         self._healthy = {name: float(params[name]) for name in FIELDS}
 
     def set(self, faults: list[tuple[FaultTable, float]]) -> None:
-        """`faults`: the acting faults, each with the time since its begin [s]."""
+        """Set the numbers for the acting `faults`, each with the time since its begin [s]."""
         now = dict(self._healthy)
         for table, since_s in faults:
             size = table.size

@@ -8,7 +8,7 @@ from bridge.wire.channels import CHANNELS
 SENSORS, EXCITER, CLOCK, BUS, PROCESS = "sensors", "exciter", "clock", "bus", "process"
 ALL_SENSORS = "sensors"
 LINK = "link"  # both directions
-LARGEST = 3.4e38  # of a sample on the wire
+LARGEST = 3.4e38  # largest sample on the wire, a 32-bit float
 # targets by group
 TARGETS = {
     SENSORS: (*CHANNELS, ALL_SENSORS),
@@ -27,7 +27,7 @@ class InjectionKind(NamedTuple):
     help: str
     value: str = ""  # meaning of the value, with its unit; empty for a kind without value
     default: float | None = None  # None for a kind without value, or if it must be given
-    lowest: float = -math.inf  # of the value
+    lowest: float = -math.inf  # limits of the value
     highest: float = math.inf
 
 
@@ -39,29 +39,33 @@ def _at_least_0(
 
 ALL = (
     InjectionKind(
-        SENSORS, "off", "reads one level: unplugged, or without its supply", "level, in the unit of the channel", 0.0
+        SENSORS, "off", "reads a constant level: unplugged, or without supply", "level, in the unit of the channel", 0.0
     ),
     InjectionKind(SENSORS, "stuck", "holds the sample before the fault"),
     InjectionKind(SENSORS, "frozen", "repeats the block before the fault"),
-    _at_least_0(SENSORS, "garbage", "any number between plus and minus the value", "in the unit of the channel", None),
-    InjectionKind(SENSORS, "scaled", "another gain, another unit; below 0: another sign", "factor", None),
+    _at_least_0(
+        SENSORS, "garbage", "random samples between plus and minus the value", "in the unit of the channel", None
+    ),
+    InjectionKind(SENSORS, "scaled", "a wrong gain or unit; below 0: a wrong sign", "factor", None),
     InjectionKind(SENSORS, "offset", "a constant offset", "in the unit of the channel", None),
     _at_least_0(SENSORS, "delayed", "delayed against the other channels", "s", None, 1.0),
     _at_least_0(SENSORS, "clipped", "limited to plus and minus the value", "in the unit of the channel", None),
     _at_least_0(SENSORS, "nan", "samples that are NaN", "share of the blocks", 1.0, 1.0),
-    InjectionKind(SENSORS, "huge", "one sample of each block", "in the unit of the channel", 3e38),
+    InjectionKind(SENSORS, "huge", "one huge sample in each block", "in the unit of the channel", 3e38),
     InjectionKind(SENSORS, "swapped", "exchanges its samples with another channel; `other` names it"),
     InjectionKind(SENSORS, "drifting", "an offset that grows", "in the unit of the channel, a second", None),
     InjectionKind(
         SENSORS, "fading", "a gain that changes evenly, and stays above 0", "share a second; below 0: weaker", None
     ),
-    InjectionKind(SENSORS, "jumping", "an offset, on and off every 0.1 s", "in the unit of the channel", None),
+    InjectionKind(
+        SENSORS, "jumping", "an offset that switches on and off every 0.1 s", "in the unit of the channel", None
+    ),
     _at_least_0(SENSORS, "noise", "more noise", "sigma, in the unit of the channel", None),
     _at_least_0(SENSORS, "loose", "zero in bursts of about 5 ms", "share of the time", 0.5, 1.0),
     _at_least_0(SENSORS, "coarse", "a coarse resolution", "step, in the unit of the channel", None),
     _at_least_0(SENSORS, "flipped", "one bit of one sample changed", "share of the blocks", 0.01, 1.0),
     _at_least_0(SENSORS, "hum", "a sine of 50 Hz", "amplitude, in the unit of the channel", None),
-    _at_least_0(EXCITER, "weak", "delivers another share of its command; above 1: too much", "factor", 0.1, 20.0),
+    _at_least_0(EXCITER, "weak", "delivers a wrong share of its command; above 1: too much", "factor", 0.1, 20.0),
     _at_least_0(EXCITER, "resonant", "its mount is loose and resonates with a damping of 0.05", "Hz", None),
     _at_least_0(EXCITER, "clipping", "its amplitude is limited by the amplifier", "m", None),
     _at_least_0(EXCITER, "hot", "its share falls to the value, with a time constant of 1 s", "factor", 0.3, 1.0),

@@ -10,7 +10,7 @@ from bridge.wire.messages import sealed, sensor_block
 from bridge.wire.topics import SENSORS
 from plant.faults.table import FaultTable
 
-_CORRUPTED_BYTES = 3
+_CORRUPTED_BYTES = 3  # changed bytes of a corrupted message
 _FOREIGN_RUN = 666  # run number of a forged command
 _MOST_WAITING = 20_000  # messages: ten seconds of both directions
 
@@ -96,7 +96,7 @@ class Line:
 
 
 def _corrupted(payload: bytes, random: np.random.Generator) -> bytes:
-    """Bytes changed, half of the messages cut as well."""
+    """A copy of the message with changed bytes; every second copy, at random, is also cut in half."""
     spoiled = bytearray(payload)
     for at in random.integers(0, len(spoiled), _CORRUPTED_BYTES):
         spoiled[at] ^= int(random.integers(1, 256))

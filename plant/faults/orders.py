@@ -12,17 +12,17 @@ from plant.faults.kinds import PROCESS
 from plant.faults.schedule import Faults
 from plant.faults.table import FaultTable
 
-_LONGEST = 10_000  # bytes of a table; every valid table has fewer than 500
+_LONGEST = 10_000  # longest table [bytes]; every valid table has fewer than 500
 
 
-_REMEMBERED = 64  # orders; a repeated order arrives within a second
+_REMEMBERED = 64  # orders whose ids are stored; a repeated order arrives within a second
 
 
 class Orders:
     """The fault-injection requests to a rig.
 
     Args:
-        faults: of the rig.
+        faults: schedule of the rig's faults, to which requests are added.
 
     """
 
@@ -55,6 +55,6 @@ def _table(text: str) -> FaultTable:
         raise Fault("BAD_MESSAGE", f"{FAULT.name}: fault: is not a JSON object; send a table [[fault]]")
     made = validate(FaultTable, table, FAULT.name)
     if made.group == PROCESS:
-        line = f"{FAULT.name}: target = {made.target}: a rig cannot end a process; must be of sensors, exciter, clock or bus"
+        line = f"{FAULT.name}: target = {made.target}: a rig cannot end a process; must belong to sensors, exciter, clock or bus"
         raise Fault("CONFIG", f"{line}; end the process by its pid")
     return made

@@ -14,7 +14,7 @@ from plant.faults.sensors import SensorFault
 from plant.faults.table import FaultTable
 
 BEGAN, ENDED = "INJECTED", "INJECTION_ENDED"  # codes of the events
-_STREAM = 2  # of the seed; noise and jitter of a rig are unchanged
+_STREAM = 2  # random stream of the faults: noise and jitter of a rig use other streams of its seed
 _NEVER = 1 << 62
 
 
@@ -33,8 +33,8 @@ class Faults:
     """The faults of one rig.
 
     Args:
-        tables: of the scenario.
-        seed: of the rig.
+        tables: faults of the scenario.
+        seed: the rig's seed.
         block_s, samples: length of a block and its samples.
         params: record of `plant.records.PARAMS`; faults of the exciter change some of its numbers.
 
@@ -115,7 +115,7 @@ class Faults:
                     fault.clock.misdate(message[0], self._since_s(fault, block))
 
     def on_the_way(self, direction: str, messages: Sequence[Message], block: int) -> list[Message]:
-        """The messages that arrive in a block of `blocks` or `commands`, after these messages were sent."""
+        """Send `messages` in the direction `blocks` or `commands`; return the messages that arrive in this block."""
         line = self._lines[direction]
         acting = [
             (fault.table, fault.end, fault.random)

@@ -13,7 +13,7 @@ from plant.faults.table import FaultTable
 
 _JUMP_S = 0.1
 _HUM_HZ = 50.0
-_LOOSE_BLOCKS = 5.0  # mean length of a burst
+_LOOSE_BLOCKS = 5.0  # mean length of a burst [blocks]
 
 
 class SensorFault:
@@ -42,7 +42,7 @@ class SensorFault:
 
         Args:
             block: record of a sensor block.
-            since_s: from the fault's begin to the begin of the block.
+            since_s: time from the fault's begin to the begin of the block.
 
         """
         if self._spoil is None:
@@ -65,7 +65,7 @@ class _Channel:
         self.is_off = False
 
     def delayed(self, samples: Floats, _s: float) -> Floats:
-        """By whole samples; until the first has arrived, the channel holds its last value."""
+        """Samples delayed by whole samples; the channel holds its last healthy value until the first one arrives."""
         count = round(self.size / self.sample_s)
         self.line = [np.concatenate([*self.line, samples])]
         missing = max(len(samples) + count - len(self.line[0]), 0)
@@ -75,7 +75,7 @@ class _Channel:
         return shown
 
     def loose(self, samples: Floats, _s: float) -> Floats:
-        """Alternating between two states, so that it is off for `size` of the time."""
+        """Samples, or zeros while the contact is open: for a share `size` of the time, in random bursts."""
         share = min(max(self.size, 1e-6), 1.0 - 1e-6)
         odds = (1.0 - share) if self.is_off else share
         if self.random.random() < odds / (_LOOSE_BLOCKS * max(share, 1.0 - share)):
@@ -83,7 +83,7 @@ class _Channel:
         return np.zeros_like(samples) if self.is_off else samples
 
     def flipped(self, samples: Floats, _s: float) -> Floats:
-        """As on the wire: in a 4-byte number."""
+        """Samples with a random bit of a random sample inverted, as a 4-byte number on the wire."""
         if self.random.random() < self.size:
             carried = samples.astype(np.float32)
             carried.view(np.uint32)[self.random.integers(len(samples))] ^= np.uint32(1 << int(self.random.integers(32)))
@@ -91,7 +91,7 @@ class _Channel:
         return samples
 
     def huge(self, samples: Floats, _s: float) -> Floats:
-        """In the middle of the block."""
+        """Samples with the value in place of the middle sample."""
         samples[len(samples) // 2] = self.size
         return samples
 
@@ -100,7 +100,7 @@ class _Channel:
         return since_s + self.sample_s * np.arange(len(samples))
 
 
-# the samples shown, from the channel, the true samples and the time since the begin of the fault
+# the faulty samples from the fault's state, the true samples and the time since the begin of the fault [s]
 _KINDS: dict[str, Callable[[_Channel, Floats, float], Floats]] = {
     "off": lambda of, true, _: np.full_like(true, of.size),
     "stuck": lambda of, true, _: np.full_like(true, of.before[-1]),

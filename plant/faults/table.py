@@ -15,7 +15,7 @@ class FaultTable(Strict):
     """A fault injected into a run. The rig must be simulated."""
 
     name: str = Field(
-        default="", pattern=r"^[^\x00-\x1f\x7f]*$", description="In events and verdicts; KIND TARGET if not given."
+        default="", pattern=r"^[^\x00-\x1f\x7f]*$", description="Name in events and verdicts; not given: TARGET KIND."
     )
     kind: str = Field(description="Kind of the fault: `stickslip fault --list` lists all kinds.")
     target: str = Field(description="A channel, sensors, exciter, clock, blocks, commands, link, or a process.")
@@ -24,7 +24,7 @@ class FaultTable(Strict):
     )
     for_s: Annotated[float, Field(ge=0, le=_LONGEST_S)] = Field(default=0.0, description="Duration; 0: to the end.")
     value: float | None = Field(default=None, description="Size of the fault; its meaning depends on the kind.")
-    other: str = Field(default="", description="Of `swapped`: the other channel.")
+    other: str = Field(default="", description="For `swapped`: the other channel.")
 
     @model_validator(mode="after")
     def _is_a_fault(self) -> "FaultTable":
@@ -34,26 +34,28 @@ class FaultTable(Strict):
             raise ValueError(f"target = {self.target}: no such target; known: {known}")
         kinds = [kind for of, kind in KINDS if of == group]
         if self.kind not in kinds:
-            raise ValueError(f"kind = {self.kind}: must fit target = {self.target}; known there: {', '.join(kinds)}")
-        made = KINDS[(group, self.kind)]
-        if not made.value:
+            raise ValueError(f"kind = {self.kind}: must fit target = {self.target}; known for it: {', '.join(kinds)}")
+        row = KINDS[(group, self.kind)]
+        if not row.value:
             if self.value is not None:
                 raise ValueError(f"value = {self.value:g}: kind = {self.kind} has none; leave it out")
-        elif self.value is None and made.default is None:
-            raise ValueError(f"value: missing; add it for kind = {self.kind}: {made.value}")
-        elif not made.lowest <= self.size <= made.highest:
-            rule = f"must be {made.lowest:g} to {made.highest:g} for kind = {self.kind} ({made.value})"
+        elif self.value is None and row.default is None:
+            raise ValueError(f"value: missing; add it for kind = {self.kind}: {row.value}")
+        elif not row.lowest <= self.size <= row.highest:
+            rule = f"must be {row.lowest:g} to {row.highest:g} for kind = {self.kind} ({row.value})"
             raise ValueError(f"value = {self.size:g}: {rule}; change the value")
         if group == SENSORS and abs(self.size) > LARGEST:
-            raise ValueError(f"value = {self.size:g}: must be within {LARGEST:g} either way, as a sample is of 32 bits")
+            raise ValueError(f"value = {self.size:g}: must be within {LARGEST:g} either way, as a sample has 32 bits")
         if (self.kind == "swapped") != bool(self.other):
-            raise ValueError(f"other = {self.other!r}: goes with kind = swapped alone; name the other channel")
+            raise ValueError(
+                f"other = {self.other!r}: needed for kind = swapped, and only there; name the other channel"
+            )
         if self.other and (self.other not in CHANNELS or self.target not in CHANNELS or self.other == self.target):
             raise ValueError(f"other = {self.other}: must be another channel than target; known: {', '.join(CHANNELS)}")
         if self.kind == "held" and not self.for_s:
-            raise ValueError("for_s = 0: held messages must arrive some time; give for_s")
+            raise ValueError("for_s = 0: held messages must arrive at some time; give for_s")
         if group == PROCESS and self.kind == "frozen" and not self.for_s:
-            raise ValueError("for_s = 0: a frozen process must continue some time; give for_s, or kind = killed")
+            raise ValueError("for_s = 0: a frozen process must continue at some time; give for_s, or kind = killed")
         return self
 
     @property

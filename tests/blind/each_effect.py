@@ -54,8 +54,12 @@ def _one(kind: str, random: np.random.Generator, ask_oracle: bool) -> dict[str, 
 
         case = made("case", Plan(tuple(effects)))
         bench = Bench(made("rough", Plan()), made("smooth", Plan(smooth=True))) if effects else None
-        limits = [bench.detectability(made(one.name, Plan((one,), smooth=True))) for one in effects] if bench else []
-        said = strict_json(diagnose(load_evidence(case), lambda *_: None))
+        limits = (
+            [bench.detectability(made(effect.name, Plan((effect,), smooth=True))) for effect in effects]
+            if bench
+            else []
+        )
+        verdict = strict_json(diagnose(load_evidence(case), lambda *_: None))
         oracle = shrinkage_with(case, names) if ask_oracle else None
     answer = {
         "stratum": kind if kind in {NONE, TWO} else "one-effect",
@@ -70,7 +74,7 @@ def _one(kind: str, random: np.random.Generator, ask_oracle: bool) -> dict[str, 
         "leave_out": [],
         "cells": [],
     }
-    return {"answer": answer, "said": said, "oracle": oracle}
+    return {"answer": answer, "said": verdict, "oracle": oracle}
 
 
 def _effect(random: np.random.Generator, name: str) -> PlantEffect:
@@ -100,8 +104,10 @@ if __name__ == "__main__":
         cases.append(case)
         if closed is not None:
             oracle[case.name] = closed
-        said = " + ".join(sorted(case.named)) or case.verdict
-        print(f"{len(cases):4d} of {len(work)}  {case.name:45s} {case.detectability:6.2f} limits: {said}", flush=True)
+        verdict = " + ".join(sorted(case.named)) or case.verdict
+        print(
+            f"{len(cases):4d} of {len(work)}  {case.name:45s} {case.detectability:6.2f} limits: {verdict}", flush=True
+        )
     seen = [case for case in cases if case.stratum != "one-effect" or case.detectability >= VISIBLE]
     print(f"\n{len(cases) - len(seen)} single effects of less than {VISIBLE:g} limits are left out.")
     both = [case.set_f1 for case in cases if case.stratum == TWO and case.detectability >= VISIBLE]

@@ -43,7 +43,7 @@ class Sized(NamedTuple):
 def make_set(out: Path, key: Path, name: str, cases: int, seed: int, jobs: int, progress: Progress) -> None:
     """Make a set and its key, both or neither; cases that were made before an interruption stay, with their names.
 
-    The sizes are written beside the key, for `tests/blind/sizes`. Raises Fault CONFIG and OSError.
+    The sizes are written next to the key, for `tests/blind/sizes`. Raises Fault CONFIG and OSError.
     """
     if cases < FEWEST:
         raise Fault("CONFIG", f"--cases {cases}: must be {FEWEST} at least, one of each kind; 200 tell something")
@@ -111,8 +111,8 @@ def made(
     tasks = (
         joblib.delayed(_one)(source, case, folder / name, known.get(case.seed, {})) for name, case in drawn.items()
     )
-    found: Any = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered")(tasks)
-    yield from found
+    cases_made: Any = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered")(tasks)
+    yield from cases_made
 
 
 def _one(source: Generator, case: Drawn, folder: Path, known: Sizes) -> tuple[str, Answer]:
@@ -124,7 +124,7 @@ def _one(source: Generator, case: Drawn, folder: Path, known: Sizes) -> tuple[st
     if case.effects:
         with tempfile.TemporaryDirectory(prefix=f"{folder.name}-", dir=folder.parent) as scratch:
             sizes, cells = sized(source, case, plan, Path(scratch), known)
-        plan = plan._replace(effects=tuple(one.effect for one in sizes))
+        plan = plan._replace(effects=tuple(size.effect for size in sizes))
     source.make(folder, plan, case.seed)
     effects = [
         {
@@ -159,7 +159,7 @@ def sized(
             sizes.append(Sized(effect.scaled(strength), strength, limits))
         else:
             sizes.append(size(lambda one: bench.detectability(made((one,))), effect, target, source.strongest))
-    return sizes, bench.cells(made(tuple(one.effect for one in sizes)))
+    return sizes, bench.cells(made(tuple(size.effect for size in sizes)))
 
 
 def _real(case: Drawn, folder: Path) -> Answer:

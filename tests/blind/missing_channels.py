@@ -46,22 +46,22 @@ parser.add_argument("--seed", type=int, default=1)
 parser.add_argument("--jobs", type=int, default=joblib.cpu_count())
 
 if __name__ == "__main__":
-    told = parser.parse_args()
+    arguments = parser.parse_args()
     counts = {
         missing: dict.fromkeys(("named", "in group", "no gap", "unexplained", "wrong", "sure and wrong"), 0)
         for missing in MISSING
     }
     sizes: dict[str, list[int]] = {missing: [] for missing in MISSING}
-    work = (joblib.delayed(diagnosed)(number, told.seed) for number in range(told.cases))
-    for number, (missing, truth, found) in enumerate(joblib.Parallel(told.jobs, return_as="generator")(work)):
-        group = {*found.effects, *(name for names in found.not_distinguishable for name in names)}
-        said = {"no-gap": "no gap", "unexplained": "unexplained"}.get(found.verdict)
-        if said is None:
-            said = "named" if truth in found.effects else "in group" if truth in group else "wrong"
+    work = (joblib.delayed(diagnosed)(number, arguments.seed) for number in range(arguments.cases))
+    for number, (missing, truth, diagnosis) in enumerate(joblib.Parallel(arguments.jobs, return_as="generator")(work)):
+        group = {*diagnosis.effects, *(name for names in diagnosis.not_distinguishable for name in names)}
+        outcome = {"no-gap": "no gap", "unexplained": "unexplained"}.get(diagnosis.verdict)
+        if outcome is None:
+            outcome = "named" if truth in diagnosis.effects else "in group" if truth in group else "wrong"
             sizes[missing].append(len(group))
-        counts[missing][said] += 1
-        counts[missing]["sure and wrong"] += said == "wrong" and found.candidates[0].probability > SURE
-        print(f"{number:4d}  {missing:28s} {truth:28s} {said:12s} {' or '.join(sorted(group))}", flush=True)
+        counts[missing][outcome] += 1
+        counts[missing]["sure and wrong"] += outcome == "wrong" and diagnosis.candidates[0].probability > SURE
+        print(f"{number:4d}  {missing:28s} {truth:28s} {outcome:12s} {' or '.join(sorted(group))}", flush=True)
     for missing, own in counts.items():
         size = float(np.mean(sizes[missing] or [0]))
-        print(f"{missing}: {', '.join(f'{said} {count}' for said, count in own.items())}; mean group {size:.2f}")
+        print(f"{missing}: {', '.join(f'{outcome} {count}' for outcome, count in own.items())}; mean group {size:.2f}")

@@ -57,12 +57,12 @@ parser.add_argument("--effects", action="store_true", help="one effect each, in 
 parser.add_argument("--jobs", type=int, default=joblib.cpu_count())
 
 if __name__ == "__main__":
-    told = parser.parse_args()
-    work = (joblib.delayed(diagnosed)(number, told.seed, told.effects) for number in range(told.cases))
+    arguments = parser.parse_args()
+    work = (joblib.delayed(diagnosed)(number, arguments.seed, arguments.effects) for number in range(arguments.cases))
     right = 0
-    for number, (truth, found) in enumerate(joblib.Parallel(told.jobs, return_as="generator")(work)):
-        said = " + ".join(found.effects) or ("none" if found.verdict == "no-gap" else found.verdict)
-        groups = [" or ".join(group) for group in found.not_distinguishable if truth in group]
-        right += truth == said
-        print(f"{number:4d}  {truth:28s} {said:40s} {', '.join(groups)}", flush=True)
-    print(f"right: {right} of {told.cases}")
+    for number, (truth, diagnosis) in enumerate(joblib.Parallel(arguments.jobs, return_as="generator")(work)):
+        verdict = " + ".join(diagnosis.effects) or ("none" if diagnosis.verdict == "no-gap" else diagnosis.verdict)
+        groups = [" or ".join(group) for group in diagnosis.not_distinguishable if truth in group]
+        right += truth == verdict
+        print(f"{number:4d}  {truth:28s} {verdict:40s} {', '.join(groups)}", flush=True)
+    print(f"right: {right} of {arguments.cases}")

@@ -1,6 +1,6 @@
 """Faults of a force sensor added to real logs: the rest of the evidence is as measured.
 
-The rig tables describe the clean logs, so a fault differs from them. The clean rigs already have gaps of their own to
+The rig tables describe the clean logs, so a fault differs from them. The clean rigs already have gaps to
 any simple model (docs/quality/results.md): the fault is the largest new gap, and not the only one.
 """
 

@@ -91,8 +91,8 @@ class Bench:
         runs = _runs(folder)
         squares: dict[tuple[str, str, str], float] = defaultdict(float)
         for problem, floor in self._parts:
-            there = _measured(problem, runs, self._described)
-            found = cell_squares(floor, _differences(floor, problem, there))
+            predicted = _measured(problem, runs, self._described)
+            found = cell_squares(floor, _differences(floor, problem, predicted))
             for (signal, regime, _, run), square in zip(cell_names(floor), found.tolist(), strict=True):
                 squares[signal, regime, run] += square
         return [[*cell, round(math.sqrt(total), 3)] for cell, total in squares.items()]
@@ -115,22 +115,22 @@ def _measured(without: Problem, runs: list[Prepared], described: Point) -> Float
     """
     files = {run.file for run in without.runs}
     other = Problem(without.rig, [run for run in runs if run.file in files])
-    there, expected = (
+    predicted, expected = (
         dict(zip(other.labels, values.tolist(), strict=True)) for values in (other.measured, other.predicted(described))
     )
     found: list[float] = []
-    for (file, label), here in zip(without.labels, without.predicted(described).tolist(), strict=True):
-        value = there.get((file, label), math.nan)
-        begun = expected.get((file, label), math.nan) - here
+    for (file, label), value_without in zip(without.labels, without.predicted(described).tolist(), strict=True):
+        value = predicted.get((file, label), math.nan)
+        begun = expected.get((file, label), math.nan) - value_without
         found.append(value - begun if math.isfinite(begun) and label.name not in POWERS else value)
     return np.array(found)
 
 
-def _differences(floor: Floor, without: Problem, there: Floats) -> Floats:
+def _differences(floor: Floor, without: Problem, predicted: Floats) -> Floats:
     """Features [features] less the features of the problem, in floors, [compared]."""
-    here = without.measured
+    measured_without = without.measured
     # `expected` adds noise that measured features hold already, so its bias is subtracted first
-    apart = (floor.expected(there - floor.bias) - floor.expected(here - floor.bias))[floor.compared]
+    apart = (floor.expected(predicted - floor.bias) - floor.expected(measured_without - floor.bias))[floor.compared]
     z = apart / floor.scatter[floor.compared]
-    one_lacks_it = (np.isfinite(there) != np.isfinite(here))[floor.compared]
+    one_lacks_it = (np.isfinite(predicted) != np.isfinite(measured_without))[floor.compared]
     return np.where(np.isfinite(z), z, np.where(one_lacks_it, _APPEARED, 0.0))

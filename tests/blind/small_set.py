@@ -60,7 +60,9 @@ def _write_sizes() -> None:
         for _, answer in made(Independent(RUNS), cases, Path(folder), joblib.cpu_count(), {}):
             answers.append(answer)
             print(
-                f"{len(answers)} of {len(cases)}", [one["detectability"] for one in answer["effects"]], file=sys.stderr
+                f"{len(answers)} of {len(cases)}",
+                [effect["detectability"] for effect in answer["effects"]],
+                file=sys.stderr,
             )
     write_sizes(SIZES, answers)
 

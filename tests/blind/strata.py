@@ -64,11 +64,11 @@ def counts(cases: int, has_outside: bool, real: int) -> dict[str, int]:
         real: number of faults in measured logs.
 
     """
-    found = {name: max(1, round(share * cases)) for name, share in SHARES.items()}
-    found["outside"] *= has_outside
-    found[REAL] = min(found[REAL], real)
-    found["one-effect"] += cases - sum(found.values())
-    return found
+    numbers = {name: max(1, round(share * cases)) for name, share in SHARES.items()}
+    numbers["outside"] *= has_outside
+    numbers[REAL] = min(numbers[REAL], real)
+    numbers["one-effect"] += cases - sum(numbers.values())
+    return numbers
 
 
 def _real_faults() -> int:
@@ -84,7 +84,7 @@ def draw(generator: Generator, cases: int, seed: int) -> list[Drawn]:
     library, outside = generator.library, generator.outside
     source = np.random.default_rng([seed, 0])
     turns = {names: source.permutation(names).tolist() for names in (library, outside) if names}
-    found: list[Drawn] = []
+    drawn_cases: list[Drawn] = []
     faults = source.permutation(_real_faults()).tolist()
     for kind, (stratum, count) in enumerate(counts(cases, bool(outside), len(faults)).items(), 1):
         for number in range(count):
@@ -92,7 +92,7 @@ def draw(generator: Generator, cases: int, seed: int) -> list[Drawn]:
             case = Drawn(stratum, int(random.integers(1 << 31)), backbone=generator.usual)
             names: list[str] = []
             if stratum == REAL:
-                found.append(case._replace(number=faults[number], backbone=None))
+                drawn_cases.append(case._replace(number=faults[number], backbone=None))
                 continue
             if stratum == "no-gap":
                 case = case._replace(tolerances=generator.wide if number % 2 else 1.0)
@@ -111,5 +111,5 @@ def draw(generator: Generator, cases: int, seed: int) -> list[Drawn]:
             effects = tuple(generator.draw(random, name) for name in names)
             targets = tuple(float(random.choice(TARGETS)) for _ in names)
             group = case.group or (tuple(names) if len(names) == 1 and stratum != "outside" else ())
-            found.append(case._replace(effects=effects, targets=targets, group=group))
-    return found
+            drawn_cases.append(case._replace(effects=effects, targets=targets, group=group))
+    return drawn_cases

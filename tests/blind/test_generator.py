@@ -116,7 +116,7 @@ def test_an_effect_shows_at_1_and_fades_towards_0(formula, busy):
     assert 0.0 < _change(faint, busy) < 0.3 * _change(full, busy)
 
 
-def test_no_strength_is_no_effect(busy):
+def test_strength_0_has_no_effect(busy):
     effects = tuple(draw_effect(np.random.default_rng(2), name).scaled(0.0) for name in NAMES)
     still = simulate(Case(effects=effects, **EXACT), 3, BUSY)[0]
     assert all(np.array_equal(still[name], busy[name]) for name in busy)
@@ -212,7 +212,7 @@ def test_roll_off_takes_its_factor_off_the_base_s_acceleration(busy):
         assert left == pytest.approx((1.0 + (frequency_Hz / 3000.0) ** 2) ** -0.5, rel=1e-4)
 
 
-def test_the_base_s_acceleration_is_that_of_the_commanded_vibration(busy):
+def test_the_base_s_acceleration_matches_the_commanded_vibration(busy):
     steady = slice(SAMPLE_RATE_HZ, int(1.2 * SAMPLE_RATE_HZ))
     amplitude = busy["base_accel_mps2"][steady].std() * np.sqrt(2.0)
     assert amplitude == pytest.approx(0.02e-6 * (2.0 * np.pi * 2000.0) ** 2, rel=1e-4)
@@ -243,7 +243,7 @@ def test_same_case_and_seed_same_bytes_other_seed_other_bytes(tmp_path):
     assert a != c
 
 
-def test_a_folder_does_not_tell_what_it_hides(tmp_path):
+def test_a_folder_does_not_reveal_its_effect(tmp_path):
     plans = tuple(replace(plan, duration_s=2.5) for plan in PROTOCOL)
     make(tmp_path / "with", Case(effects=(draw_effect(np.random.default_rng(1), "friction-drift"),)), 11, plans)
     make(tmp_path / "without", Case(), 11, plans)
@@ -285,7 +285,7 @@ def test_vibration_changes_its_frequency_only_at_rest():
     assert (tracks.amplitude_m[changes] == 0.0).all()
 
 
-def test_the_generator_shares_nothing_with_what_it_tests():
+def test_the_generator_shares_no_code_with_the_diagnosis():
     allowed = {"numpy", "scipy", "numba", "pyarrow", "tests"}
     for path in (Path(__file__).parent / "generator").glob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

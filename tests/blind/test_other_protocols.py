@@ -50,11 +50,11 @@ def assert_no_gap(folder: Path, protocol: tuple[Plan, ...]) -> None:
 
 
 @pytest.mark.parametrize("name", PROTOCOLS)
-def test_a_rig_inside_its_tolerances_is_no_gap(name: str, tmp_path: Path) -> None:
+def test_a_rig_inside_its_tolerances_has_no_gap(name: str, tmp_path: Path) -> None:
     assert_no_gap(tmp_path, PROTOCOLS[name])
 
 
-def test_a_drive_that_takes_its_time_is_no_gap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_drive_with_ramps_of_speed_has_no_gap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The drive takes 0.3 s from one speed to the next, where a model with steps of speed would see a gap."""
     monkeypatch.setattr(runs, "DRIVE_RAMP_S", 0.3)
     assert_no_gap(tmp_path, PROTOCOL)

@@ -46,7 +46,7 @@ def test_a_set_of_the_newer_generator_has_each_newer_effect_twice_and_no_older_o
     assert generator("independent").outside == OUTSIDE
 
 
-def test_what_follows_with_play_stands_still_after_each_reversal():
+def test_a_follower_with_play_rests_after_each_reversal():
     way_m = np.concatenate((np.linspace(0.0, 1e-3, 100), np.linspace(1e-3, 0.0, 100)))
     read_m = played(way_m, 1e-4)
     assert read_m[99] == pytest.approx(0.95e-3)
@@ -54,7 +54,7 @@ def test_what_follows_with_play_stands_still_after_each_reversal():
     assert read_m[-1] == pytest.approx(0.05e-3)
 
 
-def test_a_multiplexer_repeats_what_was_and_never_tells_what_comes():
+def test_a_multiplexer_repeats_past_values_and_never_shows_future_ones():
     held_m = sensed("slow-multiplexer", 1.0, turn_s=0.1)["mass_position_m"]
     true_m = 0.02 + 1e-3 * T_S
     assert len(np.unique(held_m)) == pytest.approx(20, abs=1)
@@ -111,7 +111,7 @@ def test_levels_step_up_and_wear_off():
     assert all(1.0 < load[0] <= 1.2 and load[-1] - 1.0 < 0.05 * (load[0] - 1.0) for load in humid)
 
 
-def test_a_beating_exciter_swings_around_what_is_commanded():
+def test_a_beating_exciter_swings_around_the_commanded_amplitude():
     made = tracks("exciter-beat", depth=0.4, frequency_Hz=5.0)
     ratio = (made.amplitude_m / np.where(made.commanded_m > 0.0, made.commanded_m, np.nan))[8000:28000]
     assert (np.nanmin(ratio), np.nanmax(ratio)) == pytest.approx((0.6, 1.4), abs=0.01)

@@ -1,4 +1,4 @@
-"""Sizes in detection limits: small for an effect that a refit can imitate, large for one that it cannot."""
+"""Sizes in detection limits: small for an effect that a refit can imitate, large for other effects."""
 
 import numpy as np
 import pytest
@@ -25,10 +25,10 @@ def detectability(tmp_path_factory):
     )
 
 
-def test_what_the_tolerances_can_imitate_is_worth_little(detectability):
+def test_an_effect_within_the_tolerances_has_a_small_detectability(detectability):
     # Coulomb friction 6.5 % lower, two of its tolerances
     assert detectability("coulomb-level", 0.4) < 1.5
 
 
-def test_what_they_cannot_is_worth_much(detectability):
+def test_an_effect_beyond_the_tolerances_has_a_large_detectability(detectability):
     assert detectability("force-sensor-drift", 1.0) > 5.0

@@ -39,9 +39,9 @@ def tool(part, tmp_path_factory):
         succeeds(making_app, "make", *asked)
     succeeds(app, "blind", "run", sealed, "--jobs", part.jobs)
     succeeds(app, "blind", "score", sealed, "--key", key, "--json", scores)
-    found = json.loads(scores.read_text())
-    assert found["sealed"] is True
-    return found["methods"]["diagnosis"]
+    scores_table = json.loads(scores.read_text())
+    assert scores_table["sealed"] is True
+    return scores_table["methods"]["diagnosis"]
 
 
 def test_every_case_was_diagnosed(tool, part):

@@ -12,21 +12,21 @@ from tests.blind.small_set import RUNS
 
 @pytest.mark.slow
 @pytest.mark.nightly
-def test_cross_talk_is_unexplained_and_told_with_where_and_what_next(tmp_path):
+def test_cross_talk_is_unexplained_and_reported_with_place_and_next_step(tmp_path):
     source = Independent(RUNS)
     cross_talk = source.draw(np.random.default_rng(1), "piezo-cross-talk")
     source.make(tmp_path, Plan(effects=(cross_talk,)), seed=11)
-    found = diagnose(load_evidence(tmp_path), lambda *_: None)
-    assert found.verdict == "unexplained"
-    assert found.effects == ()
-    assert found.where[0].signal == "drive_force_N"
-    assert found.where[0].band_Hz in {
+    diagnosis = diagnose(load_evidence(tmp_path), lambda *_: None)
+    assert diagnosis.verdict == "unexplained"
+    assert diagnosis.effects == ()
+    assert diagnosis.where[0].signal == "drive_force_N"
+    assert diagnosis.where[0].band_Hz in {
         (2450.0, 2550.0),
         (4450.0, 4550.0),
     }  # the highest of the vibrations of each of RUNS
-    assert "drive_force_N vibrates with" in " ".join(found.summary)
-    assert "Uncouple" in found.next_experiment.what
-    assert sum(cell.share for cell in found.where) == pytest.approx(1.0)
+    assert "drive_force_N vibrates with" in " ".join(diagnosis.summary)
+    assert "Uncouple" in diagnosis.next_experiment.what
+    assert sum(cell.share for cell in diagnosis.where) == pytest.approx(1.0)
 
 
 @pytest.mark.slow
@@ -35,7 +35,7 @@ def test_harmonics_are_found_where_the_base_vibrates(tmp_path):
     harmonics = source.draw(np.random.default_rng(1), "piezo-harmonics")
     source.make(tmp_path, Plan(effects=(harmonics,)), seed=11)
     for run in load_evidence(tmp_path).runs:
-        told, vibrates = run.distortion, run.columns["vibration_amplitude_m"].any()
-        assert (told is not None) == vibrates
-        if told is not None:
-            assert told.multiple in {0.5, 2.0}
+        distortion, vibrates = run.distortion, run.columns["vibration_amplitude_m"].any()
+        assert (distortion is not None) == vibrates
+        if distortion is not None:
+            assert distortion.multiple in {0.5, 2.0}

@@ -150,8 +150,8 @@ def suffer(
         operator: commands to the controller, by the number of the block.
 
     """
-    own = rig or {"contact": {"pair": "C45-C45 @ 0.063"}, "drive": {"profile": [(0.0, speed_mps)]}}
-    rig_config = validate(RigConfig, own, "rig")
+    settings = rig or {"contact": {"pair": "C45-C45 @ 0.063"}, "drive": {"profile": [(0.0, speed_mps)]}}
+    rig_config = validate(RigConfig, settings, "rig")
     plant = PlantNode(rig_config, 1, arm=True)
     node = ControllerNode(validate(ControllerConfig, controller or {}, "controller"))
     block_s = rig_config.solver.block_s

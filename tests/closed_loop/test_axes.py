@@ -68,14 +68,14 @@ def test_slips_of_return_strokes_are_counted() -> None:
 
 
 @pytest.mark.parametrize("factor", [10.0, 0.1])
-def test_a_told_stiffness_that_is_wrong_is_corrected(factor: float) -> None:
+def test_a_wrong_configured_stiffness_is_corrected(factor: float) -> None:
     controller = {"drive_stiffness_N_per_m": factor * 11700.0}
     loop = close_the_loop(6.0, controller=controller)
     assert loop.slips(0.0) == 0
     assert loop.trace["drive_stiffness_N_per_m"][-1] == pytest.approx(11700.0, rel=0.05)
 
 
-def test_without_a_slide_position_a_told_stiffness_that_is_too_small_is_raised() -> None:
+def test_without_a_slide_position_a_configured_stiffness_that_is_too_small_is_raised() -> None:
     """No force climbs faster than k_d v_d."""
     controller = {"drive_stiffness_N_per_m": 1170.0, "estimator": {"use_slide_position": False}}
     loop = close_the_loop(4.0, controller=controller)
@@ -131,7 +131,7 @@ def test_a_mount_that_resonates_tenfold_is_not_driven_too_far(delay_s: float) ->
     assert loop.slips(0.0) == 0
 
 
-def test_an_axis_that_cannot_be_seen_is_vibrated_while_it_moves_and_that_is_said() -> None:
+def test_an_axis_that_cannot_be_seen_is_vibrated_while_it_moves_and_reported() -> None:
     """30 N of noise on a force that swings by 65 N within 7 ms."""
     rig = machine_axis(20e6, force_noise_N=30.0)
     rig["drive"]["profile"] = [(0.0, 5e-4), (1.5, 5e-4), (1.55, 0.0)]
@@ -143,7 +143,7 @@ def test_an_axis_that_cannot_be_seen_is_vibrated_while_it_moves_and_that_is_said
     assert loop.excited(2.0) == 0.0
 
 
-def test_an_exciter_that_cannot_help_is_switched_off_and_that_is_said() -> None:
+def test_an_exciter_that_cannot_help_is_switched_off_and_reported() -> None:
     loop = close_the_loop(9.0, rig={"piezo": {"delivered_ratio": 0.05}})
     assert loop.reasons(8.0) == {wire.CANNOT_HELP}
     assert loop.excited(8.0) == 0.0

@@ -19,7 +19,7 @@ def played(name: str, seconds: float, words: dict[float, int]) -> tuple[set[str]
     loop = ClosedLoop(scenario.rig, scenario.seed, scenario.controller, arm=False)
     block_s = scenario.rig.solver.block_s
     guard, trips = GuardEvents(), TripEvents()
-    said: set[str] = set()
+    codes: set[str] = set()
     parts: list[Stretch] = []
     for at_s, ends_s in zip(words, [*list(words)[1:], seconds], strict=True):
         if loop.block < round(at_s / block_s):
@@ -27,24 +27,24 @@ def played(name: str, seconds: float, words: dict[float, int]) -> tuple[set[str]
         loop.apply_order(words[at_s])
         parts.append(loop.advance(round(ends_s / block_s) - loop.block))
     for part in parts:
-        said |= {code for row in guard_changes(part.applied) for code, _ in guard.news(part.applied[row])}
-        said |= {code for row in changes(part.trace) for code, _ in trips.news(part.trace[row])}
+        codes |= {code for row in guard_changes(part.applied) for code, _ in guard.news(part.applied[row])}
+        codes |= {code for row in changes(part.trace) for code, _ in trips.news(part.trace[row])}
     slips = np.concatenate([part.trace["slips"] for part in parts]).astype(np.int64)
     speeds_mps = np.concatenate([part.trace["drive_velocity_mps"] for part in parts])
     if ((np.diff(slips) > 0) & (speeds_mps[1:] == 0.0)).any():
-        said.add("DRIVE_UNSEEN")
-    return said - {"GUARD"}, parts
+        codes.add("DRIVE_UNSEEN")
+    return codes - {"GUARD"}, parts
 
 
 @pytest.mark.parametrize("name", ["belt-axis", "ball-screw-axis"])
 @pytest.mark.parametrize("at_s", [0.02, 4.02, 8.6])  # in a move, and before and in a dwell
-def test_strokes_to_and_fro_are_no_fault(name: str, at_s: float) -> None:
-    said, _ = played(name, 15.0, {at_s: ARM})
-    assert said == set()
+def test_strokes_to_and_fro_raise_no_fault(name: str, at_s: float) -> None:
+    codes, _ = played(name, 15.0, {at_s: ARM})
+    assert codes == set()
 
 
 def test_a_rig_that_is_armed_again_vibrates_as_before() -> None:
-    said, parts = played("from-the-start", 5.5, {0.02: ARM, 2.5: DISARM, 2.6: ARM})
-    assert said == set()
+    codes, parts = played("from-the-start", 5.5, {0.02: ARM, 2.5: DISARM, 2.6: ARM})
+    assert codes == set()
     before, after = (part.trace["vibration_velocity_mps"][-1000:] for part in (parts[1], parts[-1]))
     assert np.median(after) == pytest.approx(np.median(before), rel=0.1)

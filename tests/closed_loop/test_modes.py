@@ -47,7 +47,7 @@ def test_settle_lets_the_vibration_die_out_after_a_move() -> None:
     assert _run("on-demand").excited(1.8, 2.5) == 0.0
 
 
-def test_what_was_found_needless_stays_so_after_a_stop() -> None:
+def test_a_speed_found_needless_stays_needless_after_a_stop() -> None:
     profile = [
         (0.0, 5e-4),
         (6.0, 5e-4),

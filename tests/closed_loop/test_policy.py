@@ -58,13 +58,13 @@ def test_measured_velocity_is_held_whatever_the_exciter_delivers(piezo: dict[str
     assert loop.held(0.5).max() < 1.08
 
 
-def test_a_piezo_that_is_too_weak_is_said() -> None:
+def test_a_piezo_that_is_too_weak_is_reported() -> None:
     loop = close_the_loop(4.0, rig={"piezo": {"delivered_ratio": 0.05}})
     assert set(loop.trace["reason"][loop.t_s > 2.0]) == {wire.PIEZO_WEAK}
     assert set(loop.trace["limit"][loop.t_s > 2.0]) == {wire.RANGE}
 
 
-def test_a_velocity_limit_that_is_too_low_is_said() -> None:
+def test_a_velocity_limit_that_is_too_low_is_reported() -> None:
     rig = {"drive": {"profile": [(0.0, 5e-3)]}, "piezo": {"amplitude_max_m": 1e-6}}
     policy = {"mode": "moving"}  # on demand it is found that nothing is needed at this speed
     loop = close_the_loop(3.0, rig=rig, controller={"limits": {"amplitude_max_m": 1e-6}, "policy": policy})
@@ -73,7 +73,7 @@ def test_a_velocity_limit_that_is_too_low_is_said() -> None:
     assert set(late["reason"]) == {wire.PIEZO_WEAK}
 
 
-def test_an_accelerometer_that_is_unplugged_is_said() -> None:
+def test_an_unplugged_accelerometer_is_reported() -> None:
     def unplugged(block: int, payload: bytes) -> bytes:
         made = sensor_block(20).read(payload, "sensors")
         if block > 1500:
@@ -112,7 +112,7 @@ def test_frequency_takes_little_of_stroke_and_of_the_accelerometers_range(
     assert loop.held(0.5).min() > 0.97
 
 
-def test_drive_that_stands_needs_no_vibration() -> None:
+def test_a_resting_drive_needs_no_vibration() -> None:
     profile = [(0.0, 5e-4), (2.0, 5e-4), (2.1, 0.0), (4.0, 0.0), (4.1, 5e-4)]
     loop = close_the_loop(6.0, rig={"drive": {"profile": profile}})
     standing = (loop.t_s > 2.5) & (loop.t_s < 4.0)
@@ -174,7 +174,7 @@ def test_no_false_stick_in_smooth_sliding(seconds: float) -> None:
 @pytest.mark.parametrize("channel", ["drive_force_N", "mass_position_m", "base_accel_mps2", "drive_position_m"])
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 @pytest.mark.parametrize("bad_block", [20, 300, 1500])  # before, at and after the switch-on
-def test_a_sample_that_is_no_number_is_forgotten(channel: str, value: float, bad_block: int) -> None:
+def test_a_sample_of_nan_is_forgotten(channel: str, value: float, bad_block: int) -> None:
     def deliver(block: int, payload: bytes) -> bytes:
         if block != bad_block:
             return payload
@@ -196,7 +196,7 @@ def test_a_sample_that_is_no_number_is_forgotten(channel: str, value: float, bad
     assert loop.held(2.0).min() > 0.97
 
 
-def test_a_rig_without_an_accelerometer_on_the_slide_may_send_what_it_likes() -> None:
+def test_the_slide_acceleration_of_a_rig_without_that_sensor_is_ignored() -> None:
     def deliver(_: int, payload: bytes) -> bytes:
         sensors = sensor_block(20).read(payload, "sensors")
         sensors["mass_accel_mps2"] = np.nan

@@ -40,7 +40,7 @@ def test_until_a_fault_begins_it_is_the_run_without_one(tmp_path: Path) -> None:
         assert ours[: len(theirs)].tobytes() == theirs.tobytes(), name
 
 
-def test_a_run_with_faults_says_so_and_replays_bit_for_bit(tmp_path: Path) -> None:
+def test_a_run_with_faults_reports_them_and_replays_bit_for_bit(tmp_path: Path) -> None:
     tables = (
         {"kind": "scaled", "target": "base_accel_mps2", "value": 0.7, "from_s": 0.3, "for_s": 0.2, "name": "weak"},
         {"kind": "dropped", "target": "blocks", "value": 0.2, "from_s": 0.4, "for_s": 0.1},
@@ -49,14 +49,14 @@ def test_a_run_with_faults_says_so_and_replays_bit_for_bit(tmp_path: Path) -> No
     run = logged(scenario(1.0, *tables), tmp_path / "run.mcap")
     again = logged(scenario(1.0, *tables), tmp_path / "again.mcap")
     assert run.trace.tobytes() == again.trace.tobytes()
-    told = [event.text for event in run.events if event.code == "INJECTED"]
-    assert told[0] == "weak: base_accel_mps2 scaled 0.7 for 0.2 s"
+    injected = [event.text for event in run.events if event.code == "INJECTED"]
+    assert injected[0] == "weak: base_accel_mps2 scaled 0.7 for 0.2 s"
     assert codes(run).count("INJECTION_ENDED") == 3
     assert {"STALE", "FRESH"} <= set(codes(run))
     assert replay(run, [Change(0, scenario(1.0).controller)]).identical
 
 
-def test_a_rig_without_its_controller_comes_to_rest_and_says_so(tmp_path: Path) -> None:
+def test_a_rig_without_its_controller_stops_the_vibration_and_reports_it(tmp_path: Path) -> None:
     run = logged(scenario(1.4, {"kind": "killed", "target": "controller", "from_s": 0.5}), tmp_path / "run.mcap")
     at_rest = run.applied["t_ns"][run.applied["amplitude_m"] > 0.0][-1] * 1e-9
     assert 0.5 < at_rest < 0.7
@@ -65,7 +65,7 @@ def test_a_rig_without_its_controller_comes_to_rest_and_says_so(tmp_path: Path) 
     assert [event.source for event in run.events if event.code == "END"] == ["plant"]
 
 
-def test_a_controller_that_is_frozen_is_told_and_nothing_arms_by_itself(tmp_path: Path) -> None:
+def test_a_frozen_controller_is_reported_and_nothing_arms_by_itself(tmp_path: Path) -> None:
     run = logged(
         scenario(2.2, {"kind": "frozen", "target": "controller", "from_s": 0.5, "for_s": 1.0}), tmp_path / "run.mcap"
     )
@@ -73,7 +73,7 @@ def test_a_controller_that_is_frozen_is_told_and_nothing_arms_by_itself(tmp_path
     assert not run.applied["amplitude_m"][run.applied["t_ns"] > 0.8e9].any()
 
 
-def test_a_person_arms_the_rig_and_the_truth_is_the_rigs() -> None:
+def test_an_operator_arms_the_rig_and_the_log_holds_its_true_state() -> None:
     run = SimulatedRun(scenario(2.2), [TimedAction(20_000_000, wire.Operator.ARM)], arm=False)
     truth = run.play()
     assert len(truth.t_s) >= 2200

@@ -48,9 +48,9 @@ def test_a_stall_loses_nothing_and_teaches_nothing(tmp_path: Path, role: str, fo
 def test_an_accelerometer_that_fails_in_a_stall_is_reported_soon_after_it(tmp_path: Path) -> None:
     frozen = {"kind": "frozen", "target": "plant", "from_s": FROM_S, "for_s": 0.03}
     dead = {"kind": "off", "target": "base_accel_mps2", "from_s": FROM_S}
-    told = list(blamed(run(tmp_path / "run.mcap", 3.0, frozen, dead)))
-    assert FROM_S + SETTLED_S < told[0][0] < FROM_S + SETTLED_S + 0.5
-    assert "stalled" not in told[0][2]
+    blamed_stalls = list(blamed(run(tmp_path / "run.mcap", 3.0, frozen, dead)))
+    assert FROM_S + SETTLED_S < blamed_stalls[0][0] < FROM_S + SETTLED_S + 0.5
+    assert "stalled" not in blamed_stalls[0][2]
 
 
 def test_a_computer_that_stalls_all_the_time_is_named_and_delays_a_doubt_by_the_longest_wait(tmp_path: Path) -> None:
@@ -59,10 +59,10 @@ def test_a_computer_that_stalls_all_the_time_is_named_and_delays_a_doubt_by_the_
         {"kind": "frozen", "target": "plant", "from_s": at_s, "for_s": 0.03} for at_s in np.arange(FROM_S, 6.0, 0.15)
     ]
     dead = {"kind": "off", "target": "base_accel_mps2", "from_s": FROM_S}
-    told = list(blamed(run(tmp_path / "run.mcap", 6.0, *stalls, dead)))
+    blamed_stalls = list(blamed(run(tmp_path / "run.mcap", 6.0, *stalls, dead)))
     # steps without a block and the late blocks of the same stall both count
-    assert FROM_S + MOST_S - 0.3 < told[0][0] < FROM_S + MOST_S + 0.5
-    assert "the computer or the link stalled" in told[0][2]
+    assert FROM_S + MOST_S - 0.3 < blamed_stalls[0][0] < FROM_S + MOST_S + 0.5
+    assert "the computer or the link stalled" in blamed_stalls[0][2]
 
 
 @pytest.mark.parametrize(("role", "every_s"), [("controller", 0.3), ("plant", 0.8)])

@@ -59,7 +59,7 @@ def test_an_accelerometer_whose_gain_is_lost_slowly_is_given_no_more_stroke_than
     assert came.reasons["PIEZO_WEAK"] > 1.0
 
 
-def test_more_than_commanded_is_followed_down_and_said() -> None:
+def test_more_vibration_than_commanded_is_followed_down_and_reported() -> None:
     came = suffer(scaled(BASE, 3.0), SECONDS)
     assert came.peak < 1.05
     assert came.reasons["RESONANCE"] < AT_MOST_S
@@ -105,7 +105,7 @@ def test_a_place_that_drifts_raises_no_vibration() -> None:
     assert came.reasons["DRIVE_DOUBTED"] < 0.4
 
 
-def test_a_gain_of_the_drive_that_was_wrong_from_the_start_is_confirmed_by_nobody() -> None:
+def test_a_drive_gain_that_was_wrong_from_the_start_is_not_confirmed() -> None:
     came = suffer(scaled(DRIVE, 2.0), 5.0, from_s=0.0)
     assert came.reasons["POSITIONS_APART"] < 4.5
     assert came.at_end < 1.4  # v_a is for the slide, and not for twice its velocity
@@ -120,13 +120,13 @@ def test_dropouts_of_the_accelerometer_leave_it_at_the_known_gain() -> None:
     assert came.at_end == pytest.approx(1.0, abs=0.03)
 
 
-def test_a_mended_drive_vibrates_as_before_once_a_person_says_so() -> None:
+def test_a_repaired_drive_vibrates_as_before_after_a_reset_by_the_operator() -> None:
     came = suffer(scaled(DRIVE, 10.0), 5.5, mend_s=2.5, operator={2700: wire.Operator.RESET})
     assert came.over_s <= AT_MOST_S
     assert came.at_end == pytest.approx(1.0, abs=0.15)
 
 
-def test_noise_that_rises_a_hundredfold_is_learnt_anew() -> None:
+def test_noise_that_rises_a_hundredfold_is_learnt_again() -> None:
     came = suffer(noisy(DRIVE, 5e-5), SECONDS)
     assert came.over_s <= AT_MOST_S
     assert came.reasons["NOISE"] < AT_MOST_S
@@ -140,7 +140,7 @@ def test_all_channels_frozen_fade_out() -> None:
     assert came.reasons["FROZEN"] < AT_MOST_S
 
 
-def test_a_person_ends_a_trip_and_the_vibration_goes_on_without_a_step() -> None:
+def test_an_operator_ends_a_trip_and_the_vibration_goes_on_without_a_step() -> None:
     mended_s, reset_block = 2.5, 2700
     came = suffer(scaled(BASE, 0.3), 3.6, mend_s=mended_s, operator={reset_block: wire.Operator.RESET})
     held = came.trace["reason"][2200:reset_block]
@@ -151,7 +151,7 @@ def test_a_person_ends_a_trip_and_the_vibration_goes_on_without_a_step() -> None
     assert came.at_end == pytest.approx(1.0, abs=0.15)
 
 
-def test_a_gain_that_is_told_bounds_a_fault_from_the_first_block() -> None:
+def test_a_configured_gain_bounds_a_fault_from_the_first_block() -> None:
     known = {"amplitude": {"known_gain": 1.0}}
     came = suffer(scaled(BASE, 0.1), SECONDS, from_s=0.0, controller=known)
     assert came.peak < 1.05 * BAND

@@ -1,4 +1,4 @@
-"""What the rig announces of its drive is part of the controller's frame: live, in one process and in replay the same."""
+"""Announced drive velocities are inputs of the controller: equal live, in one process and in replay."""
 
 from pathlib import Path
 
@@ -41,24 +41,24 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> RunData:
     return read_run(path)
 
 
-def test_each_tells_the_velocity_of_its_time_and_comes_when_it_should(run: RunData) -> None:
-    said = run.announce
-    assert said["sequence"].tolist() == list(range(len(said)))
-    assert (said["holds_from_ns"] % 1_000_000 == 0).all()
-    expected = drive_velocity_mps(strokes().rig, said["holds_from_ns"] * 1e-9)
-    assert said["drive_velocity_mps"] == pytest.approx(expected, abs=1e-12)
-    ahead_ns = said["holds_from_ns"] - said["t_ns"]
-    assert (ahead_ns[said["t_ns"] > 1_000_000] == AHEAD_BLOCKS * 1_000_000).all()
+def test_each_announcement_holds_the_velocity_of_its_time_and_arrives_in_time(run: RunData) -> None:
+    announced = run.announce
+    assert announced["sequence"].tolist() == list(range(len(announced)))
+    assert (announced["holds_from_ns"] % 1_000_000 == 0).all()
+    expected = drive_velocity_mps(strokes().rig, announced["holds_from_ns"] * 1e-9)
+    assert announced["drive_velocity_mps"] == pytest.approx(expected, abs=1e-12)
+    ahead_ns = announced["holds_from_ns"] - announced["t_ns"]
+    assert (ahead_ns[announced["t_ns"] > 1_000_000] == AHEAD_BLOCKS * 1_000_000).all()
     assert ahead_ns.min() >= 0
-    # what holds at every moment is what the newest announcement of the past said
+    # at every moment the newest past announcement holds
     blocks = np.arange(2, 2700)
-    newest = np.searchsorted(said["holds_from_ns"], blocks * 1_000_000, side="right") - 1
+    newest = np.searchsorted(announced["holds_from_ns"], blocks * 1_000_000, side="right") - 1
     driven = drive_velocity_mps(strokes().rig, blocks * 1e-3)
-    assert said["drive_velocity_mps"][newest] == pytest.approx(driven, abs=2e-12)
-    assert len(said) < 2200  # none while the drive keeps its velocity
+    assert announced["drive_velocity_mps"][newest] == pytest.approx(driven, abs=2e-12)
+    assert len(announced) < 2200  # none while the drive keeps its velocity
 
 
-def test_the_trace_says_what_was_consumed(run: RunData) -> None:
+def test_the_trace_holds_the_consumed_announcements(run: RunData) -> None:
     taken = run.trace["announcements"].astype(int)
     assert taken[-1] == len(run.announce)
     new = np.diff(taken, prepend=0) > 0
@@ -89,7 +89,7 @@ def test_block_by_block_it_is_the_run_in_one_process(run: RunData, tmp_path: Pat
     again = read_run(tmp_path / "blocks.mcap")
     for name in ("sensors", "applied", "command", "trace", "state", "announce"):
         assert getattr(again, name).tobytes() == getattr(run, name).tobytes(), name
-    assert [one.memory for one in again.snapshots] == [one.memory for one in run.snapshots]
+    assert [snapshot.memory for snapshot in again.snapshots] == [snapshot.memory for snapshot in run.snapshots]
     assert len(run.snapshots) == 2
 
 
@@ -100,7 +100,7 @@ def test_replay_feeds_the_same_announcements(run: RunData, from_s: float) -> Non
     assert result.compared == round((2.7 - from_s) * 1e3) + (from_s > 0.0)
 
 
-def test_replay_without_them_says_so(run: RunData) -> None:
+def test_replay_without_announcements_reports_it(run: RunData) -> None:
     result = replay(run._replace(announce=run.announce[:10]), changes_of(run, []))
     assert result.difference is not None
     assert result.difference.field == "announcements"
@@ -123,7 +123,7 @@ def test_the_ring_holds_all_that_lies_ahead() -> None:
         assert said_mps == pytest.approx(drive_velocity_mps(scenario.rig, from_ns * 1e-9), abs=1e-15)
 
 
-def test_a_rig_that_announces_nothing_is_as_it_was(tmp_path: Path) -> None:
+def test_a_rig_without_announcements_is_unchanged(tmp_path: Path) -> None:
     run_onboard(strokes("rig.drive.announce_ahead_s=0.0", "duration_s=0.3"), tmp_path / "run.mcap", {})
     run = read_run(tmp_path / "run.mcap")
     assert len(run.announce) == 0
@@ -136,7 +136,7 @@ def test_too_far_ahead_is_refused() -> None:
         strokes("rig.drive.announce_ahead_s=0.1")
 
 
-def test_the_message_as_it_is_on_the_wire() -> None:
+def test_an_announcement_has_the_specified_bytes() -> None:
     message = ANNOUNCE.blank()
     message["sequence"], message["t_ns"], message["holds_from_ns"] = 1, 2, 3
     assert message.tobytes().hex(" ", 1).startswith("09 01 00")

@@ -49,12 +49,12 @@ def test_another_seed_gives_another_run(tmp_path: Path) -> None:
 
 def topics(path: Path) -> dict[str, list[tuple[int, int, int, bytes]]]:
     """Every message of a log by topic, times and sequence included, as the mcap library reads it."""
-    found: dict[str, list[tuple[int, int, int, bytes]]] = {}
+    messages: dict[str, list[tuple[int, int, int, bytes]]] = {}
     with path.open("rb") as file:
         for _, channel, message in make_reader(file).iter_messages(log_time_order=False):
             row = (message.log_time, message.publish_time, message.sequence, message.data)
-            found.setdefault(channel.topic, []).append(row)
-    return found
+            messages.setdefault(channel.topic, []).append(row)
+    return messages
 
 
 @pytest.mark.slow

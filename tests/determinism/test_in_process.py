@@ -25,7 +25,7 @@ TABLES = ("sensors", "applied", "command", "trace", "state")
 
 
 def block_by_block(scenario: Scenario, log: Path, changes: list[Change], words: list[TimedAction]) -> RunData:
-    """What the processes do in lockstep, without a bus."""
+    """Run plant and controller as in lockstep, without a bus."""
     plant, controller = PlantNode(scenario.rig, scenario.seed, arm=True), ControllerNode(scenario.controller)
     written = RunLog(log, lockstep=True)
     for role in ("controller", "plant"):
@@ -91,7 +91,7 @@ def test_the_log_is_in_order_of_time(tmp_path: Path, scenario: Scenario) -> None
     run_onboard(scenario, tmp_path / "run.mcap", {})
     with (tmp_path / "run.mcap").open("rb") as file:
         read = NonSeekingReader(file).iter_messages(log_time_order=False)
-        # scopes stand behind the blocks of the second that they are made of
+        # scopes follow the blocks of the second that they summarise
         times = [message.log_time for _, channel, message in read if channel.topic != "/scope"]
     assert times == sorted(times)
     assert len(times) > 4 * 1137

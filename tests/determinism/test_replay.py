@@ -141,11 +141,13 @@ def test_a_controller_that_was_started_again_is_refused(log: Path) -> None:
 def test_two_controllers_that_answered_at_once_are_refused(log: Path) -> None:
     run = read_run(log)
     both = run._replace(trace=np.repeat(run.trace, 2))
-    with pytest.raises(Fault, match=r"/trace: step 0 is recorded at 0.001 s and again at 0.001 s: .*or two answered"):
+    with pytest.raises(
+        Fault, match=r"/trace: step 0 is recorded at 0.001 s and again at 0.001 s: .*or two controllers answered"
+    ):
         replay(both, changes_of(both, []))
 
 
-def test_what_if_names_the_change_and_says_what_it_cannot_know(log: Path) -> None:
+def test_a_what_if_names_the_change_and_its_limits(log: Path) -> None:
     result = CliRunner().invoke(app, ["replay", str(log), "--set", "limits.v_ratio=1.1"])
     assert result.exit_code == 1
     assert "wanted_velocity_mps" in result.stdout
@@ -163,7 +165,7 @@ def test_a_change_from_a_time_on_changes_nothing_before(log: Path) -> None:
 @pytest.mark.parametrize(
     "setting", ["limits.v_ratio=9", "limits.v_ratio=1.1@later", "limits.v_ratio=1.1@20s", "nothing.here=1"]
 )
-def test_bad_what_if(log: Path, setting: str) -> None:
+def test_an_invalid_what_if_is_refused(log: Path, setting: str) -> None:
     result = CliRunner().invoke(app, ["replay", str(log), "--set", setting])
     assert result.exit_code == 2
     assert setting.split("=", maxsplit=1)[0].split(".", maxsplit=1)[0] in result.stderr
@@ -171,9 +173,7 @@ def test_bad_what_if(log: Path, setting: str) -> None:
 
 @pytest.mark.parametrize("more", [[], ["--closed-loop"]], ids=["replay", "closed loop"])
 @pytest.mark.parametrize("setting", ["samples_per_block=40", "samples_per_block=40@3s", "controller.block_s=0.002@3s"])
-def test_what_if_cannot_change_the_blocks_that_were_recorded(
-    log: Path, tmp_path: Path, setting: str, more: list[str]
-) -> None:
+def test_a_what_if_cannot_change_recorded_blocks(log: Path, tmp_path: Path, setting: str, more: list[str]) -> None:
     keep = ["--log", str(tmp_path / "again.mcap")] if more else []
     result = CliRunner().invoke(app, ["replay", str(log), "--set", setting, *more, *keep])
     assert result.exit_code == 2, result.output
@@ -221,8 +221,10 @@ def test_an_operators_stop_is_repeated_in_the_closed_loop_and_no_stick_slip_of_t
     assert slips.stopped_s == pytest.approx(6.6, abs=0.1)
     assert slips.stopped_slips > 0
     then = f"{slips.stopped_slips} slips"
-    told = f"stopped  by an operator, or not armed, for 6.6 s (counted neither before nor after); {then} then"
-    assert told in in_words(slips, verbose=True)
+    stopped_line = (
+        f"stopped  by an operator, or not armed, for 6.6 s (counted neither before nor after); {then} in this time"
+    )
+    assert stopped_line in in_words(slips, verbose=True)
     assert headline(slips) == f"no stick-slip with the controller in charge; {then} while it was stopped or not armed"
     assert int(read_run(stopped).trace["slips"][-1]) >= 3
     figures = CliRunner().invoke(app, ["replay", str(stopped), "--closed-loop", "--json", "--log", str(again)])
@@ -281,8 +283,8 @@ def told_whole(run: RunData) -> bool:
 @pytest.mark.realtime
 def test_a_log_on_the_bus_gets_the_same_answers_from_a_live_controller(log: Path, tmp_path: Path) -> None:
     again = tmp_path / "again.mcap"
-    # whoever gets no processor for 0.1 to 0.3 s loses messages: that is what a live loop does, and it says so. What it then
-    # answers is still checked, bit for bit; only that nothing is lost may take another try
+    # A process without CPU time for 0.1 to 0.3 s loses messages and reports it. Its
+    # answers are still checked bit for bit; only a run without a loss may need another try
     for _ in range(3):
         statuses = to_a_live_controller(log, again)
         if statuses == [0, 0, 0]:
@@ -297,7 +299,7 @@ def test_a_log_on_the_bus_gets_the_same_answers_from_a_live_controller(log: Path
         assert np.array_equal(now.trace[field], was.trace[field]), field
 
 
-def test_nothing_to_compare_is_no_success(log: Path) -> None:
+def test_a_replay_without_steps_to_compare_fails(log: Path) -> None:
     result = CliRunner().invoke(app, ["replay", str(log), "--from", "99s"])
     assert result.exit_code == 7
     assert "99 s" in result.stderr

@@ -50,7 +50,7 @@ def answers(run: RunData) -> Records:
 
 
 @pytest.mark.parametrize("name", situations())
-def test_the_answers_that_another_processor_is_held_to_are_those_of_a_replay(name: str) -> None:
+def test_the_reference_answers_for_other_processors_match_a_replay(name: str) -> None:
     run = read_run(FOLDER / f"{name}.mcap")
     assert len(run.announce) == 0
     identical = replay(run._replace(trace=answers(run)), changes_of(run, [])).difference

@@ -102,26 +102,26 @@ def main(seed: int, rigs: int) -> None:
     errors: dict[str, list[tuple[float, float, bool]]] = {}
     missing: dict[str, int] = {}
     stick_and_slip = alike = rival_alike = silent = 0
-    for number, one in enumerate(drawn(seed, rigs)):
-        made = simulate(one.rig, one.seconds)
-        slips = slips_of(one, made)
+    for number, drawn_rig in enumerate(drawn(seed, rigs)):
+        made = simulate(drawn_rig.rig, drawn_rig.seconds)
+        slips = slips_of(drawn_rig, made)
         if slips < _FEWEST_SLIPS:
             continue
         stick_and_slip += 1
-        t_s, force_N = record(one, made, number)
+        t_s, force_N = record(drawn_rig, made, number)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", np.exceptions.RankWarning)  # its line through a stick of two samples
             try:
-                rival = eight_lines(t_s, force_N, one.speed_mps)
+                rival = eight_lines(t_s, force_N, drawn_rig.speed_mps)
             except IndexError:  # it finds no peak after a trough
                 rival = None
         rival_alike += rival is not None and abs(rival.slips - slips) <= 1
-        seen = look(t_s, force_N, None, RecordFacts(one.speed_mps))
+        seen = look(t_s, force_N, None, RecordFacts(drawn_rig.speed_mps))
         if seen is None or "static_force_N" not in seen.numbers:
             silent += 1
             continue
         alike += abs(seen.slips - slips) <= 1
-        for name, value in one.truth(made).items():
+        for name, value in drawn_rig.truth(made).items():
             found = seen.numbers.get(name)
             if found is None:
                 missing[name] = missing.get(name, 0) + 1

@@ -1,7 +1,7 @@
-"""A log of schema 1, made by `stickslip run --in-process` of commit a44e824: still readable.
+"""A log of schema 1, made by `stickslip run --in-process` of commit a44e824, is still readable.
 
 It has 1.6 s, two slips, then the controller.
-Fields are only appended to a message, so what this log held must come back unchanged from every later version.
+Fields are only appended to a message, so every later version must read the content of this log unchanged.
 """
 
 import hashlib

@@ -138,7 +138,7 @@ def test_recover_in_place_and_leaves_nothing_else(tmp_path: Path) -> None:
     assert [entry.name for entry in tmp_path.iterdir()] == ["cut.mcap"]
 
 
-def test_a_clock_that_goes_back_is_read_as_it_is(tmp_path: Path) -> None:
+def test_a_clock_that_goes_back_is_read_unchanged(tmp_path: Path) -> None:
     def change(tables: dict[str, np.ndarray]) -> None:
         tables["sensors"]["t_ns"][100:] -= 90_000_000
 
@@ -183,19 +183,19 @@ def test_an_odd_block_costs_only_itself(tmp_path: Path, odd: int) -> None:
 def test_an_event_or_a_snapshot_that_cannot_be_read_costs_only_itself(tmp_path: Path, topic: Topic) -> None:
     path, saved = tmp_path / "odd.mcap", tmp_path / "saved.mcap"
     log = RunLog(path, lockstep=True)
-    said = topic.message(sequence=0, t_ns=7).SerializeToString()
-    log.write(topic, said)
+    payload = topic.message(sequence=0, t_ns=7).SerializeToString()
+    log.write(topic, payload)
     log._add(topic, b"\x09rubbish", 1, 8)
     for number in range(1000):
         log.write(SENSORS, block(number))
     log.close()
     recover(path, saved)
-    for one in (path, saved):
-        run = read_run(one)
+    for file in (path, saved):
+        run = read_run(file)
         assert [message.t_ns for message in [*run.events, *run.snapshots]] == [7]
         assert len(run.sensors) == 1000
         assert run.damage.bad_records == 1
-        kinds = {finding.kind for finding in check_log(one).findings}
+        kinds = {finding.kind for finding in check_log(file).findings}
         assert "damaged" in kinds
         assert "bad-message" not in kinds
 
@@ -239,7 +239,7 @@ def test_a_log_that_is_being_recorded_is_not_replaced(tmp_path: Path) -> None:
         recover(path, tmp_path / "new folder" / "saved.mcap")
 
 
-def test_a_chunk_of_which_nothing_is_readable_is_no_table(tmp_path: Path) -> None:
+def test_an_unreadable_chunk_gives_no_table(tmp_path: Path) -> None:
     log = RunLog(tmp_path / "run.mcap", lockstep=True)
     for number in range(100):
         log.write(SENSORS, block(number))
@@ -280,7 +280,7 @@ def test_a_rig_that_leaves_before_its_first_word_ends_the_record(tmp_path: Path)
     assert [event.code for event in read_run(log.path).events] == ["PLANT_LOST"]
 
 
-def test_a_late_block_is_no_loss_and_a_new_start_is_said(tmp_path: Path) -> None:
+def test_a_late_block_is_not_a_loss_and_a_new_start_is_reported(tmp_path: Path) -> None:
     log = RunLog(tmp_path / "run.mcap", lockstep=True)
     for number in [*range(4), 1, *range(4, 300), *range(3)]:
         log.write(SENSORS, block(number))

@@ -104,7 +104,7 @@ def answer(run: RunData, changes: list[Change], from_s: float) -> Replay | str:
 @pytest.mark.usefixtures("small_window")
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 2**32), st.sampled_from([0.0, 0.0, 0.4, 1.0005, 2.2]), st.booleans())
-def test_the_answer_is_that_of_the_log_in_whole(seed: int, from_s: float, disorder: bool) -> None:
+def test_replay_in_pieces_equals_replay_of_the_whole_log(seed: int, from_s: float, disorder: bool) -> None:
     chance = random.Random(seed)
     run = lossy(chance, disorder)
     changes = changes_of(whole_run(), ["limits.v_ratio=1.1@1.2s"] if chance.random() < 0.2 else [])

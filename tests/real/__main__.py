@@ -28,36 +28,36 @@ parser.add_argument("--jobs", type=int, default=1)
 parser.add_argument("--budget", type=float, metavar="S", help="seconds after which an answer is what is known by then")
 
 if __name__ == "__main__":
-    told = parser.parse_args()
-    if unknown := set(told.names) - EVIDENCES.keys():
+    arguments = parser.parse_args()
+    if unknown := set(arguments.names) - EVIDENCES.keys():
         parser.error(f"{', '.join(sorted(unknown))}: no such evidence; known here: {', '.join(EVIDENCES)}")
     if not (SLIDER.is_dir() and AXIS.is_dir()):
         print(f"nothing done: {MISSING}")
         sys.exit()
-    if told.known:
+    if arguments.known:
         print("\n".join(known()))
         sys.exit()
-    if told.relations or told.latent:
-        of_evidence = of_relations if told.relations else of_latent
-        for name in told.names or EVIDENCES:
+    if arguments.relations or arguments.latent:
+        of_evidence = of_relations if arguments.relations else of_latent
+        for name in arguments.names or EVIDENCES:
             with tempfile.TemporaryDirectory() as folder, one_thread():
                 EVIDENCES[name](Path(folder))
                 shown = of_evidence(load_evidence(Path(folder)))
                 print("\n".join([name, *(f"  {line}" for line in shown)]), flush=True)
         sys.exit()
-    told.out.mkdir(parents=True, exist_ok=True)
+    arguments.out.mkdir(parents=True, exist_ok=True)
     results = {}
-    for name in told.names or EVIDENCES:
+    for name in arguments.names or EVIDENCES:
         with tempfile.TemporaryDirectory() as folder:
             EVIDENCES[name](Path(folder))
-            found = diagnose(
+            diagnosis = diagnose(
                 load_evidence(Path(folder)),
                 lambda text, _share, name=name: print(f"{name}: {text}", file=sys.stderr, flush=True),
-                told.jobs,
-                told.budget,
+                arguments.jobs,
+                arguments.budget,
             )
-        write_report(found, name, told.out / f"{name}.html")
-        results[name] = strict_json(found)
-        print("\n".join([name, *(f"  {line}" for line in lines(found))]), flush=True)
-    if told.json:
-        told.json.write_text(json.dumps(results, indent=1), encoding="utf-8")
+        write_report(diagnosis, name, arguments.out / f"{name}.html")
+        results[name] = strict_json(diagnosis)
+        print("\n".join([name, *(f"  {line}" for line in lines(diagnosis))]), flush=True)
+    if arguments.json:
+        arguments.json.write_text(json.dumps(results, indent=1), encoding="utf-8")

@@ -1,6 +1,6 @@
-"""Evidence folders from the public logs next to the repository. The rig tables hold what their publishers state.
+"""Evidence folders from the public logs next to the repository. The rig tables hold the publishers' numbers.
 
-Other numbers are read off the record with a ruler, or taken from the literature on such contacts, and gets a wide
+Other numbers are read off the record with a ruler, or taken from the literature on such contacts, and get a wide
 tolerance. No number here comes from a fit of this project.
 """
 
@@ -105,8 +105,8 @@ def slider(
         log = scipy.io.loadmat(SLIDER / f"{cut.log}.mat")
         t_s = log["t"].ravel()
         force = sensor(t_s, log["Fnorm"].ravel() * _WEIGHT_N) / _WEIGHT_N
-        own = (t_s - t_s[0] >= cut.first_s) & (t_s - t_s[0] < cut.last_s)
-        table = {"t": t_s[own], "Fnorm": force[own], "drive_position_m": cut.drive_velocity_mps * t_s[own]}
+        in_cut = (t_s - t_s[0] >= cut.first_s) & (t_s - t_s[0] < cut.last_s)
+        table = {"t": t_s[in_cut], "Fnorm": force[in_cut], "drive_position_m": cut.drive_velocity_mps * t_s[in_cut]}
         pq.write_table(pa.table(table), folder / cut.file)
         manifest += f'[[run]]\nfile = "{cut.file}"\ndrive_velocity_mps = {cut.drive_velocity_mps}\n'
         manifest += "holdout = true\n" if cut.holdout else ""

@@ -66,7 +66,7 @@ def _axis() -> list[str]:
     moving = np.abs(v) > 0.005  # m/s: away from the reversals
     right = savgol_filter(force_N, 61, 3)[moving]
     q_m, v, a = q_m[moving], v[moving], a[moving]
-    said: list[str] = []
+    lines: list[str] = []
     columns: list[Floats] = []
     for name, more in (
         ("mass, viscous, Coulomb", [a, v, np.sign(v)]),
@@ -79,7 +79,7 @@ def _axis() -> list[str]:
         sizes, *_ = np.linalg.lstsq(design, right, rcond=None)
         left_N = float(np.sqrt(np.mean((right - design @ sizes) ** 2)))
         numbers = ", ".join(f"{size:.4g}" for size in sizes[-len(more) :])
-        said.append(f"axis: {name} ({numbers}): leaves {left_N:.2f} N rms")
+        lines.append(f"axis: {name} ({numbers}): leaves {left_N:.2f} N rms")
     left = right - design @ sizes
     waves: list[tuple[float, float, float]] = []
     for period_m in np.geomspace(0.002, 0.02, 400):
@@ -87,4 +87,4 @@ def _axis() -> list[str]:
         sizes, *_ = np.linalg.lstsq(pair, left, rcond=None)
         waves.append((float(np.sqrt(np.mean((left - pair @ sizes) ** 2))), period_m, float(np.hypot(*sizes))))
     left_N, period_m, ripple_N = min(waves)
-    return [*said, f"axis: ripple over {1e3 * period_m:.2f} mm ({ripple_N:.2g}): leaves {left_N:.2f} N rms"]
+    return [*lines, f"axis: ripple over {1e3 * period_m:.2f} mm ({ripple_N:.2g}): leaves {left_N:.2f} N rms"]

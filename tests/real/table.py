@@ -14,52 +14,54 @@ from diagnosis.result import Diagnosis, Shrinkage
 _SHOWN = 4  # candidates
 
 
-def lines(found: Diagnosis) -> list[str]:
+def lines(diagnosis: Diagnosis) -> list[str]:
     """Verdict, candidates with their parameters, gap on the held-out runs, where it lies, seconds."""
-    gap = found.gap
-    said = [f"verdict     {headline(found)}"]
-    for one in found.candidates[:_SHOWN]:
-        sizes = "; ".join(estimate_in_words(one.effect, *item) for item in one.parameters.items())
-        said.append(f"candidate   {one.effect} {percent(one.probability)}{': ' if sizes else ''}{sizes}")
-    said += [f"alike       {', '.join(group)}" for group in found.not_distinguishable]
-    said.append(
+    gap = diagnosis.gap
+    rows = [f"verdict     {headline(diagnosis)}"]
+    for candidate in diagnosis.candidates[:_SHOWN]:
+        sizes = "; ".join(estimate_in_words(candidate.effect, *item) for item in candidate.parameters.items())
+        rows.append(f"candidate   {candidate.effect} {percent(candidate.probability)}{': ' if sizes else ''}{sizes}")
+    rows += [f"alike       {', '.join(group)}" for group in diagnosis.not_distinguishable]
+    rows.append(
         f"held out    {times(gap.nominal)} as described, {times(gap.retuned)} retuned, {times(gap.with_effect)} as judged"
     )
-    said += [f"  {_closed(one)}" for one in gap.compared]
-    said += [
+    rows += [f"  {_closed(fit)}" for fit in gap.compared]
+    rows += [
         f"where       {percent(cell.share)} {cell.signal} {cell.regime} {cell.band_Hz[0]:g}-{cell.band_Hz[1]:g} Hz {cell.run}"
-        for cell in found.where[:3]
+        for cell in diagnosis.where[:3]
     ]
-    said += [
-        f"moved       {one.name} {one.described:.4g} -> {one.retuned:.4g}"
-        for one in found.rig
-        if abs(one.retuned - one.described) > 2.0 * one.tolerance * (one.described or 1.0)
+    rows += [
+        f"moved       {number.name} {number.described:.4g} -> {number.retuned:.4g}"
+        for number in diagnosis.rig
+        if abs(number.retuned - number.described) > 2.0 * number.tolerance * (number.described or 1.0)
     ]
-    return [*said, f"next        {found.next_experiment.what}", f"took        {found.elapsed_s:.0f} s"]
+    return [*rows, f"next        {diagnosis.next_experiment.what}", f"took        {diagnosis.elapsed_s:.0f} s"]
 
 
 def of_relations(evidence: Evidence) -> list[str]:
     """The relations between channels: sizes, shares on the held-out runs, omitted relations."""
     runs = prepare(evidence)
     relations = relations_of(evidence.rig, runs)
-    said = [line for one in relations.answered for line in _relation(one)]
+    rows = [line for item in relations.answered for line in _relation(item)]
     decision = decision_of(relations, evidence.rig)
-    said += [f"{one.relation}: named: {one.cause}" for one in decision.decided]
-    said += [
-        f"{one.relation}: outside: {one.what}: {one.size:.3g} {one.unit}, noise {one.noise:.3g}"
-        for one in decision.outside
+    rows += [f"{item.relation}: named: {item.cause}" for item in decision.decided]
+    rows += [
+        f"{item.relation}: outside: {item.what}: {item.size:.3g} {item.unit}, noise {item.noise:.3g}"
+        for item in decision.outside
     ]
-    return [*said, *(f"{one.name}: left out: {one.why}" for one in relations.missing)]
+    return [*rows, *(f"{item.name}: left out: {item.why}" for item in relations.missing)]
 
 
 def of_latent(evidence: Evidence) -> list[str]:
     """Latent friction: the variation on the held-out runs, and its shares."""
-    said: list[str] = []
-    for one in latent_of(evidence.rig, prepare(evidence)):
-        once = "" if one.revisited else "; each place once"
-        said.append(f"{one.signal}: {one.differs:.3g} N differ in {one.rows} rows, noise {one.noise:.2g}{once}")
-        said += [f"  {share_in_words(share)}" for share in latent_shares([one])]
-    return said
+    rows: list[str] = []
+    for signal in latent_of(evidence.rig, prepare(evidence)):
+        once = "" if signal.revisited else "; each place once"
+        rows.append(
+            f"{signal.signal}: {signal.differs:.3g} N differ in {signal.rows} rows, noise {signal.noise:.2g}{once}"
+        )
+        rows += [f"  {share_in_words(share)}" for share in latent_shares([signal])]
+    return rows
 
 
 def _relation(one: Answered) -> list[str]:

@@ -16,13 +16,13 @@ pytestmark = pytest.mark.skipif(not (SLIDER.is_dir() and AXIS.is_dir()), reason=
 
 
 def diagnosed(folder: Path) -> Diagnosis:
-    found = diagnose(load_evidence(folder), lambda *_: None, jobs=2)
-    assert lines(found)[0].startswith("verdict")
-    return found
+    diagnosis = diagnose(load_evidence(folder), lambda *_: None, jobs=2)
+    assert lines(diagnosis)[0].startswith("verdict")
+    return diagnosis
 
 
 @pytest.mark.slow
-def test_what_is_known_is_in_the_logs() -> None:
+def test_known_properties_are_found_in_the_logs() -> None:
     said = known()
     wavelengths_mm = [float(line.split(" mm")[0].split()[-1]) for line in said[:5]]
     assert all(3.4 < wavelength_mm < 4.4 for wavelength_mm in wavelengths_mm)  # published with the data: 3.7 to 4.3 mm
@@ -44,9 +44,11 @@ def test_every_evidence_is_read_without_a_doubt(name: str, tmp_path: Path) -> No
 @pytest.mark.nightly
 def test_the_wave_of_the_track_leads_on_the_stiff_spring(tmp_path: Path) -> None:
     EVIDENCES["slider-stiff"](tmp_path)
-    effects = [one for one in diagnosed(tmp_path).candidates if one.effect not in {"none", "unexplained"}]
+    effects = [
+        candidate for candidate in diagnosed(tmp_path).candidates if candidate.effect not in {"none", "unexplained"}
+    ]
     # at one speed a wave of the track and one of the load in time are the same
-    assert {one.effect for one in effects[:2]} == {"position-dependent-friction", "normal-load-fluctuation"}
+    assert {effect.effect for effect in effects[:2]} == {"position-dependent-friction", "normal-load-fluctuation"}
     sizes = effects[0].parameters
     wavelength_m = sizes["wavelength_m"].value if "wavelength_m" in sizes else 1.1e-3 / sizes["frequency_Hz"].value
     assert 0.0034 < wavelength_m < 0.0044
@@ -56,6 +58,13 @@ def test_the_wave_of_the_track_leads_on_the_stiff_spring(tmp_path: Path) -> None
 def test_no_effect_is_sure_where_noise_hides_the_slips(tmp_path: Path) -> None:
     cuts = (Cut("k2254Nm_v42", 4.2e-5, 0.0, 8.0), Cut("k2254Nm_v42", 4.2e-5, 8.0, 16.0, holdout=True))
     slider(tmp_path, 2254.0, Levels(0.40, 0.367), cuts)
-    found = diagnosed(tmp_path)
-    assert found.verdict != "effect"
-    assert max(one.probability for one in found.candidates if one.effect not in {"none", "unexplained"}) < 0.8
+    diagnosis = diagnosed(tmp_path)
+    assert diagnosis.verdict != "effect"
+    assert (
+        max(
+            candidate.probability
+            for candidate in diagnosis.candidates
+            if candidate.effect not in {"none", "unexplained"}
+        )
+        < 0.8
+    )

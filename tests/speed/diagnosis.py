@@ -49,13 +49,13 @@ def bench(quick: bool = False) -> bool:
     _seconds("no effect")  # loads the kernels and starts the processes
     kept = True
     for name, effects in list(CASES.items())[: 1 if quick else None]:
-        first_s, wall_s, said = _seconds(name)
+        first_s, wall_s, answer = _seconds(name)
         wanted = "unexplained" if name == UNKNOWN else " ".join(("effect", *sorted(effects))) if effects else "no-gap"
-        within = wall_s <= LIMIT_S and first_s <= FIRST_LIMIT_S and said == wanted
+        within = wall_s <= LIMIT_S and first_s <= FIRST_LIMIT_S and answer == wanted
         kept &= within
         print(
             f"  {name:14} {wall_s:5.1f} s, {wall_s / LIMIT_S:.2f} of the limit; first figures {first_s:.1f} s, "
-            f"{first_s / FIRST_LIMIT_S:.2f}; {said}; {'PASS' if within else 'FAIL'}"
+            f"{first_s / FIRST_LIMIT_S:.2f}; {answer}; {'PASS' if within else 'FAIL'}"
         )
     for name, effects in SIDE_BY_SIDE.items():
         print(
@@ -80,9 +80,9 @@ def _seconds(name: str) -> tuple[float, float, str]:
         said_at: list[float] = []
         begin = time.perf_counter()
         evidence = load_evidence(Path(folder) / "bench")
-        found = diagnose(evidence, lambda _text, _share: said_at.append(time.perf_counter() - begin), JOBS)
-        said = " ".join((found.verdict, *sorted(found.effects)))
-        return said_at[0], time.perf_counter() - begin, said
+        diagnosis = diagnose(evidence, lambda _text, _share: said_at.append(time.perf_counter() - begin), JOBS)
+        answer = " ".join((diagnosis.verdict, *sorted(diagnosis.effects)))
+        return said_at[0], time.perf_counter() - begin, answer
 
 
 def _compress(folder: Path) -> None:

@@ -58,7 +58,7 @@ def rows() -> list[Row]:
 
 
 def bench(quick: bool = False) -> bool:
-    """Print the table, except in a quick run; True, as there is no bar."""
+    """Print the table, except in a quick run; True, as there is no limit."""
     if quick:
         return True
     table = rows()

@@ -64,18 +64,18 @@ MUJOCO = [
 
 def rivals(quick: bool = False) -> list[Rival]:
     """Those that can run here; ours is the first. Of the others only LSODA is quick."""
-    found = [
+    timings = [
         Rival("stickslip", ours, STEPS_S),
         Rival("stickslip, its default step", ours, [DEFAULT_STEP_S]),
         Rival("SciPy LSODA", lsoda, TOLERANCES),
     ]
     if quick:
-        return found
-    found.append(Rival("SciPy LSODA, 1 ms blocks", lsoda_in_blocks, TOLERANCES))
-    found.append(Rival("SciPy Radau", radau, TOLERANCES))
+        return timings
+    timings.append(Rival("SciPy LSODA, 1 ms blocks", lsoda_in_blocks, TOLERANCES))
+    timings.append(Rival("SciPy Radau", radau, TOLERANCES))
     if importlib.util.find_spec("mujoco"):
-        found.append(Rival("MuJoCo dcmotor, LuGre", mujoco, MUJOCO))
-    return found
+        timings.append(Rival("MuJoCo dcmotor, LuGre", mujoco, MUJOCO))
+    return timings
 
 
 def _choose(case: Case, rival: Rival) -> Row:

@@ -114,7 +114,7 @@ def _binned(values: Floats, bins: int) -> npt.NDArray[np.int64]:
 
 def _share(found: LatentSignal, what: str) -> tuple[float, tuple[float, float], bool]:
     """Share, interval, and whether it is more than chance; the share of place includes a rough track."""
-    own = [one for one in found.shares if one.what == what]
+    own = [share for share in found.shares if share.what == what]
     if not own:
         return 0.0, (0.0, 0.0), False
     one = own[0]

@@ -11,5 +11,5 @@ _GAP = re.compile(r"(/\S+): (\d+) lost before \d+")
 
 def lost_of(events: Iterable[wire.Event]) -> Counter[str]:
     """Messages that were lost, by topic; none on a computer that does not stall."""
-    found = (_GAP.fullmatch(event.text) for event in events if event.code == "GAP")
-    return sum((Counter({gap[1]: int(gap[2])}) for gap in found if gap), Counter())
+    gaps = (_GAP.fullmatch(event.text) for event in events if event.code == "GAP")
+    return sum((Counter({gap[1]: int(gap[2])}) for gap in gaps if gap), Counter())

@@ -15,15 +15,15 @@ COMMAND = [sys.executable, "-m", "cockpit"]
 
 def children_of(pid: int) -> list[int]:
     """Processes whose parent is `pid`."""
-    found: list[int] = []
+    pids: list[int] = []
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
             fields = stat.read_text().rsplit(")", 1)[1].split()
         except OSError:
             continue
         if int(fields[1]) == pid:
-            found.append(int(stat.parent.name))
-    return found
+            pids.append(int(stat.parent.name))
+    return pids
 
 
 def role(pid: int) -> str:

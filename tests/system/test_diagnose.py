@@ -58,31 +58,31 @@ def command(damped, tmp_path_factory):
 
 
 def test_the_command_names_the_effect_in_the_form_of_the_contract(command):
-    said, found, _ = command
-    assert found["format"] == "diagnosis/2"
-    assert found["verdict"] == "effect"
-    assert found["effects"] == ["drive-damping"]
-    names = {one["effect"] for one in found["candidates"]}
+    printed, result, _ = command
+    assert result["format"] == "diagnosis/2"
+    assert result["verdict"] == "effect"
+    assert result["effects"] == ["drive-damping"]
+    names = {candidate["effect"] for candidate in result["candidates"]}
     assert names == {*EFFECTS, "none", "unexplained"}
-    assert sum(one["probability"] for one in found["candidates"]) == pytest.approx(1.0)
-    best = found["candidates"][0]
+    assert sum(candidate["probability"] for candidate in result["candidates"]) == pytest.approx(1.0)
+    best = result["candidates"][0]
     low, high = best["parameters"]["damping_Ns_per_m"]["interval_90"]
     assert low < best["parameters"]["damping_Ns_per_m"]["value"] < high
     assert best["parameters"]["damping_Ns_per_m"]["value"] == pytest.approx(12.0, rel=0.25)
-    assert sum(one["share"] for one in found["where"]) == pytest.approx(1.0)
-    assert {one["regime"] for one in found["where"]} <= {"stick", "breakaway", "slip", "restick", "steady"}
-    assert "drive-damping" in said
+    assert sum(cell["share"] for cell in result["where"]) == pytest.approx(1.0)
+    assert {cell["regime"] for cell in result["where"]} <= {"stick", "breakaway", "slip", "restick", "steady"}
+    assert "drive-damping" in printed
 
 
 def test_the_gap_is_judged_on_the_held_out_run_only(command):
-    _, found, _ = command
-    gap = found["gap"]
+    _, result, _ = command
+    gap = result["gap"]
     assert gap["runs"] == ["run-03"]
     assert gap["with_effect"] < gap["retuned"] < gap["nominal"]
     closed = (gap["retuned"] - gap["with_effect"]) / (gap["retuned"] - gap["floor"])
     if gap["shrinkage"] is not None:
         assert gap["shrinkage"] == pytest.approx(closed)
-    assert [one["who"] for one in gap["compared"]][-2:] == ["parameters alone", "flexible residual"]
+    assert [fit["who"] for fit in gap["compared"]][-2:] == ["parameters alone", "flexible residual"]
 
 
 def test_the_report_and_the_rig_file_are_there(command):
@@ -119,7 +119,7 @@ def test_nothing_leaks_from_the_held_out_run(damped, one, short, tmp_path):
     two = diagnosed(other, 2)
     assert one.effects == ("drive-damping",)
     own_fits, other_fits = (
-        {fit.effect: (fit.chi2, fit.form, fit.parameters) for fit in found.candidates} for found in (one, two)
+        {fit.effect: (fit.chi2, fit.form, fit.parameters) for fit in result.candidates} for result in (one, two)
     )
     assert own_fits == other_fits
     assert one.gap.retuned != two.gap.retuned
@@ -138,9 +138,9 @@ def test_the_number_of_processes_changes_not_a_digit(damped, one):
 def test_force_alone_gives_an_answer_that_is_not_confidently_wrong(short):
     missing = ("mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m")
     case = Case(short, {"drive-damping": {"damping_Ns_per_m": 12.0}}, leave_out=missing)
-    found = diagnosis.diagnose.diagnose(load_evidence(made_evidence(case, seed=22)), quiet, jobs=2)
-    best = found.candidates[0]
-    group = {*found.effects, *(name for names in found.not_distinguishable for name in names)}
+    result = diagnosis.diagnose.diagnose(load_evidence(made_evidence(case, seed=22)), quiet, jobs=2)
+    best = result.candidates[0]
+    group = {*result.effects, *(name for names in result.not_distinguishable for name in names)}
     assert "drive-damping" in group or best.effect in {"none", "unexplained"} or best.probability < 0.9
-    assert any("mass_accel_mps2" in finding.where for finding in found.findings)
-    assert np.isfinite(found.gap.retuned)
+    assert any("mass_accel_mps2" in finding.where for finding in result.findings)
+    assert np.isfinite(result.gap.retuned)

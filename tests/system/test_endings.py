@@ -27,7 +27,7 @@ pytestmark = pytest.mark.realtime
 ENDINGS = [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.nightly), signal.SIGHUP]
 
 
-def test_ctrl_c_fades_out_closes_the_log_and_says_so(tmp_path: Path, runs: list[Run]) -> None:
+def test_ctrl_c_fades_out_closes_the_log_and_reports_it(tmp_path: Path, runs: list[Run]) -> None:
     run = Run(tmp_path / "run.mcap", "--set", "controller.policy.enabled_from_s=0.0")
     runs.append(run)
     run.wait_until_recording()
@@ -42,10 +42,10 @@ def test_ctrl_c_fades_out_closes_the_log_and_says_so(tmp_path: Path, runs: list[
     assert data.applied["amplitude_m"][-1] == 0.0
 
 
-@pytest.mark.parametrize("there", ["nothing", "an empty file", "an older log"])
-def test_ctrl_c_before_the_record_judges_no_other_run(tmp_path: Path, runs: list[Run], there: str) -> None:
+@pytest.mark.parametrize("existing", ["nothing", "an empty file", "an older log"])
+def test_ctrl_c_before_the_record_judges_no_other_run(tmp_path: Path, runs: list[Run], existing: str) -> None:
     log = tmp_path / "run.mcap"
-    older = {"nothing": None, "an empty file": b"", "an older log": short_log()}[there]
+    older = {"nothing": None, "an empty file": b"", "an older log": short_log()}[existing]
     if older is not None:
         log.write_bytes(older)
     run = Run(log)
@@ -59,7 +59,7 @@ def test_ctrl_c_before_the_record_judges_no_other_run(tmp_path: Path, runs: list
         assert log.read_bytes() == older
 
 
-def test_ctrl_c_while_a_child_starts_leaves_nobody_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_while_a_child_starts_leaves_no_process_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     started: list[subprocess.Popen[str]] = []
 
     class Interrupted(orchestra.Child):
@@ -144,7 +144,7 @@ def test_a_second_ctrl_c_takes_nothing_away(tmp_path: Path, runs: list[Run], pau
 
 
 @pytest.mark.parametrize("number", ENDINGS[:2])
-def test_judging_that_takes_long_is_told_and_can_be_left(tmp_path: Path, number: signal.Signals) -> None:
+def test_long_judging_is_reported_and_can_be_interrupted(tmp_path: Path, number: signal.Signals) -> None:
     log = tmp_path / "run.mcap"
     slow = (
         "import time; from cockpit.judge.run_judge import RunJudge; from cockpit.entry import main\n"
@@ -183,7 +183,7 @@ def _without_priority() -> None:
 
 
 @pytest.mark.parametrize("clock", ["real time", "lockstep"])
-def test_a_priority_that_is_missing_is_told_at_the_start_and_in_the_verdict(tmp_path: Path, clock: str) -> None:
+def test_a_missing_priority_is_reported_at_the_start_and_in_the_verdict(tmp_path: Path, clock: str) -> None:
     more, log = ["--lockstep"] if clock == "lockstep" else [], tmp_path / "run.mcap"
     result = subprocess.run(
         [*COMMAND, "run", "--set", "duration_s=0.5", "--endpoint", free_endpoint(), "--json", *more, "--log", str(log)],
@@ -203,6 +203,6 @@ def test_a_priority_that_is_missing_is_told_at_the_start_and_in_the_verdict(tmp_
     assert result.stderr == warning
     assert sorted(verdict["normal_scheduling"]) == ["controller", "plant"]
     assert (verdict["pauses"], verdict["not_watched"]) == (None, "no real-time priority")
-    said = call("log", "info", "--verbose", str(log)).stdout
-    assert "under normal scheduling: real time is not guaranteed" in said
-    assert "were not watched: no real-time priority" in said
+    output = call("log", "info", "--verbose", str(log)).stdout
+    assert "under normal scheduling: real time is not guaranteed" in output
+    assert "were not watched: no real-time priority" in output

@@ -57,7 +57,7 @@ def told_lost(data: RunData, topic: str) -> int:
     return sum(int(text.split()[1]) for text in texts if text.startswith(f"/{topic}: "))
 
 
-def test_a_controller_that_stood_still_goes_on(tmp_path: Path, runs: list[Run]) -> None:
+def test_a_stalled_controller_goes_on(tmp_path: Path, runs: list[Run]) -> None:
     run = Run(tmp_path / "run.mcap", seconds=3.5)
     runs.append(run)
     run.wait_until_recording()
@@ -122,7 +122,7 @@ def test_full_disk(tmp_path: Path, runs: list[Run]) -> None:
     assert status == FAULTS["LOG_WRITE"].exit_status
     assert "stickslip: warning: LOG_WRITE: run.mcap: File too large: nothing is recorded from " in err
     assert "recover" in err
-    assert "it goes on in run-00" in err
+    assert "it continues in run-00" in err
     data = read_run(log)
     assert data.damage.whole
     # the log went on in the next files; losses between two of them, possibly the END, are reported
@@ -173,7 +173,7 @@ def test_bad_configuration_starts_nothing(tmp_path: Path) -> None:
     assert not (tmp_path / "run.mcap").exists()
 
 
-def test_a_rig_whose_numbers_run_away_is_no_quiet_one(tmp_path: Path) -> None:
+def test_a_rig_with_diverging_numbers_is_reported(tmp_path: Path) -> None:
     endless = ["--set", "duration_s=0.1", "--set", "rig.contact.stribeck_velocity_mps=1e-320"]
     for more in (["--in-process"], ["--endpoint", free_endpoint()]):
         result = call("run", *endless, *more, "--log", str(tmp_path / "run.mcap"))

@@ -64,13 +64,13 @@ def test_a_rig_written_from_the_page_alone_is_controlled_and_recorded(start: Sta
     plant = start(str(FOREIGN_PLANT), endpoint, str(BLOCKS))
     controller = start("-m", "cockpit", "controller", *common)
     recorder = start("-m", "cockpit", "record", *common, "--log", str(log))
-    said, complaints = plant.communicate(timeout=28.0)
+    message, complaints = plant.communicate(timeout=28.0)
     assert plant.returncode == 0, complaints
     for process in (controller, recorder):
         _, complaints = process.communicate(timeout=5.0)
         assert process.returncode == 0, complaints
 
-    seen = json.loads(said)
+    seen = json.loads(message)
     assert seen["commands"] == BLOCKS
     assert seen["vibrates_from_s"] == pytest.approx(ENABLED_FROM_S, abs=0.05)
     assert seen["slips_before"] == 8

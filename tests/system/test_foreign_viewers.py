@@ -55,7 +55,7 @@ def test_the_protobuf_decoder_reads_every_message_by_name(log: Path) -> None:
 
     with log.open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
-        decoded = [(channel.topic, said) for _, channel, _, said in reader.iter_decoded_messages()]
+        decoded = [(channel.topic, message) for _, channel, _, message in reader.iter_decoded_messages()]
         statistics = reader.get_summary().statistics
     assert len(decoded) == statistics.message_count
     last = dict(decoded)["/scope"]
@@ -64,7 +64,7 @@ def test_the_protobuf_decoder_reads_every_message_by_name(log: Path) -> None:
 
 
 @pytest.mark.nightly
-def test_our_definition_of_the_log_message_is_that_of_foxglove() -> None:
+def test_our_definition_of_the_log_message_matches_foxglove() -> None:
     messages = pytest.importorskip("foxglove.messages", reason="make nightly installs the viewers")
     from google.protobuf import descriptor_pb2
 
@@ -72,8 +72,8 @@ def test_our_definition_of_the_log_message_is_that_of_foxglove() -> None:
     assert (theirs.name, theirs.encoding) == (foxglove_log.SCHEMA, "protobuf")
     of_theirs = descriptor_pb2.FileDescriptorSet.FromString(theirs.data).file[-1].message_type[0]
     of_ours = foxglove_log.FILES.file[-1].message_type[0]
-    assert [(one.name, one.number, one.type, one.type_name) for one in of_ours.field] == [
-        (one.name, one.number, one.type, one.type_name) for one in of_theirs.field
+    assert [(entry.name, entry.number, entry.type, entry.type_name) for entry in of_ours.field] == [
+        (entry.name, entry.number, entry.type, entry.type_name) for entry in of_theirs.field
     ]
-    values = [[(one.name, one.number) for one in kind.enum_type[0].value] for kind in (of_ours, of_theirs)]
+    values = [[(entry.name, entry.number) for entry in kind.enum_type[0].value] for kind in (of_ours, of_theirs)]
     assert values[0] == values[1]

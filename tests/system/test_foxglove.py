@@ -31,21 +31,21 @@ def decoder(channel: dict[str, Any]) -> Any:
 
 
 async def received(port: int, rig: Rig, tell: Any) -> dict[str, list[tuple[int, Any]]]:
-    """What a client that subscribes to everything gets of a slip in some blocks, by topic: time and message."""
+    """Messages of a slip that a client of all topics receives, by topic: time and message."""
     protocol = Subprotocol("foxglove.sdk.v1")
     async with connect(f"ws://127.0.0.1:{port}", subprotocols=[protocol], max_size=None) as client:
         channels: dict[str, Any] = {}
         while len(channels) < 2:
-            said = json.loads(await asyncio.wait_for(client.recv(), 10.0))
-            if said["op"] == "serverInfo":
-                assert said["capabilities"] == []
-            channels |= {one["topic"]: one for one in said.get("channels", ())}
-        wanted = [{"id": number, "channelId": one["id"]} for number, one in enumerate(channels.values())]
+            answer = json.loads(await asyncio.wait_for(client.recv(), 10.0))
+            if answer["op"] == "serverInfo":
+                assert answer["capabilities"] == []
+            channels |= {channel["topic"]: channel for channel in answer.get("channels", ())}
+        wanted = [{"id": number, "channelId": channel["id"]} for number, channel in enumerate(channels.values())]
         await client.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
         names = dict(enumerate(channels))
-        found: dict[str, list[tuple[int, Any]]] = {name: [] for name in channels}
+        messages: dict[str, list[tuple[int, Any]]] = {name: [] for name in channels}
         number = 0
-        while not all(found.values()) or len(found["/scope"]) < 10:
+        while not all(messages.values()) or len(messages["/scope"]) < 10:
             for block in range(number, number + 10):
                 rig.block(block, peak_N=17.0 if block % 40 == 13 else None)
                 rig.answer(block)
@@ -61,9 +61,9 @@ async def received(port: int, rig: Rig, tell: Any) -> dict[str, list[tuple[int, 
                 if isinstance(data, bytes) and data[0] == _MESSAGE:
                     name = names[int.from_bytes(data[1:5], "little")]
                     message = decoder(channels[name]).FromString(data[13:])
-                    found[name].append((int.from_bytes(data[5:13], "little"), message))
+                    messages[name].append((int.from_bytes(data[5:13], "little"), message))
             assert number < 10_000
-        return found
+        return messages
 
 
 @pytest.mark.nightly
@@ -76,22 +76,22 @@ def test_a_client_subscribes_and_decodes_signals_and_events() -> None:
     with Foxglove(0) as server:
         with pytest.raises(Fault, match=f"ENDPOINT_BUSY.*{server.port}.*--foxglove-port"):
             Foxglove(server.port)
-        found = asyncio.run(received(server.port, rig, lambda: server.send(view.step())))
-    times = [time for time, _ in found["/scope"]]
+        messages = asyncio.run(received(server.port, rig, lambda: server.send(view.step())))
+    times = [time for time, _ in messages["/scope"]]
     assert {later - time for time, later in itertools.pairwise(times)} == {5_000_000}
-    scope = [message for _, message in found["/scope"]]
-    assert max(one.drive_force_max_N for one in scope) == 17.0
-    assert {one.drive_force_min_N for one in scope} == {10.0}
+    scope = [message for _, message in messages["/scope"]]
+    assert max(message.drive_force_max_N for message in scope) == 17.0
+    assert {message.drive_force_min_N for message in scope} == {10.0}
     assert "mode: EXCITE" in str(scope[-1])
-    _, event = found["/log"][-1]
+    _, event = messages["/log"][-1]
     assert event.message.startswith("GAP: before block ")
     assert event.name == "plant"
 
 
-def test_without_the_extra_its_install_line_is_told(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+def test_without_the_extra_its_install_command_is_named(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
     from cockpit.live.foxglove_server import Foxglove
 
     monkeypatch.setitem(sys.modules, "foxglove", None)
     assert exit_status_of(lambda: Foxglove(0) and None) != 0
-    assert "MISSING_EXTRA" in (said := capsys.readouterr().err)
-    assert "pip install 'stickslip[foxglove]'" in said
+    assert "MISSING_EXTRA" in (answer := capsys.readouterr().err)
+    assert "pip install 'stickslip[foxglove]'" in answer

@@ -46,7 +46,7 @@ def say(word: str, endpoint: str, *options: str) -> tuple[int, dict[str, Any]]:
     return done.returncode, json.loads(done.stdout)
 
 
-def test_a_rig_is_armed_by_a_person_and_a_stop_outlasts_its_process(tmp_path: Path) -> None:
+def test_an_operator_arms_the_rig_and_a_stop_outlasts_its_process(tmp_path: Path) -> None:
     endpoint = free_endpoint()
     environment = os.environ | {"XDG_STATE_HOME": str(tmp_path)}
     with rig(endpoint, environment, "--set", "arm=false"):

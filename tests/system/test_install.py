@@ -49,8 +49,8 @@ def call(folder: Path, *arguments: str, status: int = 0, search: Path | None = N
 
 def test_a_run_in_a_folder_with_files_of_the_same_names(crowded: Path) -> None:
     words = f"run --lockstep --scenario from-the-start --set duration_s=0.5 --endpoint {free_endpoint()}"
-    said = call(crowded, *words.split())
-    assert "data     whole: 500 blocks" in said
+    output = call(crowded, *words.split())
+    assert "data     whole: 500 blocks" in output
 
 
 @pytest.mark.nightly  # 14 s of CPU; the run before has processes in such a folder, too
@@ -58,8 +58,8 @@ def test_workers_of_a_diagnosis_in_a_folder_with_files_of_the_same_names(crowded
     """Each worker reports the gaps of its evidence: a whole diagnosis in the same workers would take half a minute."""
     for name in ("first", "second"):
         (made_up.evidence_folder(crowded / name) / "run-01.csv").unlink()
-    said = call(crowded, "diagnose", "first", "second", "--jobs", "2", status=FAULTS["BAD_EVIDENCE"].exit_status)
-    assert said.count("run-01.csv") == 2
+    output = call(crowded, "diagnose", "first", "second", "--jobs", "2", status=FAULTS["BAD_EVIDENCE"].exit_status)
+    assert output.count("run-01.csv") == 2
 
 
 # all in one process, where importing costs its two seconds once; `--lockstep` starts plant, controller and recorder
@@ -87,7 +87,7 @@ def plain(tmp_path: Path) -> Path:
     return folder
 
 
-def test_what_a_plain_installation_does_needs_no_extra(tmp_path: Path, plain: Path) -> None:
+def test_a_plain_installation_needs_no_extra(tmp_path: Path, plain: Path) -> None:
     lines = [
         "run --in-process --scenario from-the-start --set duration_s=0.5 --log run.mcap",
         f"run --lockstep --scenario from-the-start --set duration_s=0.5 --log bus.mcap --endpoint {free_endpoint()}",
@@ -134,15 +134,15 @@ def test_a_command_names_the_extra_that_is_missing(tmp_path: Path, plain: Path, 
 
 def test_the_missing_extra_as_json(tmp_path: Path, plain: Path) -> None:
     kind = FAULTS["MISSING_EXTRA"]
-    said = call(tmp_path, "reproduce", "--json", status=kind.exit_status, search=plain)
-    assert json.loads(said) == {
+    output = call(tmp_path, "reproduce", "--json", status=kind.exit_status, search=plain)
+    assert json.loads(output) == {
         "fault": kind.code,
         "line": "this command needs jinja2, which is not installed; pip install 'stickslip[all]'",
         "exit_status": kind.exit_status,
     }
 
 
-def test_all_that_the_extras_bring_is_told_of() -> None:
+def test_everything_in_the_extras_is_documented() -> None:
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     assert extras["all"] == ["stickslip[diagnosis,tables]"]
     names = {re.split(r"[\[>=]", line)[0] for line in (*extras["diagnosis"], *extras["tables"])}

@@ -15,8 +15,8 @@ pytestmark = pytest.mark.slow
 COMPILES = """
 import math, subprocess, sys
 import numba
-from plant.four_rigs_step import gone
-assert math.isclose(gone(0.5), math.expm1(-0.5))
+from plant.four_rigs_step import decayed
+assert math.isclose(decayed(0.5), math.expm1(-0.5))
 started = "import numba, bridge.kernel; print(numba.config.CACHE_DIR)"
 print(numba.config.CACHE_DIR, subprocess.run([sys.executable, "-c", started], capture_output=True, text=True).stdout)
 """
@@ -73,7 +73,7 @@ import bridge.kernel
 
 
 @pytest.mark.nightly
-def test_of_two_first_starts_at_once_one_process_compiles_each_set_and_nobody_is_said_to_be_missing(tmp_path):
+def test_two_first_starts_at_once_compile_each_set_once_and_report_no_missing_process(tmp_path):
     cache = tmp_path / "cache"
     fast = (
         "--scenario",
@@ -93,9 +93,9 @@ def test_of_two_first_starts_at_once_one_process_compiles_each_set_and_nobody_is
         )
         for name in ("one.mcap", "other.mcap")
     ]
-    said = [process.communicate(timeout=PATIENCE_S)[1] for process in begun]
-    assert [process.returncode for process in begun] == [0, 0], said
-    lines = "".join(said).splitlines()
+    errors = [process.communicate(timeout=PATIENCE_S)[1] for process in begun]
+    assert [process.returncode for process in begun] == [0, 0], errors
+    lines = "".join(errors).splitlines()
     for role in ("plant", "controller"):
         compiling = [line for line in lines if f"compiling the kernels of the {role}" in line]
         assert len(compiling) == 1, lines

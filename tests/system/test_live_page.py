@@ -19,7 +19,7 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(BROWSER is None, reason="no chromium on this computer"),
 ]
-# stands in for the connection: `up` is whether the server answers
+# replaces the connection; `up`: the server answers
 _CONNECTION = """
 <script>
 let up = true, connection = null;
@@ -103,7 +103,7 @@ async function live(ms, more = {}) {
 
 @pytest.fixture(scope="module")
 def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
-    """What the page shows at each step, on a screen of 1280 by 720 pixels and on a phone of 390 by 844."""
+    """The content of the page at each step, on a screen of 1280 by 720 pixels and on a phone of 390 by 844."""
     folder = tmp_path_factory.mktemp("live")
     rig = Rig()
     server = Server(BusConfig(), "", 8447)

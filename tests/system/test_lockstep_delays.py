@@ -25,11 +25,11 @@ SETTINGS = (
 @pytest.mark.slow
 @pytest.mark.nightly  # 14 s of CPU; tests/unit/plant/test_loop_delay.py and tests/determinism/test_contract.py have the parts
 def test_over_the_bus_as_in_one_process(tmp_path: Path) -> None:
-    told = [part for setting in SETTINGS for part in ("--set", setting)]
+    options = [part for setting in SETTINGS for part in ("--set", setting)]
     for way in (["--lockstep", "--endpoint", free_endpoint()], ["--in-process"]):
         log = tmp_path / f"{way[0].strip('-')}.mcap"
         subprocess.run(
-            [sys.executable, "-m", "cockpit", "run", "--scenario", "from-the-start", *told, *way, "--log", str(log)],
+            [sys.executable, "-m", "cockpit", "run", "--scenario", "from-the-start", *options, *way, "--log", str(log)],
             capture_output=True, timeout=PATIENCE_S, check=False,
         )  # fmt: skip
     over_the_bus, at_once = (read_run(tmp_path / f"{name}.mcap") for name in ("lockstep", "in-process"))

@@ -33,9 +33,9 @@ def sources(at: Path, names: list[str]) -> list[EvidenceFolder]:
 
 
 def by_name(outcomes: Iterator[FolderResult]) -> dict[str, FolderResult]:
-    found = list(outcomes)
-    result = {outcome.source.name: outcome for outcome in found}
-    assert len(found) == len(result)
+    results = list(outcomes)
+    result = {outcome.source.name: outcome for outcome in results}
+    assert len(results) == len(result)
     return result
 
 
@@ -66,13 +66,20 @@ def cluster(at: Path, workers: int, certs: Path | None = None) -> Iterator[str]:
     dask = [sys.executable, "-m", "distributed.cli"]
     quiet = ["--no-dashboard"]
     if certs is not None:
-        own = files_of(CLUSTER, certs)
-        quiet += ["--tls-ca-file", str(own.authority), "--tls-cert", str(own.certificate), "--tls-key", str(own.key)]
+        files = files_of(CLUSTER, certs)
+        quiet += [
+            "--tls-ca-file",
+            str(files.authority),
+            "--tls-cert",
+            str(files.certificate),
+            "--tls-key",
+            str(files.key),
+        ]
     local = [*quiet, "--no-nanny", "--nthreads", "1", "--host", "127.0.0.1", "--local-directory", str(at)]
     commands = [[f"{dask[2]}.dask_scheduler", "--host", address, *quiet]]
     commands += [[f"{dask[2]}.dask_worker", address, *local]] * workers
     with (at / "cluster.log").open("w") as log:
-        processes = [subprocess.Popen([*dask[:2], *one], stdout=log, stderr=log) for one in commands]
+        processes = [subprocess.Popen([*dask[:2], *command], stdout=log, stderr=log) for command in commands]
         try:
             yield address
         finally:
@@ -86,15 +93,15 @@ def test_outcomes_on_two_processes(tmp_path):
     """The last folder has both processes, as the substitute reports."""
     names = ["a", "b", "refused", "broken", "c"]
     outcomes = by_name(diagnose_many(sources(tmp_path, names), 2, diagnose=made_up.spreads))
-    found = {name: outcome.diagnosis for name, outcome in outcomes.items() if outcome.diagnosis}
-    assert {name: one.elapsed_s for name, one in found.items()} == {"a": 1.0, "b": 1.0, "c": 2.0}
+    results = {name: outcome.diagnosis for name, outcome in outcomes.items() if outcome.diagnosis}
+    assert {name: one.elapsed_s for name, one in results.items()} == {"a": 1.0, "b": 1.0, "c": 2.0}
     assert outcomes["refused"].fault == ("BAD_EVIDENCE", "run-01.csv: too short")
     assert (outcomes["broken"].fault or ("",))[0] == "DIAGNOSIS_BROKE"
-    assert found["a"].gap == made_up.diagnosis().gap
+    assert results["a"].gap == made_up.diagnosis().gap
 
 
 @pytest.mark.nightly  # 18 s of CPU; the next has a process that dies once
-def test_a_process_that_always_dies_takes_nobody_along(tmp_path):
+def test_a_process_that_always_dies_ends_no_other(tmp_path):
     outcomes = by_name(diagnose_many(sources(tmp_path, ["a", "killer", "b", "c"]), 2, diagnose=made_up.dies))
     assert {name for name, outcome in outcomes.items() if outcome.diagnosis} == {"a", "b", "c"}
     assert (outcomes["killer"].fault or ("",))[0] == "PEER_DIED"
@@ -122,8 +129,8 @@ def test_a_cluster_with_tls(tmp_path):
     (tmp_path / "dask").mkdir()
     make_certificates(tmp_path / "certs", [])
     with cluster(tmp_path / "dask", 1, tmp_path / "certs") as address:
-        found = by_name(diagnose_many(sources(tmp_path, ["a"]), 1, address, made_up.quick, str(tmp_path / "certs")))
-    assert found["a"].diagnosis is not None
+        results = by_name(diagnose_many(sources(tmp_path, ["a"]), 1, address, made_up.quick, str(tmp_path / "certs")))
+    assert results["a"].diagnosis is not None
 
 
 @pytest.mark.parametrize(
@@ -146,7 +153,7 @@ def test_a_cluster_that_is_not_there(tmp_path):
 
 
 @pytest.mark.nightly
-def test_after_sigkill_only_what_is_missing_is_done(tmp_path):
+def test_after_sigkill_only_missing_results_are_computed(tmp_path):
     """One folder is done, the other under way when everything is killed; the next time only the other is diagnosed."""
     for name in ("a", "slow"):
         made_up.evidence_folder(tmp_path / "all" / name)
@@ -175,7 +182,10 @@ def test_after_sigkill_only_what_is_missing_is_done(tmp_path):
     assert "1 of 2 reused from " in again.stderr
     assert (tmp_path / "all/a/done").read_text() == "once\n"
     assert (tmp_path / "all/slow/done").read_text() == "once\nonce\n"
-    assert [one["evidence"] for one in json.loads((tmp_path / "all.json").read_text())["results"]] == ["a", "slow"]
+    assert [result["evidence"] for result in json.loads((tmp_path / "all.json").read_text())["results"]] == [
+        "a",
+        "slow",
+    ]
     assert json.loads((out / "index.json").read_text())["left"] == []
 
 
@@ -222,14 +232,14 @@ def test_ctrl_c_leaves_no_worker_and_no_file(tmp_path):
     try:
         wait_for(lambda: all(mark.exists() and mark.read_text() for mark in marks))
         os.killpg(command.pid, signal.SIGINT)  # as a terminal does: every process of the group
-        _, said = command.communicate(timeout=PATIENCE_S)
+        _, errors = command.communicate(timeout=PATIENCE_S)
     except BaseException:
         os.killpg(command.pid, signal.SIGKILL)
         command.communicate()
         raise
     workers = [int(mark.read_text()) for mark in marks]
     assert command.returncode == 130
-    assert said.splitlines()[-1] == "stickslip: INTERRUPTED: stopped by Ctrl-C"
-    assert "Traceback" not in said
+    assert errors.splitlines()[-1] == "stickslip: INTERRUPTED: stopped by Ctrl-C"
+    assert "Traceback" not in errors
     wait_for(lambda: all(gone(pid) for pid in workers))
     assert not (tmp_path / "out.json").exists()

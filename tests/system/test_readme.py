@@ -14,10 +14,10 @@ _ALIKE = 0.06
 
 @pytest.mark.slow
 @pytest.mark.nightly
-def test_the_commands_of_the_readme_print_what_it_shows(tmp_path: Path) -> None:
+def test_the_commands_of_the_readme_print_the_shown_output(tmp_path: Path) -> None:
     """After a change of their output: `make readme`."""
     now = readme.block(readme.kept(readme.README.read_text(encoding="utf-8"), tmp_path / "demo.png"))
     shown = readme.block(readme.KEPT.read_text(encoding="utf-8"))
     assert _NUMBER.sub("N", now) == _NUMBER.sub("N", shown)
-    numbers = [float(one) for one in _NUMBER.findall(shown)]
-    assert [float(one) for one in _NUMBER.findall(now)] == pytest.approx(numbers, rel=_ALIKE)
+    numbers = [float(number) for number in _NUMBER.findall(shown)]
+    assert [float(number) for number in _NUMBER.findall(now)] == pytest.approx(numbers, rel=_ALIKE)

@@ -51,9 +51,9 @@ def test_every_block_arrives_and_is_answered(tmp_path: Path) -> None:
     assert int(data.applied["commands"].sum()) + lost.total() > 5700  # a pause at the end leaves some under way
     assert set(data.headers) == {"run", "plant", "controller", "verdict"}
     verdict = json.loads(result.stdout)
-    told = [event.text for event in data.events if event.code == "WATCH"]
-    assert len(told) == 1
-    assert (verdict["pauses"] is None) == ("not watched: " in told[0]) == bool(verdict["not_watched"])
+    watch = [event.text for event in data.events if event.code == "WATCH"]
+    assert len(watch) == 1
+    assert (verdict["pauses"] is None) == ("not watched: " in watch[0]) == bool(verdict["not_watched"])
 
 
 @pytest.mark.smoke
@@ -124,10 +124,10 @@ def test_operator_stop_and_reset(tmp_path: Path) -> None:
         refused = subprocess.run(second, timeout=60, check=False, capture_output=True, text=True)
         assert refused.returncode == FAULTS["ENDPOINT_BUSY"].exit_status
         assert f"{endpoint}: another controller is on this bus: must be one" in refused.stderr
-        told = subprocess.run(
+        shown = subprocess.run(
             [*COMMAND, "status", "--json", "--endpoint", endpoint], timeout=30, check=True, capture_output=True
         )
-        status = json.loads(told.stdout)
+        status = json.loads(shown.stdout)
         assert (status["rig"], status["mode"]) == ("paper-c45-c45", "STOPPED")
         assert status["roles"] == ["plant", "controller", "recorder"]
         for word in ("reset", "arm"):
@@ -144,18 +144,18 @@ def test_operator_stop_and_reset(tmp_path: Path) -> None:
     assert data.applied["amplitude_m"][: np.argmax(stopped)].max() > 0
     assert data.trace["vibration_velocity_mps"][stopped][300:].max() < 1e-5
     assert data.trace["mode"][-1] != wire.STOPPED
-    said = [event.text.split()[0] for event in data.events if event.code == "OPERATOR"]
-    assert list(dict.fromkeys(said)) == ["STOP", "RESET", "ARM"]  # on a busy computer one may be published twice
+    output = [event.text.split()[0] for event in data.events if event.code == "OPERATOR"]
+    assert list(dict.fromkeys(output)) == ["STOP", "RESET", "ARM"]  # on a busy computer one may be published twice
 
 
 @pytest.mark.parametrize(
-    ("state", "told"),
+    ("state", "expected"),
     [
         (wire.ACTIVE, "the rig did not confirm STOP within 5 s and is ACTIVE with a vibration of 37 nm"),
         (None, "no rig publishes"),
     ],
 )
-def test_a_rig_that_does_not_obey_is_said(state: int | None, told: str) -> None:
+def test_a_rig_that_does_not_confirm_is_reported(state: int | None, expected: str) -> None:
     config = BusConfig(endpoint=free_endpoint())
     with Bus(config, "plant", lockstep=False) as plant:
         inbox, send = Inbox(10), plant.publisher(APPLIED)
@@ -166,12 +166,12 @@ def test_a_rig_that_does_not_obey_is_said(state: int | None, told: str) -> None:
             if state is not None:
                 send(wire.Applied(guard_state=state, amplitude_m=37e-9).SerializeToString())
             time.sleep(0.01)
-        _, said = stop.communicate()
+        _, output = stop.communicate()
     assert stop.returncode == FAULTS["NO_PEER"].exit_status
-    assert f"{config.endpoint}: {told}" in said
+    assert f"{config.endpoint}: {expected}" in output
 
 
-def test_rubbish_on_the_bus_stops_nobody(tmp_path: Path) -> None:
+def test_rubbish_on_the_bus_stops_no_process(tmp_path: Path) -> None:
     log, endpoint = tmp_path / "run.mcap", free_endpoint()
     run = subprocess.Popen(
         [*COMMAND, "run", "--set", "duration_s=5.0", "--endpoint", endpoint, "--log", str(log)],

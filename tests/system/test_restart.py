@@ -70,10 +70,10 @@ def test_a_rig_that_is_killed_and_started_again_is_taken_up_again(tmp_path: Path
             subprocess.run([*COMMAND, "plant", *settings], timeout=60, check=False, capture_output=True).returncode == 0
         )
         ends = {role: started[role].wait(20) for role in ("controller", "recorder")}
-        said = {role: life_of(started[role]) for role in ends}
+        reported = {role: life_of(started[role]) for role in ends}
     assert ends == {"controller": 0, "recorder": 0}
-    assert said["controller"] == ["waiting", "joined", "running", "waiting", "joined", "ended"]
-    assert said["recorder"] == ["waiting", "waiting", "joined", "running", "ended"]
+    assert reported["controller"] == ["waiting", "joined", "running", "waiting", "joined", "ended"]
+    assert reported["recorder"] == ["waiting", "waiting", "joined", "running", "ended"]
     data = read_run(log)
     codes = [event.code for event in data.events if event.source == "controller"]
     assert [code for code in codes if code in {"RIG_RESTARTED", "RIG_BACK"}] == ["RIG_RESTARTED", "RIG_BACK"]
@@ -93,7 +93,7 @@ def test_a_rig_that_is_killed_and_started_again_is_taken_up_again(tmp_path: Path
 
 
 @pytest.mark.parametrize(("role", "for_s"), [("plant", 1.0), ("controller", 1.0), ("plant", 2.5)])
-def test_who_stalls_says_so_and_the_run_goes_on(tmp_path: Path, role: str, for_s: float) -> None:
+def test_a_stalled_process_reports_it_and_the_run_goes_on(tmp_path: Path, role: str, for_s: float) -> None:
     log, endpoint = tmp_path / "run.mcap", free_endpoint()
     with processes(endpoint, log) as started:
         await_commands(endpoint)
@@ -114,10 +114,10 @@ def test_who_stalls_says_so_and_the_run_goes_on(tmp_path: Path, role: str, for_s
         assert data.trace["gap_blocks"].sum() == 0
     else:
         assert {"RIG_BACK", "GAP"} <= {event.code for event in data.events}
-    said = [event for event in data.events if event.source == "controller"]
+    reported = [event for event in data.events if event.source == "controller"]
     made_up_for = {"LATE", "FLOOD", "FOREIGN", "GAIN_LIMIT"}  # possible events when late blocks arrive at once
-    codes = [event.code for event in said if event.code not in made_up_for]
-    assert codes[-2:] == ["FRESH", "END"], [event.text for event in said]
+    codes = [event.code for event in reported if event.code not in made_up_for]
+    assert codes[-2:] == ["FRESH", "END"], [event.text for event in reported]
 
 
 def test_a_frozen_controller_is_replaced(tmp_path: Path) -> None:

@@ -70,9 +70,9 @@ def told_by(page: Path, folder: Path) -> Any:
     ]  # fmt: skip
     done = subprocess.run(command, capture_output=True, text=True, timeout=280, check=True)
     assert "CONSOLE" not in done.stderr, done.stderr
-    told = re.search(r'<body[^>]* data-told="([^"]*)"', done.stdout)
-    assert told is not None
-    return json.loads(html.unescape(told[1]))
+    state = re.search(r'<body[^>]* data-told="([^"]*)"', done.stdout)
+    assert state is not None
+    return json.loads(html.unescape(state[1]))
 
 
 def told_in_windows(page: str, folder: Path, sizes: dict[str, tuple[int, int]]) -> dict[str, Any]:
@@ -95,7 +95,7 @@ def opened(page: Path, folder: Path) -> dict[str, str | int]:
 
 
 @pytest.mark.timeout(300)
-def test_a_person_can_zoom_into_one_log_and_into_two(tmp_path: Path) -> None:
+def test_the_page_zooms_into_one_log_and_into_two(tmp_path: Path) -> None:
     logs = [tmp_path / "a.mcap", tmp_path / "b.mcap"]
     for log, ratio in zip(logs, ("1.2", "1.6"), strict=True):
         run_onboard(load_scenario("paper-c45-c45", ["duration_s=14.0", f"controller.limits.v_ratio={ratio}"]), log, {})
@@ -103,16 +103,16 @@ def test_a_person_can_zoom_into_one_log_and_into_two(tmp_path: Path) -> None:
         page = tmp_path / "page.html"
         write_review(shown, page)
         assert page.stat().st_size < MOST_BYTES
-        told = opened(page, tmp_path)
-        assert told["plots"] == 4
-        assert told["opened"] == 7
-        assert told["whole"] == "0.001 to 14.000 s"
-        from_s, to_s = (float(one) for one in str(told["dragged"]).removesuffix(" s").split(" to "))
+        state = opened(page, tmp_path)
+        assert state["plots"] == 4
+        assert state["opened"] == 7
+        assert state["whole"] == "0.001 to 14.000 s"
+        from_s, to_s = (float(time) for time in str(state["dragged"]).removesuffix(" s").split(" to "))
         assert from_s == pytest.approx(3.5, abs=0.1)
         assert to_s == pytest.approx(7.0, abs=0.1)
-        from_s, to_s = (float(one) for one in str(told["slip"]).removesuffix(" s").split(" to "))
+        from_s, to_s = (float(time) for time in str(state["slip"]).removesuffix(" s").split(" to "))
         assert from_s < 2.98 < to_s  # the first breakaway
-        assert int(told["ink"]) > 1000
+        assert int(state["ink"]) > 1000
 
 
 def test_pages_of_results_fit_a_phone(tmp_path: Path) -> None:
@@ -121,6 +121,6 @@ def test_pages_of_results_fit_a_phone(tmp_path: Path) -> None:
     look = CliRunner().invoke(app, ["look", str(tribometer(tmp_path)), "--out", str(tmp_path / "look.html")])
     assert look.exit_code == 0, look.output
     pages = [(tmp_path / name).read_text() for name in ("review.html", "look.html")]
-    told = "<script>document.body.dataset.told = JSON.stringify(document.documentElement.scrollWidth)</script></body>"
+    script = "<script>document.body.dataset.told = JSON.stringify(document.documentElement.scrollWidth)</script></body>"
     for page in (*pages, report_page(made_up.diagnosis(), "rig")):
-        assert told_in_windows(page.replace("</body>", told), tmp_path, {"phone": (390, 844)})["phone"] <= 390
+        assert told_in_windows(page.replace("</body>", script), tmp_path, {"phone": (390, 844)})["phone"] <= 390

@@ -47,7 +47,7 @@ def config(request: pytest.FixtureRequest, certificates: Path) -> Iterator[BusCo
         yield BusConfig(endpoint=endpoint.replace("tcp/", "tls/"), certificates=str(certificates))
 
 
-def test_each_role_says_its_own_topics_and_no_others(config: BusConfig) -> None:
+def test_each_role_may_publish_only_its_topics(config: BusConfig) -> None:
     heard, rig_says = Inbox(1000), Inbox(1000)
     with ExitStack() as sessions:
         plant = sessions.enter_context(Bus(config, "plant", lockstep=False))
@@ -78,7 +78,7 @@ def test_each_role_says_its_own_topics_and_no_others(config: BusConfig) -> None:
         assert not plant.wait_for({"controller", "recorder"}, 1.0)
 
 
-def test_a_viewer_passes_for_nobody(config: BusConfig) -> None:
+def test_a_viewer_cannot_pass_for_another_role(config: BusConfig) -> None:
     with Bus(config, "plant", lockstep=False) as plant, Bus(config, "viewer", lockstep=False) as viewer:
         session = viewer._session
         tokens = [
@@ -90,16 +90,16 @@ def test_a_viewer_passes_for_nobody(config: BusConfig) -> None:
             assert recorder.wait_for({"controller"}, 0.5) == {"controller"}
             plant.serve_header(wire.Header(role="plant", schema_version=2))
             began_s = time.monotonic()
-            assert [one.ok.payload.to_bytes()[:2] for one in recorder._session.get("rig/header/*", timeout=2.0)] == [
-                b"\n\x05"
-            ]
+            assert [
+                reply.ok.payload.to_bytes()[:2] for reply in recorder._session.get("rig/header/*", timeout=2.0)
+            ] == [b"\n\x05"]
             assert time.monotonic() - began_s < 1.5  # no silent session was queried
         assert not plant.alive("controller")
         assert tokens
         assert answering
 
 
-def test_without_the_password_nobody_gets_in() -> None:
+def test_without_the_password_no_client_connects() -> None:
     config = BusConfig(endpoint=free_endpoint())
     with Bus(config, "plant", lockstep=False):
         for wrong in (None, {"user": "controller", "password": "x"}, {"user": "rig", "password": ""}):
@@ -112,7 +112,7 @@ def test_without_the_password_nobody_gets_in() -> None:
             pass
 
 
-def test_without_a_certificate_of_the_authority_nobody_gets_in(certificates: Path, tmp_path: Path) -> None:
+def test_without_a_certificate_of_the_authority_no_client_connects(certificates: Path, tmp_path: Path) -> None:
     config = BusConfig(endpoint=free_endpoint().replace("tcp/", "tls/"), certificates=str(certificates))
     make_certificates(tmp_path / "other", [])
     known = {"transport/link/tls/root_ca_certificate": str(certificates / "authority.pem")}

@@ -67,7 +67,7 @@ def browser(folder: Path) -> Generator[str]:
             time.sleep(0.05)
         port = told.read_text().split()[0]
         with urllib.request.urlopen(f"http://127.0.0.1:{port}/json") as answer:
-            yield next(one["webSocketDebuggerUrl"] for one in json.load(answer) if one["type"] == "page")
+            yield next(target["webSocketDebuggerUrl"] for target in json.load(answer) if target["type"] == "page")
     finally:
         process.terminate()
         process.wait(10.0)
@@ -103,7 +103,7 @@ class Tab:
 
 @pytest.mark.skipif(BROWSER is None, reason="no chromium on this computer")
 @pytest.mark.timeout(200)
-def test_a_person_sees_a_run_and_stops_it(tmp_path: Path, runs: list[Run]) -> None:
+def test_an_operator_sees_a_run_and_stops_it(tmp_path: Path, runs: list[Run]) -> None:
     run = Run(tmp_path / "run.mcap", "--scenario", "from-the-start", seconds=95.0)
     runs.append(run)
     endpoint = run.process.args[run.process.args.index("--endpoint") + 1]  # type: ignore[union-attr,index,operator]
@@ -112,9 +112,9 @@ def test_a_person_sees_a_run_and_stops_it(tmp_path: Path, runs: list[Run]) -> No
         asyncio.run(_look(driven, page, token, pid))
     run.process.send_signal(2)
     run.end()
-    said = [one.text for one in read_run(run.log).events if one.code == "OPERATOR"]
-    assert next(text.split()[0] for text in said if text.startswith(("STOP", "RESET"))) == "STOP"
-    assert any(text.startswith("RESET") for text in said)
+    texts = [event.text for event in read_run(run.log).events if event.code == "OPERATOR"]
+    assert next(text.split()[0] for text in texts if text.startswith(("STOP", "RESET"))) == "STOP"
+    assert any(text.startswith("RESET") for text in texts)
 
 
 def cpu_s(pid: int) -> float:
@@ -139,10 +139,10 @@ async def _look(driven: str, page: str, token: str, pid: int) -> None:
         await asyncio.sleep(_MEASURED_S)
         assert (cpu_s(pid) - before_s) / _MEASURED_S < CORE_SHARE * busy()
         assert await tab.run("document.querySelectorAll('.uplot').length") == 4
-        said = await tab.until(
+        texts = await tab.until(
             "document.getElementById('said').textContent", lambda text: "in the last" in (text or ""), 5.0
         )
-        assert re.search(r"slips? in the last \d+ s; [A-Z]+: ", said)
+        assert re.search(r"slips? in the last \d+ s; [A-Z]+: ", texts)
         await tab.run("document.getElementById('stop').click()")
         await tab.until("document.getElementById('told').textContent", lambda text: "done after" in text, 8.0)
         await tab.until(

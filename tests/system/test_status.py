@@ -29,7 +29,7 @@ BLOCK_NS = 20_000_000
 
 
 def messages(number: int, trace: dict[str, Any], applied: dict[str, Any]) -> dict[Topic, bytes]:
-    """What rig and controller publish of one block."""
+    """Messages of rig and controller for one block."""
     times = {"sequence": number, "t_ns": (number + 1) * BLOCK_NS}
     defaults = {
         SENSORS: (sensor_block(20), {"drive_force_N": 13.5}),
@@ -87,17 +87,17 @@ def config() -> BusConfig:
     return BusConfig(endpoint=free_endpoint())
 
 
-def test_a_rig_and_its_controller_are_told(config: BusConfig) -> None:
-    said = Inbox(10)
+def test_a_rig_and_its_controller_are_shown(config: BusConfig) -> None:
+    inbox = Inbox(10)
     with Bus(config, "plant", lockstep=False) as plant, Bus(config, "controller", lockstep=False) as controller:
         plant.serve_header(HEADER)
-        plant.listen(OPERATOR, said.keep)
+        plant.listen(OPERATOR, inbox.keep)
         plant.announce()
         controller.announce()
         assert not plant.wait_for(["plant", "controller"], PATIENCE_S)
         with publishing(plant, controller, {}, {}):
             seen, lines = look(config)
-        assert said.get_nowait() is None
+        assert inbox.get_nowait() is None
         assert not plant.alive("status")
     assert (seen.rig, seen.roles, seen.controlled) == ("lathe", ["plant", "controller"], True)
     assert (seen.mode, seen.reason, seen.limit, seen.contact) == ("EXCITE", "HELD", "SLEW", "SMOOTH")
@@ -149,13 +149,13 @@ def test_a_rig_alone_ends_with_status_1(config: BusConfig) -> None:
     assert (table["roles"], table["mode"]) == (["plant"], None)
 
 
-def test_nobody_is_told_soon(config: BusConfig) -> None:
+def test_a_missing_rig_is_reported_within_a_short_time(config: BusConfig) -> None:
     with pytest.raises(Fault, match=r"no rig answered at \S+ within 0\.4 s") as raised:
         look(config)
     assert raised.value.kind is FAULTS["NO_PEER"]
 
 
-def test_another_prefix_is_told(config: BusConfig) -> None:
+def test_another_prefix_is_reported(config: BusConfig) -> None:
     with Bus(config, "plant", lockstep=False) as plant:
         plant.announce()
         with pytest.raises(

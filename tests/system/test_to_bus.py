@@ -24,7 +24,7 @@ def until_quiet(inbox: Inbox) -> list[Received]:
 
 def codes(received: list[Received]) -> set[str]:
     """Of the plant's events."""
-    return {wire.Event.FromString(one.payload).code for one in received if one.topic is PLANT_EVENT}
+    return {wire.Event.FromString(message.payload).code for message in received if message.topic is PLANT_EVENT}
 
 
 def test_pause_and_go_on() -> None:
@@ -48,7 +48,7 @@ def test_pause_and_go_on() -> None:
             assert resumed is not None
             after = [resumed, *until_quiet(inbox)]
         assert "END" in codes(after)
-        numbers = [wire.SensorBlock.FromString(one.payload).sequence for one in after if one.topic is SENSORS]
+        numbers = [wire.SensorBlock.FromString(row.payload).sequence for row in after if row.topic is SENSORS]
         assert numbers == list(range(numbers[0], 1500))
         assert player.wait(10) == 0
     finally:

@@ -44,16 +44,16 @@ def test_the_wheel_holds_every_file_of_the_packages_and_nothing_else(wheel: Path
     assert held == {f"cockpit/{name}" if name.startswith("deploy/") else name for name in listed}
 
 
-def test_what_the_wheel_holds_runs_in_an_empty_folder(wheel: Path, tmp_path: Path) -> None:
+def test_the_content_of_the_wheel_runs_in_an_empty_folder(wheel: Path, tmp_path: Path) -> None:
     unpacked, empty = tmp_path / "unpacked", tmp_path / "empty"
     empty.mkdir()
     zipfile.ZipFile(wheel).extractall(unpacked)
     # interpreted: the kernels at another path would be compiled again, for half a minute, and never used
-    said = run(
+    output = run(
         sys.executable, "-P", "-m", "cockpit", "run", "--in-process", "--scenario", "from-the-start", "--set", "duration_s=0.05",
         cwd=empty, PYTHONPATH=str(unpacked), NUMBA_DISABLE_JIT="1",
     )  # fmt: skip
-    assert "data     whole: 50 blocks" in said
+    assert "data     whole: 50 blocks" in output
     where = run(
         sys.executable, "-P", "-c", "import cockpit; print(cockpit.__file__)", cwd=empty, PYTHONPATH=str(unpacked)
     )
@@ -73,11 +73,11 @@ def test_a_fresh_installation_is_small_and_runs(wheel: Path, tmp_path: Path) -> 
     at = installed(tmp_path / "base", str(wheel))
     files = [path for path in (tmp_path / "base" / "lib").rglob("*") if path.is_file()]
     assert sum(path.stat().st_blocks * 512 for path in files) < BASE_MB * 2**20
-    said = run(
+    output = run(
         at / "stickslip", "run", "--lockstep", "--scenario", "from-the-start", "--set", "duration_s=1",
         "--endpoint", free_endpoint(), cwd=tmp_path, NUMBA_CACHE_DIR=str(tmp_path),
     )  # fmt: skip
-    assert "data     whole: 1000 blocks" in said
+    assert "data     whole: 1000 blocks" in output
 
 
 @pytest.mark.nightly
@@ -85,5 +85,5 @@ def test_a_fresh_installation_is_small_and_runs(wheel: Path, tmp_path: Path) -> 
 def test_a_fresh_installation_with_all_diagnoses(wheel: Path, tmp_path: Path) -> None:
     made_up.evidence_folder(tmp_path / "evidence")
     at = installed(tmp_path / "all", f"{wheel}[all]")
-    said = run(at / "stickslip", "diagnose", "evidence", "--jobs", "2", cwd=tmp_path, NUMBA_CACHE_DIR=str(tmp_path))
-    assert said.startswith("unexplained")
+    output = run(at / "stickslip", "diagnose", "evidence", "--jobs", "2", cwd=tmp_path, NUMBA_CACHE_DIR=str(tmp_path))
+    assert output.startswith("unexplained")

@@ -153,7 +153,7 @@ def test_a_random_track_goes_on_below_0(way):
     coulomb_N = rig().contact.coulomb_force_N
     assert result.true_friction_force_N == pytest.approx(way * coulomb_N * (1 + 0.1 * noise), rel=2e-3)
     at = way * np.arange(0.0, 4000.0, 0.1)
-    numbers = np.array([smooth_noise(one, 7.0) for one in at])
+    numbers = np.array([smooth_noise(speed, 7.0) for speed in at])
     assert numbers.mean() == pytest.approx(0.0, abs=0.05)
     assert numbers.var() == pytest.approx(1.0, rel=0.05)
 
@@ -169,7 +169,7 @@ def readings(config, analogue_N, analogue_m):
     return block[0]
 
 
-def test_sensors_measure_below_0_where_they_are_told_to():
+def test_sensors_measure_below_0_where_configured():
     two_sided = {"force_lowest_N": -50.0, "position_lowest_m": -0.05, "position_linearity": 0.0}
     force_N = np.array([-60.0, -50.0, -17.0, 0.0, 17.0, 50.0, 60.0])
     place_m = force_N * 1e-3

@@ -136,7 +136,7 @@ def test_the_base_vibrates_with_the_paper_s_velocity_amplitude(frequency_Hz):
 
 
 @pytest.mark.parametrize("pair", STEEL_PAIRS)
-def test_damping_is_that_of_table_2_and_critical(pair):
+def test_damping_matches_table_2_and_is_critical(pair):
     numbers = PAIRS[pair]
     assert numbers["damping_Ns_per_m"] == PRINTED_DAMPING_NS_PER_M[pair]
     critical_Ns_per_m = 2 * math.sqrt(numbers["stiffness_N_per_m"] * rig(pair).slide.mass_kg)

@@ -51,7 +51,7 @@ def test_damping_makes_the_free_oscillation_decay_as_its_closed_form():
 
 
 @pytest.mark.parametrize("relaxation_s", [5e-4, 5e-3, 50e-3])
-def test_a_damper_on_a_spring_of_its_own_swings_as_its_equations(relaxation_s):
+def test_a_damper_in_series_with_a_spring_follows_its_equations(relaxation_s):
     damping = 30.0
     table = {"form": "relaxing", "damping_Ns_per_m": damping, "relaxation_s": relaxation_s}
     result = released({"drive-damping": table})
@@ -210,7 +210,7 @@ def test_where_a_screw_s_even_drive_would_be(ratio):
     params, _ = build(config)
     # the run begins at its even position, not where its lead error would have it
     error_m = ratio * wavelength_m / TAU * (-math.cos(1.0) - 0.15 * math.cos(2.0) - 0.25 * math.sin(2.0))
-    found_m = np.array([even_m(params[0], one + error_m) for one in result.true_drive_position_m])
+    found_m = np.array([even_m(params[0], position_m + error_m) for position_m in result.true_drive_position_m])
     assert found_m == pytest.approx(5e-4 * result.t_s, abs=1e-11)
 
 

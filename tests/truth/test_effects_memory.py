@@ -44,7 +44,7 @@ FORMS = [
 
 
 @pytest.mark.parametrize("ageing", FORMS, ids=lambda ageing: ageing["form"])
-def test_breakaway_after_a_rest_is_that_of_the_bristle_and_the_age(ageing):
+def test_breakaway_after_a_rest_follows_from_bristle_and_age(ageing):
     """Independently: z' = v - k_t v z / g, age' = 1 - v age / L with L ten bristle reaches, from an age of the rest."""
     rest_s = 0.5
     reach_m = 10 * CONTACT.static_force_N / K_T
@@ -63,7 +63,7 @@ def test_breakaway_after_a_rest_is_that_of_the_bristle_and_the_age(ageing):
 
 
 @pytest.mark.parametrize("ageing", FORMS, ids=lambda ageing: ageing["form"])
-def test_the_static_friction_can_be_that_of_a_rested_contact(ageing):
+def test_the_static_friction_may_refer_to_a_rested_contact(ageing):
     from_new, from_rested = (pulled_after(0.5, ageing | {"rested_s": rested_s})[1].max() for rested_s in (0.0, 0.2))
     assert from_new - from_rested == pytest.approx(growth_N(ageing, 0.2), rel=0.03)
 
@@ -139,7 +139,7 @@ def test_a_dead_time_shows_the_stribeck_curve_an_earlier_speed():
 
 @pytest.mark.parametrize("step_s", [2.5e-6, 5e-6, 1e-5, 2e-5, 5e-5])
 @pytest.mark.parametrize("delay_s", [1e-5, 2.03e-3, LONGEST_LAG_S])
-def test_a_dead_time_is_as_long_as_it_says_at_every_step(step_s, delay_s):
+def test_a_dead_time_has_its_length_at_every_step(step_s, delay_s):
     params, state = build(rig({"frictional-lag": {"form": "dead-time", "delay_s": delay_s}}))
     for n in range(round(0.05 / step_s)):
         t_s = n * step_s

@@ -28,7 +28,7 @@ def test_roll_off_takes_from_the_amplitude(form, power, frequency_Hz):
 
 
 @pytest.mark.parametrize("frequency_Hz", [500.0, 2900.0, 3000.0, 5000.0])
-def test_resonance_is_that_of_a_mass_on_a_spring(frequency_Hz):
+def test_the_resonance_matches_a_mass_on_a_spring(frequency_Hz):
     effects = {"piezo-resonance": {"resonance_Hz": 3000.0, "damping_ratio": 0.1}}
     r = frequency_Hz / 3000.0
     expected = 1 / abs(1 - r**2 + 2j * 0.1 * r)

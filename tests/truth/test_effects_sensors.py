@@ -50,7 +50,7 @@ def test_the_reading_is_off_by_the_formula(effect, values, reading):
     assert result.drive_force_N == pytest.approx(reading(result.true_drive_force_N, result.t_s), abs=1e-9)
 
 
-def test_a_bias_is_what_is_read_whatever_the_amplifier():
+def test_the_amplifier_does_not_change_a_bias():
     def read_N(bias_N):
         effects = {"force-sensor-bias": {"bias_N": bias_N}}
         sensors = {"force_gain": 1.1, "force_noise_N": 0.0, "force_resolution_N": 0.0}

@@ -37,7 +37,7 @@ def test_slide_and_frame_swing_as_two_masses(frequency_Hz, damping):
     assert result.true_position_m == pytest.approx(expected_m, abs=5e-6)
 
 
-def test_their_modes_are_those_of_the_eigenproblem():
+def test_the_modes_match_the_eigenproblem():
     ratio, frequency_Hz = 1.0, 40.0
     config = rig(frame(ratio, frequency_Hz, 0.0), contact=NO_FRICTION)
     result = run(config, np.zeros(4000), {"s_d": 1e-3})

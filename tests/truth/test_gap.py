@@ -60,7 +60,7 @@ def test_two_rough_surfaces_are_one_floor_apart(bench):
     assert max(gaps) < 1.6
 
 
-def test_what_a_slip_does_to_all_features_of_its_segment_counts_once(bench):
+def test_the_effect_of_a_slip_on_all_features_of_its_segment_counts_once(bench):
     """Among runs that the floor was not made from, along the direction in which a segment scatters most."""
     z = between(bench.floor, bench.problem.predicted(bench.point({})), bench.runs(16, 2))
     z = compress(np.where(np.isfinite(z), z, 0.0))
@@ -69,10 +69,10 @@ def test_what_a_slip_does_to_all_features_of_its_segment_counts_once(bench):
     segments = [(file, label.segment) for file, label in compared]
     lengths = []
     for segment in dict.fromkeys(segments):
-        own = np.array([one == segment for one in segments])
-        main = np.linalg.svd(z[:, own], full_matrices=False)[2][0]
-        one_deviation = np.std(z[:, own] @ main) * main
-        lengths.append(np.linalg.norm(bench.floor.whitening[:, own] @ one_deviation))
+        in_segment = np.array([one == segment for one in segments])
+        main = np.linalg.svd(z[:, in_segment], full_matrices=False)[2][0]
+        one_deviation = np.std(z[:, in_segment] @ main) * main
+        lengths.append(np.linalg.norm(bench.floor.whitening[:, in_segment] @ one_deviation))
     assert 0.7 < np.median(lengths) < 2.0  # 3.7 where correlations between segments were taken for real
     assert max(lengths) < 3.0  # 5.6
 
@@ -86,10 +86,10 @@ def test_a_power_that_is_above_its_replicates_by_chance_leaves_something_of_a_we
     below = drawn.mean(axis=0) < plain
     assert (below & powers).sum() > 5
     floor = floor_of(bench.problem, bench.point({}), drawn)
-    own = below & powers & floor.compared
-    weak = np.where(own, 0.2 * plain, plain)
-    assert floor.expected(weak)[own] == pytest.approx(0.5 * np.log(weak[own]))
-    assert np.all(np.abs(between(floor, weak, plain)[own[floor.compared]]) < 4.0)
+    weak_rows = below & powers & floor.compared
+    weak = np.where(weak_rows, 0.2 * plain, plain)
+    assert floor.expected(weak)[weak_rows] == pytest.approx(0.5 * np.log(weak[weak_rows]))
+    assert np.all(np.abs(between(floor, weak, plain)[weak_rows[floor.compared]]) < 4.0)
 
 
 def test_slips_that_the_model_lacks_count_once_each(bench):

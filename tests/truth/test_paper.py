@@ -26,7 +26,7 @@ TABLE = {
 # nightly: `stickslip reproduce` makes the same runs and holds them against the same numbers, tests/unit/cockpit/test_reproduce.py
 @pytest.mark.nightly
 @pytest.mark.parametrize(("pair", "frequency_Hz"), TABLE)
-def test_the_cycle_means_are_those_of_the_independent_solution(pair, frequency_Hz):
+def test_the_cycle_means_match_the_independent_solution(pair, frequency_Hz):
     expected = TABLE[pair, frequency_Hz]
     mean = run(pair, frequency_Hz, lambda: None).mean
     if len(expected) == 1:

@@ -19,7 +19,7 @@ from diagnosis.model.sensor_chain import SENSOR_EFFECTS
 from plant.core import advance, advance_disturbed
 from plant.effects.library import EFFECTS
 from plant.four_rigs import advance_lanes
-from plant.four_rigs_step import LANES, NARROW, gone
+from plant.four_rigs_step import LANES, NARROW, decayed
 from plant.records import TRUTH
 from tests.prepared import prepared
 
@@ -93,14 +93,14 @@ def steps_of_one_length(p, s, first):
 
 def test_the_exponential_of_additions_and_multiplications():
     a = np.concatenate([np.linspace(0.0, 3.0, 3001), np.geomspace(1e-12, 690.0, 3001)])
-    found = np.array([gone(one) for one in a])
-    np.testing.assert_allclose(found, np.expm1(-a), rtol=3e-16, atol=3e-16)
+    results = np.array([decayed(item) for item in a])
+    np.testing.assert_allclose(results, np.expm1(-a), rtol=3e-16, atol=3e-16)
 
 
-def worst(found, expected) -> float:
+def worst(results, expected) -> float:
     return max(
         float(np.abs(one[name] - other[name]).max() / (np.abs(other[name]).max() + 1e-12))
-        for one, other in zip(found, expected, strict=True)
+        for one, other in zip(results, expected, strict=True)
         for name in other
     )
 
@@ -117,17 +117,17 @@ def test_as_the_plants_kernel(ladder, tables, name, form):
     rig, _ = ladder
     configs = rigs(rig, tables[name, form] if name else {}, count=2)
     commands, start = there_and_back(), Start(0.5 * rig.coulomb_force_N, 0.0)
-    found = predict_many(configs, False, commands, [start] * 2, [()] * 2)
+    results = predict_many(configs, False, commands, [start] * 2, [()] * 2)
     expected = [alone(config, commands, start) for config in configs]
     assert np.ptp(expected[0]["drive_force_N"]) > 20.0  # it slides both ways
-    assert worst(found, expected) < ROUNDING
+    assert worst(results, expected) < ROUNDING
 
 
 @pytest.mark.slow
 def test_as_the_plants_kernel_on_a_rough_surface_and_with_a_tail(ladder):
     rig, _ = ladder
     tail = [{"coulomb_force_N": rig.coulomb_force_N * share, "stribeck_tail": 0.3} for share in (1.0, 1.004)]
-    configs = rigs(rig, {}, Roughness(0.01, 2e-5, 7), count=2) + [rig_config(rig, one, {}, None) for one in tail]
+    configs = rigs(rig, {}, Roughness(0.01, 2e-5, 7), count=2) + [rig_config(rig, lane, {}, None) for lane in tail]
     commands, start = there_and_back(), Start(0.5 * rig.coulomb_force_N, 0.0)
     assert (
         worst(
@@ -146,9 +146,9 @@ def test_to_the_last_bit_the_same_in_any_company(ladder, tables):
     configs = [rig_config(rig, {}, tables[key], None) for key in FORMS]
     assert len(configs) > 2 * LANES
     together = predict_many(configs, False, commands, [start] * len(configs), [entries] * len(configs))
-    for config, found in zip(configs, together, strict=True):
+    for config, results in zip(configs, together, strict=True):
         by_itself = predict(config, False, commands, start, entries)
-        assert all(np.array_equal(found[name], by_itself[name]) for name in by_itself)
+        assert all(np.array_equal(results[name], by_itself[name]) for name in by_itself)
 
 
 def test_to_the_last_bit_the_same_whether_four_or_eight_are_stepped_at_once(ladder, tables):
@@ -170,7 +170,7 @@ def test_to_the_last_bit_the_same_whether_four_or_eight_are_stepped_at_once(ladd
         assert all(np.array_equal(one[name], other[name]) for name in other)
 
 
-def test_what_may_be_asked_next_is_simulated_where_a_lane_is_free(ladder, monkeypatch):
+def test_likely_next_points_are_simulated_in_free_lanes(ladder, monkeypatch):
     rig, runs = ladder
     nuisances = Nuisances(rig)
     now, soon, *later = (nuisances.point(0.1 * number * np.ones(len(nuisances)), {}) for number in range(6))
@@ -178,10 +178,10 @@ def test_what_may_be_asked_next_is_simulated_where_a_lane_is_free(ladder, monkey
     problem = Problem(rig, runs[:1])
     calls = []
     monkeypatch.setattr(twin, "advance_lanes", lambda *given: calls.append(advance_lanes(*given)))
-    found = problem.predicted_many([now], perhaps=[soon, *later])
+    results = problem.predicted_many([now], perhaps=[soon, *later])
     assert len(calls) == 1
     again = problem.predicted(soon)
     assert len(calls) == 1
     problem.predicted(later[-1])  # there was no lane for it
     assert len(calls) == 2
-    assert np.array_equal([*found, again], alone, equal_nan=True)
+    assert np.array_equal([*results, again], alone, equal_nan=True)

@@ -115,7 +115,7 @@ def test_no_damping_no_critical_velocity():
 
 @pytest.mark.parametrize(("damping", "stiffness"), [(50.0, 11700.0), (10.0, 2000.0), (50.0, 200_000.0)])
 @pytest.mark.parametrize("ratio", [0.95, 1.05])
-def test_growth_beside_the_critical_velocity_is_the_rig_s(damping, stiffness, ratio):
+def test_growth_near_the_critical_velocity_matches_the_rig(damping, stiffness, ratio):
     critical_mps = critical_velocity_mps(rig(damping=damping, stiffness=stiffness))
     config = rig(ratio * critical_mps, damping, stiffness)
     growth_per_s = measured_growth_per_s(force_near_steady(config, 1.0, 1e-5 if ratio < 1 else 1e-3), 5e-5)
@@ -227,10 +227,10 @@ def test_the_map_of_a_rig_with_effects(tmp_path):
         "frame-compliance": {"ratio": 0.1},
     }
     table = rig(0.002).model_dump() | {"effects": effects}
-    found = draw_map(validate(RigConfig, table, "test"), tmp_path / "effects.png")
-    assert found.critical_velocity_mps == plain.critical_velocity_mps
-    assert found.left_out == ("frame-compliance",)
-    assert "left out: frame-compliance" in found.answer
+    drawn_map = draw_map(validate(RigConfig, table, "test"), tmp_path / "effects.png")
+    assert drawn_map.critical_velocity_mps == plain.critical_velocity_mps
+    assert drawn_map.left_out == ("frame-compliance",)
+    assert "left out: frame-compliance" in drawn_map.answer
 
 
 @pytest.mark.slow
@@ -248,7 +248,7 @@ def test_the_picture_and_its_numbers(tmp_path):
     assert "a start at rest ends in stick-slip" in between.answer
 
 
-def test_of_several_drive_velocities_the_one_that_needs_most_is_told(tmp_path, monkeypatch):
+def test_the_most_demanding_of_several_drive_velocities_is_reported(tmp_path, monkeypatch):
     """A damped drive at 1 mm/s sticks and slips; at 10 mm/s, to which it goes later, it does not."""
     monkeypatch.setattr(of_map, "_draw", lambda *_: None)  # 5 s of CPU, and the numbers are judged here
     profile = {"profile": [[0.0, 1e-3], [6.0, 1e-3], [6.1, 1e-2]], "damping_Ns_per_m": 50.0}

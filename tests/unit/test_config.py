@@ -16,14 +16,14 @@ from plant.config import RigConfig
 
 
 @pytest.mark.parametrize("line", ["mass_kg = 2,0", "slide = { mass_kg = -2,0e-3 }"])
-def test_a_decimal_comma_is_told(tmp_path: Path, line: str) -> None:
+def test_a_decimal_comma_is_reported(tmp_path: Path, line: str) -> None:
     (tmp_path / "rig.toml").write_text(f"# a rig\n{line}\n")
     number = line.partition("kg = ")[2].rstrip(" }").replace(",", ".")
     with pytest.raises(Fault, match=rf"rig.toml: not valid TOML: .*line 2.*; write a decimal point: {number}$"):
         read_toml(tmp_path / "rig.toml")
 
 
-def test_a_misspelt_key_is_not_told_as_a_missing_one_too() -> None:
+def test_a_misspelt_key_is_not_reported_as_missing_too() -> None:
     class Slide(Strict):
         mass_kg: float
         length_m: float
@@ -43,6 +43,7 @@ def test_a_misspelt_key_is_not_told_as_a_missing_one_too() -> None:
         (["rig.slide.mas_kg=1.0"], ["rig.slide.mas_kg", "unknown key", "mass_kg"]),
         (['rig.slide.mass_kg="heavy"'], ["rig.slide.mass_kg", "'heavy'", "number"]),
         (["rig.slide.mass_kg=2,5"], ["rig.slide.mass_kg", "'2,5'", "number", "write a decimal point: 2.5"]),
+        (["rig.slide.mass_kg=heavy"], ["rig.slide.mass_kg", "'heavy'", "number", "write digits, such as 1.5"]),
         (['rig.contact.pair="ice"'], ["ice", "unknown friction pair", "C45-C45 @ 0.063"]),
         (["rig.contact.pair=[1]"], ["pair = [1]", "unknown friction pair"]),
         (["rig.solver.step_s=2e-5"], ["step_s", "too coarse", "5000", "1e-05"]),
@@ -179,7 +180,7 @@ def test_unknown_scenario_names_the_known_ones(name: str) -> None:
         load_scenario(name, [])
 
 
-def test_keys_of_older_files_are_told_once_and_left_out(
+def test_keys_of_older_files_are_reported_once_and_left_out(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("bridge.config._REPORTED", set())
@@ -190,8 +191,10 @@ def test_keys_of_older_files_are_told_once_and_left_out(
     }
     for _ in range(2):
         assert validate(ControllerConfig, older, "older.toml") == ControllerConfig()
-    told = sorted(line.removeprefix("stickslip: ").partition(":")[0] for line in capsys.readouterr().err.splitlines())
-    assert told == ["gain", "gentle_ratio", "onset", "too_late_from"]
+    reported = sorted(
+        line.removeprefix("stickslip: ").partition(":")[0] for line in capsys.readouterr().err.splitlines()
+    )
+    assert reported == ["gain", "gentle_ratio", "onset", "too_late_from"]
 
 
 def test_missing_and_broken_files(tmp_path: Path) -> None:
@@ -212,14 +215,14 @@ def test_an_error_in_a_rig_file_names_it(tmp_path: Path) -> None:
         load_scenario("paper-c45-c45", [rig_setting(str(rig))])
 
 
-def test_a_text_of_another_form_is_told_with_one_of_the_right_form() -> None:
+def test_a_text_of_the_wrong_form_is_reported_with_an_example_of_the_right_form() -> None:
     with pytest.raises(
         Fault, match=r"bus.endpoint = 'foo': must have the form of 'tcp/127.0.0.1:7447'; change the value"
     ):
         load_scenario("paper-c45-c45", ["bus.endpoint=foo"])
 
 
-def test_a_setting_is_blamed_for_what_is_its_own_and_a_file_for_the_rest(tmp_path: Path) -> None:
+def test_an_error_names_the_setting_or_the_file_that_causes_it(tmp_path: Path) -> None:
     with pytest.raises(Fault) as caught:
         load_scenario("paper-c45-c45", ["rig.slide.mass_kg=-1.0", "duration_s=soon", "seed=3"])
     first, second = sorted(caught.value.line.splitlines())
@@ -279,20 +282,20 @@ def test_every_rig_and_scenario_that_comes_along_is_valid() -> None:
         assert load_scenario(path.stem, []).description
 
 
-def test_pair_fills_in_what_is_not_given() -> None:
+def test_pair_fills_in_missing_values() -> None:
     rig = validate(RigConfig, {"contact": {"pair": "C45-C45 @ 0.063", "static_force_N": 18.0}}, "test")
     assert rig.contact.static_force_N == 18.0
     assert rig.contact.stiffness_N_per_m == 77.52e6
 
 
 @pytest.mark.parametrize("text", ["mass_kg = 1" + 5000 * "0", "a = " + 5000 * "["], ids=["digits", "depth"])
-def test_a_file_that_is_too_much_for_pythons_own_reader_is_told(tmp_path: Path, text: str) -> None:
+def test_a_file_too_deep_for_the_toml_reader_is_reported(tmp_path: Path, text: str) -> None:
     (tmp_path / "rig.toml").write_text(text)
     with pytest.raises(Fault, match=r"CONFIG: .*rig.toml: not valid TOML: "):
         read_toml(tmp_path / "rig.toml")
 
 
-def test_a_pipe_is_no_file_to_read(tmp_path: Path) -> None:
+def test_a_pipe_is_not_read_as_a_file(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.toml")
     for load in (load_rig, load_scenario):
         with pytest.raises(Fault, match=r"CONFIG: .*pipe.toml: must be a file on a disk; give the path of a TOML file"):

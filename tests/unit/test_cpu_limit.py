@@ -31,14 +31,14 @@ def test_dear_and_marked():
 
 
 @pytest.mark.parametrize(
-    ("limits", "status", "said"),
+    ("limits", "status", "message"),
     [
         (("--cpu-each", "0.3"), 1, "s of CPU: must be 0.3 s at most; do it with less, or mark it slow"),
         (("--cpu-all", "0.6"), 1, "must be 0.6 s at most"),
         (("--cpu-each", "30", "--cpu-all", "60"), 0, "3 passed"),
     ],
 )
-def test_what_costs_more_than_it_may_fails(tmp_path, limits, status, said):
+def test_a_test_over_its_cpu_limit_fails(tmp_path, limits, status, message):
     (tmp_path / "test_made_up.py").write_text(TESTS)
     (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n  slow: costs much\n")
     command = [
@@ -54,7 +54,7 @@ def test_what_costs_more_than_it_may_fails(tmp_path, limits, status, said):
     ]
     done = subprocess.run([*command, *limits, tmp_path], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == status, done.stdout
-    assert said in done.stdout
+    assert message in done.stdout
     if "--cpu-all" not in limits:
         assert "1 error" in done.stdout
         assert "ERROR at teardown of test_dear " in done.stdout

@@ -45,8 +45,8 @@ def test_links_lead_somewhere(page: Path) -> None:
             continue
         file, _, anchor = link.partition("#")
         target = (page.parent / file).resolve() if file else page
-        there = target in GENERATED or target.is_file()
-        if not there or (anchor and anchor not in _anchors(target)):
+        exists = target in GENERATED or target.is_file()
+        if not exists or (anchor and anchor not in _anchors(target)):
             dead.append(link)
     assert not dead
 
@@ -60,7 +60,7 @@ def test_pages_outside_of_docs_link_to_no_generated_page(name: str) -> None:
 @pytest.mark.parametrize("page", PAGES, ids=_name)
 def test_named_files_exist(page: Path) -> None:
     named = set(_FILE.findall(_text(page)))
-    assert not [one for one in sorted(named) if not any(ROOT.glob(one.rstrip("/")))]
+    assert not [page for page in sorted(named) if not any(ROOT.glob(page.rstrip("/")))]
 
 
 def test_pages_that_the_code_names_exist() -> None:
@@ -69,8 +69,8 @@ def test_pages_that_the_code_names_exist() -> None:
         for name in ("bridge", "controller", "plant", "diagnosis", "cockpit", "tests")
         for path in (ROOT / name).rglob("*.py")
     ]
-    named = {one for path in sources for one in re.findall(r"\bdocs/[\w/-]+\.md", path.read_text(encoding="utf-8"))}
-    assert not [one for one in sorted(named) if not (ROOT / one).is_file()]
+    named = {page for path in sources for page in re.findall(r"\bdocs/[\w/-]+\.md", path.read_text(encoding="utf-8"))}
+    assert not [page for page in sorted(named) if not (ROOT / page).is_file()]
 
 
 def test_generated_pages_are_not_in_git() -> None:
@@ -78,7 +78,7 @@ def test_generated_pages_are_not_in_git() -> None:
     assert {f"docs/reference/{page.name}" for page in GENERATED} <= set(ignored)
 
 
-def test_the_configurations_of_zenoh_are_those_of_the_code() -> None:
+def test_the_documented_zenoh_configurations_match_the_code() -> None:
     made = zenoh_files.configurations()
     assert {path.name for path in zenoh_files.FOLDER.glob("*.json5")} == made.keys()
     assert not [name for name, text in made.items() if (zenoh_files.FOLDER / name).read_text() != text], (
@@ -92,7 +92,7 @@ def test_readme_is_a_landing_page() -> None:
     assert len(text.split()) <= 700
 
 
-def test_readme_shows_what_its_commands_print() -> None:
+def test_readme_shows_the_output_of_its_commands() -> None:
     text = readme.README.read_text(encoding="utf-8")
     kept = readme.KEPT.read_text(encoding="utf-8")
     assert re.findall(r"^\$ (.*)$", kept, re.MULTILINE) == readme.commands(text)
@@ -105,8 +105,8 @@ def test_readme_shows_what_its_commands_print() -> None:
 def test_readme_names_the_folders_that_there_are(package: str) -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     (row,) = re.findall(rf"^    {package}/ (.*(?:\n     .*)*)", text, re.MULTILINE)
-    there = {path.parent.name for path in (ROOT / package).glob("*/*") if path.parent.name != "__pycache__"}
-    assert set(re.findall(r"(\w+)/", row)) == there
+    folders = {path.parent.name for path in (ROOT / package).glob("*/*") if path.parent.name != "__pycache__"}
+    assert set(re.findall(r"(\w+)/", row)) == folders
 
 
 def test_contributing_names_commands_that_there_are() -> None:

@@ -13,7 +13,7 @@ def moment(monkeypatch):
     return "moment"
 
 
-def test_it_is_made_once_and_is_what_would_be_made_now(moment, tmp_path, monkeypatch):
+def test_the_evidence_is_made_once_and_equals_fresh_evidence(moment, tmp_path, monkeypatch):
     kept = made_evidence(Case(moment), 4)
     make_evidence(tmp_path, Case(moment), 4)
     assert {path.name: path.read_bytes() for path in kept.iterdir()} == {
@@ -30,7 +30,7 @@ def test_it_is_made_once_and_is_what_would_be_made_now(moment, tmp_path, monkeyp
 
 
 @pytest.mark.parametrize("place", MAKERS)
-def test_an_edit_of_what_makes_it_is_seen(tmp_path, place):
+def test_an_edit_of_its_generator_is_seen(tmp_path, place):
     def checkout(name: str, text: str) -> str:
         root = tmp_path / name
         (root / place / "deep").mkdir(parents=True)

@@ -12,7 +12,7 @@ from tests.stall_report import LEAST_NS, _Thread, words
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
-# stands in for the timers: the computer stalls during each test with the word in its name
+# replaces the timers: the computer stalls during each test with `stalled` in its name
 CONFTEST = """
 from bridge.wire.pauses import Pause
 from tests import stall_report
@@ -45,7 +45,7 @@ def test_bad_with_stall(): raise ValueError("late")
 
 
 @pytest.mark.parametrize(
-    ("more", "option", "seconds", "status", "said"),
+    ("more", "option", "seconds", "status", "expected"),
     [
         ("", "--excuse-stalls", 1, 0, "NOT JUDGED test_made_up.py::test_bad_with_stall: the computer stalled 1 time"),
         ("", "--stalls", 1, 1, "during test_made_up.py::test_bad_with_stall: stalled 1 time, longest 1000 ms"),
@@ -54,7 +54,7 @@ def test_bad_with_stall(): raise ValueError("late")
     ],
 )
 def test_only_a_failure_during_a_stall_is_excused(
-    tmp_path: Path, more: str, option: str, seconds: int, status: int, said: str
+    tmp_path: Path, more: str, option: str, seconds: int, status: int, expected: str
 ) -> None:
     (tmp_path / "conftest.py").write_text(CONFTEST.replace("SECONDS", str(seconds)))
     (tmp_path / "test_made_up.py").write_text(TESTS + more)
@@ -72,7 +72,7 @@ def test_only_a_failure_during_a_stall_is_excused(
     ]
     done = subprocess.run([*command, option, tmp_path], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == status, done.stdout
-    assert said in done.stdout
+    assert expected in done.stdout
     assert ("ValueError: late" in done.stdout) or status == 0
 
 

@@ -1,4 +1,4 @@
-"""What the harness of stalls counts."""
+"""The counts of the stall harness."""
 
 import numpy as np
 import pytest

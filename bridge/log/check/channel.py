@@ -25,9 +25,9 @@ _ROUNDING = 1e-6  # tolerance at an end of the range. Below 6e-8: float32 misses
 
 
 class ChannelLimits(NamedTuple):
-    """The description of a channel, in its unit; NaN or infinite for a number that the log lacks."""
+    """Noise, resolution and range of a channel, in its unit; NaN or infinite for a number that the log lacks."""
 
-    noise: float = math.nan  # rms of a sample
+    noise: float = math.nan  # rms
     step: float = math.nan  # resolution
     low: float = -math.inf  # ends of the range
     high: float = math.inf
@@ -57,17 +57,17 @@ def channels_of(plant: Any) -> dict[str, ChannelLimits]:
     return channels
 
 
-def channel_findings(name: str, seen: SignalLook, sample_s: float, of: ChannelLimits) -> list[Finding]:
+def channel_findings(name: str, seen: SignalLook, sample_s: float, limits: ChannelLimits) -> list[Finding]:
     """Findings on a channel of `/sensors` with samples `sample_s` apart; `times` counts the samples concerned."""
     where, findings = "/sensors " + name, not_finite(name, seen, sample_s)
     if seen.constant:
         return [*findings, Finding("dead", where, f"constant at {seen.lowest:g} over the whole log", seen.samples)]
-    live = of.is_noisy or not math.isfinite(of.noise)  # equal samples are a fault
+    live = limits.is_noisy or not math.isfinite(limits.noise)  # equal samples are a fault
     if live and seen.longest_run * sample_s > _DEAD_S:
         from_s = (seen.longest_run_end - seen.longest_run + 1) * sample_s
         text = f"constant for {seen.longest_run * sample_s:.2f} s from {from_s:.3f} s on"
         findings.append(Finding("dead", where, text, seen.longest_run))
-    return [*findings, *_clipped(where, seen, of, dwells=name.endswith("_m"))]
+    return [*findings, *_clipped(where, seen, limits, dwells=name.endswith("_m"))]
 
 
 def not_finite(name: str, seen: SignalLook, sample_s: float) -> list[Finding]:
@@ -81,15 +81,15 @@ def not_finite(name: str, seen: SignalLook, sample_s: float) -> list[Finding]:
     return [Finding("not-finite", f"/sensors {name}", text, seen.not_finite)]
 
 
-def _clipped(where: str, seen: SignalLook, of: ChannelLimits, dwells: bool) -> list[Finding]:
-    beyond = _BEYOND * (of.high - of.low)  # infinite for an unknown end
-    shows_more = of.is_noisy and not dwells and seen.highest - seen.lowest > _NOISE_ALONE * of.noise
+def _clipped(where: str, seen: SignalLook, limits: ChannelLimits, dwells: bool) -> list[Finding]:
+    beyond = _BEYOND * (limits.high - limits.low)  # infinite for an unknown end
+    shows_more = limits.is_noisy and not dwells and seen.highest - seen.lowest > _NOISE_ALONE * limits.noise
     many = max(FEW_AT_END, _SHARE_AT_END * seen.samples) if shows_more else math.inf
     parts: list[str] = []
     times, reached = 1, math.nan
     for value, runs, at, end, over in (
-        (seen.highest, seen.clipped_high, seen.at_highest, of.high, seen.highest - of.high),
-        (seen.lowest, seen.clipped_low, seen.at_lowest, of.low, of.low - seen.lowest),
+        (seen.highest, seen.clipped_high, seen.at_highest, limits.high, seen.highest - limits.high),
+        (seen.lowest, seen.clipped_low, seen.at_lowest, limits.low, limits.low - seen.lowest),
     ):
         if over > beyond:
             text = f"shows {value:.4g}, beyond the end of its range, {end:g}: another signal or unit"

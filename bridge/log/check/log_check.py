@@ -28,7 +28,10 @@ from bridge.wire.topics import BY_NAME
 LATE_NS = 1_000_000  # 1 ms, the usual block: a later answer arrives after the next block is due
 # Share of late messages from which a rig is too slow. Smaller: any desktop fails; larger: a slow controller passes.
 LATE_SHARE = 0.01
-_OF_EVERY_BLOCK = {"plant": ("applied",), "controller": ("command", "trace")}  # topics by sender
+_OF_EVERY_BLOCK = {
+    "plant": ("applied",),
+    "controller": ("command", "trace"),
+}  # topics with a message per block, by sender
 
 
 class LogCheck(NamedTuple):
@@ -36,11 +39,11 @@ class LogCheck(NamedTuple):
 
     log: str
     findings: list[Finding]
-    messages: dict[str, int]  # by streaming topic
-    seconds: float  # of sensor blocks
+    messages: dict[str, int]  # number by streaming topic
+    seconds: float  # duration of all sensor blocks
     late_share: dict[str, float]  # share of messages later than 1 ms: /applied (block sent), /trace (answer ready)
     checksums: Checksums
-    foreign: dict[str, int]  # messages in topics of other programs, not counted as findings
+    foreign: dict[str, int]  # number of messages by topic of another program, not counted as findings
 
 
 class LogWatch:

@@ -26,13 +26,13 @@ def schema_findings(reader: LogReader) -> list[Finding]:
         elif schema.name != wanted:
             text = f"its schema is {schema.name!r}: must be {wanted!r}"
         else:
-            text = _described(schema.data, topic)
+            text = _schema_fault(schema.data, topic)
         if text:
             findings.append(Finding("schema", channel.topic, f"{text}; other programs cannot read it, or misread it"))
     return findings
 
 
-def _described(data: bytes, topic: Topic) -> str:
+def _schema_fault(data: bytes, topic: Topic) -> str:
     """The fault of a serialised FileDescriptorSet, as text; empty if it describes the topic's message."""
     files = descriptor_pb2.FileDescriptorSet()
     try:

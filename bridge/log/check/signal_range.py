@@ -14,12 +14,12 @@ from bridge.arrays import Floats
 # Smaller: round peaks count as clipped; larger: flat clipping passes.
 _OVERSHOOT_SHARE = 1e-3
 _LONGEST_DWELL = 40.0  # most samples counted in a run of a position, which may rest at an end of its range
-_SHORTEST_RUN = 3.0  # equal samples at the limit; noise alone rarely makes three
+_SHORTEST_RUN = 3.0  # fewest equal samples at the limit that count; noise alone rarely makes three
 _STEPS_OF_RESOLUTION = 2.5  # smallest step into a clipped run, in resolutions; a real peak ends in steps of 1 or 2
 
 
 class SignalLook(NamedTuple):
-    """Range and faults of one signal; values in its unit, others in samples."""
+    """Range and faults of one signal; the extremes in its unit, all other numbers in samples."""
 
     samples: int
     lowest: float
@@ -28,8 +28,8 @@ class SignalLook(NamedTuple):
     first_not_finite: int  # index of the sample; -1: none
     clipped_high: int  # samples at the upper limit; 0: not clipped there
     clipped_low: int
-    longest_run: int  # of equal samples
-    longest_run_end: int  # index of its last sample
+    longest_run: int  # length of the longest run of equal samples
+    longest_run_end: int  # index of the last sample of that run
     at_highest: int  # samples equal to the largest; many of them on a noisy signal mean clipping
     at_lowest: int
 
@@ -44,16 +44,16 @@ class _Side:
 
     def __init__(self, longest: float) -> None:
         self.extreme = -math.inf
-        self.at_extreme = 0  # samples
+        self.at_extreme = 0  # number of samples equal to the extreme
         self._longest = longest
         self.runs = self.overshoot = 0.0  # samples in runs that count; the largest overshoot
         # the first run of the signal: its length, and the step out of it
         self.begin: tuple[float, float] | None = None
-        # length of the run that goes on, and the step into it
+        # length of the run that has not ended, and the step into it
         self._open: tuple[float, float] | None = None
 
     def add(self, values: Floats, before: float | None, resolution: float) -> None:
-        """The next finite samples, at least one; `before` is the sample before them, `resolution` their smallest step so far."""
+        """Add finite samples, at least one; `before` is the sample before them, `resolution` the smallest step so far."""
         highest = float(values.max())
         if highest > self.extreme:
             self.extreme = highest
@@ -81,7 +81,7 @@ class _Side:
                 self.end_run(self.extreme - float(values[end]), resolution)
 
     def end_run(self, step_out: float, resolution: float) -> None:
-        """The run that goes on, if any, ends with this step."""
+        """End the open run, if any, with this step."""
         if self._open is None:
             return
         (length, step_in), self._open = self._open, None
@@ -101,7 +101,7 @@ class _Side:
             self.runs += length
 
     def clipped(self, resolution: float, begins: bool, limit: float) -> int:
-        """Samples in runs at the end of the signal's range; `begins`: the run that it begins with counts."""
+        """Number of samples in runs at the extreme; `begins`: whether the first run of the signal counts."""
         side = copy(self)
         side.end_run(math.inf, resolution)
         if begins and side.begin is not None:
@@ -142,14 +142,15 @@ class CheckedSignal:
         self._last = float(values[-1])
 
     def _runs_of_equals(self, values: Floats, at: int, places: npt.NDArray[np.int64] | None) -> None:
-        """The longest run of equal samples and the smallest step; `places` of the samples where some of a piece are left out."""
+        """Update the longest run of equal samples and the smallest step; `places`: indices of finite samples, if not all are."""
         steps = np.abs(np.diff(values, prepend=values[:1] if self._last is None else values.dtype.type(self._last)))
         changes = np.flatnonzero(steps)
         if len(changes):
             self._resolution = min(self._resolution, float(steps[changes].min()))
         begins = changes if self._last is not None else np.concatenate([[0], changes])
         lengths = np.diff(begins, append=len(values))
-        before = int(begins[0]) if len(begins) else len(values)  # samples that go on with the run of the piece before
+        # number of samples that continue the last run of the previous piece
+        before = int(begins[0]) if len(begins) else len(values)
         runs = np.concatenate([[self._run + before], lengths]) if self._last is not None else lengths
         ends = np.concatenate([[before], begins[1:], [len(values)]])[-len(runs) :] - 1
         longest = int(np.argmax(runs))
@@ -186,7 +187,7 @@ class CheckedSignal:
 
 
 def look(values: npt.NDArray[Any], dwells: bool) -> SignalLook:
-    """Range and faults of a whole signal, [samples]; see `Signal`."""
+    """Range and faults of a whole signal, [samples]; see `CheckedSignal`."""
     signal = CheckedSignal(dwells)
     signal.add(values)
     return signal.result()

@@ -32,11 +32,11 @@ UNREADABLE = (
 _MARK_AT = 28
 _MARKS = tuple(struct.pack("<I", len(name)) + name.encode() for name in ("zstd", "lz4"))
 _LONGEST_MARK_BYTES = max(map(len, _MARKS))
-# from the opcode on; a look-ahead, since matches may overlap
+# begin of a chunk record, from its opcode to the name of its compression; a look-ahead, since matches may overlap
 _CHUNK_HEAD = re.compile(rb"(?=\x06.{36}(?:\x04\0\0\0zstd|\x03\0\0\0lz4|\0\0\0\0))", re.DOTALL)
 _HEAD_BYTES = HEAD.size + _MARK_AT + _LONGEST_MARK_BYTES
 _SEARCH_BYTES = 1 << 20
-_PASSED_OVER = frozenset({Opcode.ATTACHMENT})  # and opcodes unknown to the MCAP format
+_SKIPPED = frozenset({Opcode.ATTACHMENT})  # records that are skipped, besides opcodes unknown to MCAP
 
 
 class FileRecord(NamedTuple):
@@ -44,7 +44,7 @@ class FileRecord(NamedTuple):
 
     opcode: int
     content: bytes  # only its first bytes for a skipped record
-    end_bytes: int  # place of its end in the file
+    end_bytes: int  # end of the record in the file
 
     @property
     def is_chunk(self) -> bool:
@@ -68,9 +68,9 @@ def next_record(file: IO[bytes], at_bytes: int, size_bytes: int) -> FileRecord |
     """The next whole record; None where the file is cut or the bytes are not a record.
 
     Args:
-        file: at the place `at_bytes`.
-        at_bytes: where the record begins.
-        size_bytes: of the file.
+        file: the file, positioned at `at_bytes`.
+        at_bytes: begin of the record.
+        size_bytes: size of the file.
 
     """
     head = file.read(HEAD.size)
@@ -80,7 +80,7 @@ def next_record(file: IO[bytes], at_bytes: int, size_bytes: int) -> FileRecord |
     end_bytes = at_bytes + HEAD.size + length
     if opcode == 0 or end_bytes > size_bytes:
         return None
-    if opcode in _PASSED_OVER or opcode > Opcode.DATA_END:
+    if opcode in _SKIPPED or opcode > Opcode.DATA_END:
         record = FileRecord(opcode, file.read(min(length, _HEAD_BYTES)), end_bytes)
         if not record.is_chunk:
             file.seek(end_bytes)

@@ -40,7 +40,7 @@ class Definitions:
         self.channels: dict[int, Channel] = {}
 
     def learn(self, opcode: int, content: bytes) -> None:
-        """Take in a definition. Raises one of UNREADABLE where it is damaged."""
+        """Add a definition. Raises one of UNREADABLE if it is damaged."""
         stream = ReadDataStream(BytesIO(content))
         if opcode == Opcode.SCHEMA:
             schema = Schema.read(stream)
@@ -54,16 +54,16 @@ class Definitions:
         channel = self.channels.get(channel_id)
         if channel is not None and channel.schema_id in self.schemas and _name(channel) in _KNOWN:
             return True
-        other = self._summary.channels.get(channel_id)
-        if other is not None and (channel is None or _name(other) in _KNOWN):
-            channel = self.channels[channel_id] = other
+        listed = self._summary.channels.get(channel_id)
+        if listed is not None and (channel is None or _name(listed) in _KNOWN):
+            channel = self.channels[channel_id] = listed
         if channel is not None and channel.schema_id in self._summary.schemas:
             self.schemas.setdefault(channel.schema_id, self._summary.schemas[channel.schema_id])
         return channel is not None
 
     @cached_property
     def _summary(self) -> Summary:
-        """The summary of the file; empty where it cannot be read."""
+        """The summary of the file; empty if it cannot be read."""
         with contextlib.suppress(OSError, ValueError, *UNREADABLE), self._path.open("rb") as file:
             return make_reader(file).get_summary() or Summary()
         return Summary()

@@ -22,9 +22,9 @@ from bridge.log.storage.verdict_file import VERDICT, judged_sha256, verdict_path
 
 _PIECE_BYTES = 1 << 20
 _DATA_END = struct.Struct("<BQI")  # opcode, length, CRC of all bytes before it
-_ENDING = struct.Struct("<BQQQI8s")  # of the file: footer with the begin of the index, of its offsets, and a CRC; magic
+_ENDING = struct.Struct("<BQQQI8s")  # end of a file: footer with begins of index and offsets, and a CRC; magic
 _STORED = {
-    "fits": "the verdict file fits",
+    "fits": "the verdict file names this SHA-256",
     "differs": "the verdict file belongs to other bytes",
     "unreadable": "the verdict file cannot be read",
     "inside": "the verdict is inside the log, without a digest",
@@ -35,7 +35,7 @@ _STORED = {
 class Checksums(NamedTuple):
     """The digest of a log, and its comparison with the checksums in its files and in its verdict file."""
 
-    sha256: str  # of all files, one after the other, hexadecimal
+    sha256: str  # digest of all files, one after the other, hexadecimal
     damaged: list[str]  # files with a byte that does not fit a checksum at their end
     complete: bool  # every file has a checksum of all its data
     verdict: Literal["fits", "differs", "unreadable", "inside", "none"]  # the stored verdict, see `_STORED`
@@ -46,7 +46,7 @@ class Checksums(NamedTuple):
         return bool(self.damaged) or self.verdict == "differs"
 
     def with_tables(self, metadata: Container[str]) -> "Checksums":
-        """The same for a log with these metadata records, which may hold a verdict in logs of version 0.2."""
+        """These checksums, with `inside` for a log of version 0.2 whose metadata records hold the verdict."""
         return self._replace(verdict="inside") if self.verdict == "none" and VERDICT in metadata else self
 
 
@@ -79,10 +79,11 @@ def _read_through(file: IO[bytes], digest: Any) -> tuple[bool, bool]:
     )
     footer_ends = (opcode, length) == (Opcode.FOOTER, _ENDING.size - HEAD.size - len(MAGIC))
     is_cut = not footer_ends and magic != MAGIC  # the reader reports it
-    begins = min(summary_start or size - _ENDING.size, size)  # of the index
-    opcode, length, data_crc = _DATA_END.unpack(_read_at(file, begins - size - _DATA_END.size, _DATA_END.size))
+    index_start = min(summary_start or size - _ENDING.size, size)
+    opcode, length, data_crc = _DATA_END.unpack(_read_at(file, index_start - size - _DATA_END.size, _DATA_END.size))
     data_ends = (opcode, length) == (Opcode.DATA_END, _DATA_END.size - HEAD.size)
-    places = (0, begins - _DATA_END.size), (begins, size - len(MAGIC) - 4)  # data; index and footer up to its CRC
+    # data; index, and footer up to its CRC
+    places = (0, index_start - _DATA_END.size), (index_start, size - len(MAGIC) - 4)
     sums = [0, 0]
     at = 0
     file.seek(0)

@@ -16,7 +16,7 @@ from bridge.units import counted
 if TYPE_CHECKING:
     from bridge.log.runlog import RunLog
 
-_LOOK_S = 1.0  # between two checks of the path of the file, and of a full disk
+_LOOK_S = 1.0  # time between two checks of the file's path, and of a full disk
 _LONGEST_WAIT_S = 64.0  # longest wait between two tries; it doubles each time, as a quota shows only on writing
 _ROOM_BYTES = 16 << 20  # free space on a full disk from which the log continues: half a minute of it
 _SLOW_S = 1.0  # writing time of a chunk from which the disk is reported as slow
@@ -26,7 +26,7 @@ class Rotation(NamedTuple):
     """When a log continues in a new file; 0: never for that reason."""
 
     bytes: int = 0
-    seconds: float = 0.0  # of the run
+    seconds: float = 0.0  # time of the run in one file
 
 
 class LogFiles:
@@ -48,7 +48,7 @@ class LogFiles:
         self.whole_t_ns: int | None = None  # time of the latest message in a chunk that is whole in a file
         self._owner, self._rotation, self._patient = owner, rotation, patient
         self._number = 0
-        self._begins = ""  # identifies the log
+        self._begins = ""  # identifies the log; the same in all its files
         self._began_ns = 0
         self._wait_s = _LOOK_S
         self._look_s = time.monotonic() + _LOOK_S
@@ -96,13 +96,13 @@ class LogFiles:
         part = self._part
         if part is not None and self._is_long(part):
             self._end(part)
-            self._go_on()
+            self._begin_next()
         if time.monotonic() < self._look_s:
             return
         self._look_s = time.monotonic() + self._wait_s
         if part is None:
             if self._has_room():
-                self._go_on()
+                self._begin_next()
             return
         if self._patient and part.slowest_s > _SLOW_S:  # lockstep runs write the same log on any disk
             self._owner.add_event("DISK_SLOW", f"a chunk of the log took {part.slowest_s:.1f} s to write")
@@ -122,7 +122,7 @@ class LogFiles:
         if self._fault is not None:
             fault, self._fault = self._fault, None
             more = f"; {counted(self.unwritten, 'message')} after that were not recorded" if self.unwritten else ""
-            also = f"; it goes on in {part_path(self.path, self._number).name}" if self._number else ""
+            also = f"; it continues in {self._name()}" if self._number else ""
             raise Fault(fault.kind.code, fault.line + more + also)
 
     def _is_long(self, part: PartFile) -> bool:
@@ -146,15 +146,15 @@ class LogFiles:
     def _lose(self, part: PartFile, code: str, text: str) -> None:
         """Close a file that was taken away; the log continues in the next file, with the open chunk."""
         self._note(Fault("LOG_LOST", f"{part.path}: {text}"))
-        self._go_on()
+        self._begin_next()
         if self._part is None:
             self.unwritten += part.writer.unsure_messages
         else:
             new, old = self._part.writer, part.writer
             new.open_chunk, old.open_chunk = old.open_chunk, new.open_chunk
         part.leave()
-        goes_on = f"the log goes on in {self._name()}" if self._part else "the log waits for a place to go on"
-        self._owner.add_event(code, f"{part.path.name} {text}; {goes_on}")
+        next_file = f"the log continues in {self._name()}" if self._part else "the log waits until it can continue"
+        self._owner.add_event(code, f"{part.path.name} {text}; {next_file}")
         if self._part:
             self._owner.repeat_events()
 
@@ -193,7 +193,7 @@ class LogFiles:
             return False
         return disk.f_bavail * disk.f_frsize > _ROOM_BYTES
 
-    def _go_on(self) -> None:
+    def _begin_next(self) -> None:
         """Begin the next file; if that fails, wait twice as long before the next try."""
         self._part = None
         number = self._number + 1
@@ -203,7 +203,7 @@ class LogFiles:
             while part is None:
                 try:
                     part = PartFile(part_path(self.path, number), replace=False)
-                except FileExistsError:  # of another log
+                except FileExistsError:  # the name belongs to another log
                     number += 1
             writer = part.writer
             part.guarded(lambda: self._owner.begin(writer, LogPart(number, self._begins)))

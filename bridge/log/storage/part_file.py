@@ -34,7 +34,7 @@ class PartFile:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             if replace:
-                # not truncated when it is opened: the file may be the log of a run under way
+                # not truncated before it is locked: the file may be the log of a run under way
                 flags = os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
                 self._file = os.fdopen(os.open(followed(path), flags, 0o666), "wb")
             else:
@@ -42,7 +42,7 @@ class PartFile:
             if not locked(self._file):
                 self._file.close()
                 line = f"{path}: is being recorded: must not be the log of a run in progress"
-                raise Fault("LOG_WRITE", f"{line}; wait for the end of that one, or choose another --log")
+                raise Fault("LOG_WRITE", f"{line}; wait for the end of that run, or choose another --log")
             if path.is_file():
                 self._file.truncate(0)
             self.writer = ChunkWriter(self._file, LIBRARY, path.absolute().parent)
@@ -66,7 +66,7 @@ class PartFile:
         self.writer.note_whole()
 
     def size_trouble(self) -> str | None:
-        """A foreign change of the file's size, as text; checked before each write, which would hide it behind a hole."""
+        """A change of the file's size by another program, as text; checked before each write, which would hide it."""
         opened = os.fstat(self._file.fileno())
         if opened.st_size == self.whole_bytes or not stat.S_ISREG(opened.st_mode):
             return None

@@ -15,17 +15,17 @@ from bridge.log.library import HEAD, MAGIC
 
 PART = "part"  # the metadata record of each file: of the first file after its first chunk, of others before it
 RECOVERED = "recovered"  # the metadata record of a file that `stickslip log recover` wrote; before the record above
-LOST = "lost"  # the metadata record at the end of such a file, if the original log was not whole
+LOST = "lost"  # the metadata record at the end of such a file, if the original log was damaged
 _CHAIN = "chain"  # the metadata record after each chunk in logs of version 0.2; its first hash identifies the log
 OF_FILES = frozenset({_CHAIN, PART, RECOVERED, LOST})  # records about the file, not about its run
-_BEGINNING_BYTES = 1 << 21  # the record of the file is within: definitions, configurations and one chunk
+_BEGINNING_BYTES = 1 << 21  # bytes that hold the record PART: it follows definitions, configurations and one chunk
 
 
 class LogPart(NamedTuple):
     """The place of a file in a log of several files."""
 
-    number: int  # of the file, from 0
-    begins: str  # identifies the log: made of the first bytes of its first file
+    number: int  # number of the file, from 0
+    begins: str  # identifies the log: the checksum of the first bytes of its first file
 
     def as_texts(self) -> dict[str, str]:
         """The fields of the metadata record."""
@@ -68,17 +68,17 @@ def parts_of(path: Path) -> list[Path]:
     if place is None:
         return [path]
     stem = path.stem.removesuffix(f"-{place.number:04d}") if place.number else path.stem
-    later = [(number, other) for number, other in _numbered(stem, path) if number > place.number]
-    return [path, *(other for number, other in later if part_of(other) == LogPart(number, place.begins))]
+    later = [(number, file) for number, file in _numbered(stem, path) if number > place.number]
+    return [path, *(file for number, file in later if part_of(file) == LogPart(number, place.begins))]
 
 
 def later_names(path: Path) -> list[Path]:
     """Files named like further files of the log `path`, in order."""
-    return [other for _, other in _numbered(path.stem, path)]
+    return [file for _, file in _numbered(path.stem, path)]
 
 
 def _numbered(stem: str, first: Path) -> list[tuple[int, Path]]:
     """Files in the folder of `first` named like further files of the log `stem`, in order of their numbers."""
     named = re.compile(rf"{re.escape(stem)}-(\d{{4,}}){re.escape(first.suffix)}")
     likely = first.parent.glob(f"{glob.escape(stem)}-[0-9][0-9][0-9][0-9]*")
-    return sorted((int(match[1]), other) for other in likely if (match := named.fullmatch(other.name)))
+    return sorted((int(match[1]), file) for file in likely if (match := named.fullmatch(file.name)))

@@ -11,7 +11,7 @@ from bridge.results import write_json
 
 VERDICT = "verdict"  # the metadata record with the verdict in logs of version 0.2
 _DIGEST = "log_sha256"
-_BEGINS = f'{{\n "{_DIGEST}": '  # of the text of a verdict file
+_BEGINS = f'{{\n "{_DIGEST}": '  # first text of a verdict file
 
 
 def verdict_path(log: Path) -> Path:

@@ -1,4 +1,4 @@
-"""Events as `foxglove.Log`, the well-known message that the log panels of viewers show.
+"""Events as `foxglove.Log`, the public message type that the log panels of viewers show.
 
 Its definition is https://docs.foxglove.dev/docs/sdk/schemas/log. It is built here in a private pool, so that another package's
 definition of the same name does not conflict.

@@ -16,17 +16,17 @@ from bridge.wire.messages import APPLIED, TRACE, Layout, sensor_block
 # Blocks that become messages at once: one second. Fewer: numpy's call overhead dominates; with the 100 blocks of a chunk it is a
 # third of the cost of writing the log. More: a kill loses more of this topic, and viewers must look further ahead.
 AT_ONCE_BLOCKS = 1000
-_ENTRY_BYTES = 16  # of an index entry
+_ENTRY_BYTES = 16  # size of an index entry
 
 
 class ScopeMaker:
     """Makes the messages of the topic from chunks of a log, in order."""
 
     def __init__(self) -> None:
-        self.ends = False  # no block follows the next chunk
-        self._waiting: list[tuple[bytes, dict[str, bytes]]] = []  # chunks, and the indexes of the topics used
+        self.ends = False  # True: no block follows the next chunk
+        self._waiting: list[tuple[bytes, dict[str, bytes]]] = []  # chunks, and their indexes by topic
         self._blocks_waiting = 0
-        self._layout: Layout | None = None  # of the blocks
+        self._layout: Layout | None = None  # layout of the sensor blocks
         self._stretches = Stretches()
 
     def of_chunk(
@@ -35,9 +35,9 @@ class ScopeMaker:
         """The messages due with this chunk; None for none.
 
         Args:
-            data: of the chunk, uncompressed.
-            entries: of its index, by channel.
-            channels: by topic.
+            data: bytes of the chunk, uncompressed.
+            entries: entries of the chunk's index, by channel.
+            channels: channel numbers by topic.
 
         """
         names = topics.SENSORS.name, topics.APPLIED.name, topics.TRACE.name
@@ -57,11 +57,13 @@ class ScopeMaker:
         data = np.frombuffer(joined, np.uint8)
         begins = np.cumsum([0, *(len(data) for data, _ in waiting)])
         for topic, layout in ((topics.APPLIED.name, APPLIED), (topics.TRACE.name, TRACE)):
-            heads, starts = _found(data, [indexes[topic] for _, indexes in waiting], begins)
+            heads, starts = _heads_and_starts(data, [indexes[topic] for _, indexes in waiting], begins)
             right = np.flatnonzero(heads["length"] == FIELDS_BYTES + layout.size)
-            last_ones = right[last_of_stretches(heads["publish_ns"].astype(np.int64)[right])]
-            self._stretches.add(topic, cut(data, starts[last_ones], layout.size).view(layout.dtype))
-        blocks = self._blocks(data, *_found(data, [indexes[topics.SENSORS.name] for _, indexes in waiting], begins))
+            last_rows = right[last_of_stretches(heads["publish_ns"].astype(np.int64)[right])]
+            self._stretches.add(topic, cut(data, starts[last_rows], layout.size).view(layout.dtype))
+        blocks = self._blocks(
+            data, *_heads_and_starts(data, [indexes[topics.SENSORS.name] for _, indexes in waiting], begins)
+        )
         records, log_ns = self._stretches.made(blocks, last)
         return None if records is None else rows({channels[topics.SCOPE.name]: records}, {}, log_ns)
 
@@ -84,7 +86,7 @@ class ScopeMaker:
         return ScopeBlocks(t_ns[right], log_ns[right], samples)
 
 
-def _found(data: Bytes, indexes: Sequence[bytes], begins: Column) -> tuple[npt.NDArray[Any], Column]:
+def _heads_and_starts(data: Bytes, indexes: Sequence[bytes], begins: Column) -> tuple[npt.NDArray[Any], Column]:
     """Heads of the messages in the joined chunks (publish time = `t_ns`), and the starts of their payloads."""
     each = [np.frombuffer(index, "<i8")[1::2] + begin for index, begin in zip(indexes, begins, strict=False)]
     offsets = np.concatenate([np.empty(0, np.int64), *each])
@@ -92,7 +94,7 @@ def _found(data: Bytes, indexes: Sequence[bytes], begins: Column) -> tuple[npt.N
 
 
 def _of_blocks(payload_bytes: int) -> Layout | None:
-    """The layout of canonical sensor blocks of this length; None where no number of samples gives it."""
+    """The layout of canonical sensor blocks of this length; None if no number of samples gives this length."""
     about = (payload_bytes - sensor_block(1).size) // (len(CHANNELS) * 4) + 1
     likely = [sensor_block(samples) for samples in range(max(about - 1, 1), about + 2)]
     return next((layout for layout in likely if layout.size == payload_bytes), None)

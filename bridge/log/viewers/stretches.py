@@ -17,7 +17,7 @@ from bridge.wire.channels import CHANNELS
 from bridge.wire.messages import APPLIED, SCOPE, TRACE, Layout, Records
 
 PERIOD_NS = 5_000_000
-# Messages of a topic that wait for their block: 4 s. A controller whose rig is silent repeats itself at 1 kHz
+# Most messages of a topic that wait for their block: 4 s. A controller whose rig is silent repeats itself at 1 kHz.
 _WAIT = 4096
 _OF_BOTH = {"sequence", "t_ns"}  # fields of every message
 
@@ -31,7 +31,7 @@ class Envelope(NamedTuple):
 
 
 def envelope_of(values: Floats, starts: Indices) -> Envelope:
-    """Smallest, mean and largest value of each group along the last axis; `starts`: the first of each group."""
+    """Smallest, mean and largest value of each group along the last axis; `starts`: the first index of each group."""
     counts = np.diff(starts, append=values.shape[-1])
     return Envelope(
         np.minimum.reduceat(values, starts, axis=-1),
@@ -47,12 +47,12 @@ def fields_of(channel: str) -> list[str]:
 
 
 def last_of_stretches(t_ns: Column) -> Column:
-    """Which of these messages, in order, are the last of their stretch."""
+    """Indices of the messages that are the last of their stretch; `t_ns`: times of the messages, in order."""
     return np.flatnonzero(np.diff((t_ns - 1) // PERIOD_NS, append=-1))
 
 
 class ScopeBlocks(NamedTuple):
-    """Blocks, in order."""
+    """The samples of sensor blocks, in order."""
 
     t_ns: Column  # [blocks]
     log_ns: Column  # [blocks]
@@ -68,13 +68,13 @@ class _Latest:
 
     def add(self, messages: Records) -> None:
         """Add canonical messages, in order; only the last of each stretch is needed."""
-        whole = f"V{messages.dtype.itemsize}"  # numpy joins raw elements in one go, and records field by field
-        self._kept = np.concatenate([self._kept.view(whole), messages.view(whole)]).view(messages.dtype)[-_WAIT:]
+        raw = f"V{messages.dtype.itemsize}"  # numpy joins raw elements whole, and records field by field
+        self._kept = np.concatenate([self._kept.view(raw), messages.view(raw)]).view(messages.dtype)[-_WAIT:]
 
     def fill(self, records: Records, fresh_ns: int | None) -> None:
-        """Write the fields of the newest message up to the end of each stretch; they stay 0 before the first.
+        """Write the fields of the newest message up to the end of each stretch; they stay 0 before the first message.
 
-        `fresh_ns`: nan instead for a stretch without a message that is younger than this at its end.
+        `fresh_ns`: the fields are NaN if the newest message is older than this at the end of the stretch.
         """
         messages = self._kept
         # without blocks a controller continues its clock, which the next block sets back
@@ -133,8 +133,10 @@ class Stretches:
         ends = np.append(starts[1:], len(blocks.t_ns))
         self._rest = None
         if not last:
-            few = slice(int(starts[-self._behind :][0]), None)
-            self._rest = ScopeBlocks(blocks.t_ns[few].copy(), blocks.log_ns[few].copy(), blocks.samples[:, few].copy())
+            late = slice(int(starts[-self._behind :][0]), None)
+            self._rest = ScopeBlocks(
+                blocks.t_ns[late].copy(), blocks.log_ns[late].copy(), blocks.samples[:, late].copy()
+            )
             starts, ends = starts[: -self._behind], ends[: -self._behind]
         if not len(starts):
             return None, ends

@@ -22,7 +22,7 @@ def median(values: npt.NDArray[Any]) -> float:
 
 
 def _medians(values: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
-    """Along the last axis."""
+    """Medians along the last axis."""
     low, high = (values.shape[-1] - 1) // 2, values.shape[-1] // 2
     middle = np.partition(values, (low, high))
     return np.asarray((middle[..., low].astype(np.float64) + middle[..., high]) / 2.0)
@@ -39,14 +39,14 @@ class Longest:
     """The longest run of true values in pieces of an array."""
 
     def __init__(self) -> None:
-        self.longest = self._now = 0
+        self.longest = self._open = 0
 
     def add(self, true: npt.NDArray[np.bool_]) -> None:
         """Take the next piece, [rows]."""
         edges = np.flatnonzero(np.diff(true.view(np.int8), prepend=np.int8(0), append=np.int8(0))).reshape(-1, 2)
         runs = edges[:, 1] - edges[:, 0]
         if len(runs) and true[0]:
-            runs[0] += self._now
+            runs[0] += self._open
         self.longest = max(self.longest, int(runs.max(initial=0)))
         if len(true):
-            self._now = int(runs[-1]) if true[-1] else 0
+            self._open = int(runs[-1]) if true[-1] else 0

@@ -8,8 +8,7 @@ from bridge.log.pause_events import CORE_PAUSE, PAUSE, RunPause, not_watched, pa
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.event_codes import EVENTS, FAILURE, MAINTENANCE, OUTSIDE
 
-# Events of one source and code that are kept, to bound the memory during a storm of events. Stalls are all kept, as two numbers
-# each.
+# Most events of one source and code that are kept, to bound the memory. Stalls are all kept, as two numbers each.
 KEPT = 20
 _BLOCKS = re.compile(r"\bblocks=(\d{1,18})\b")  # in the plant's END; foreign rigs may leave it out
 _WEIGHTY = {FAILURE, OUTSIDE, MAINTENANCE}
@@ -46,7 +45,7 @@ class EventWatch:
         return counts[-1] if counts else None
 
     def has(self, source: str, code: str) -> bool:
-        """Whether there was such an event."""
+        """Whether the log has an event of this source and code."""
         return self.counts[source, code] > 0
 
 

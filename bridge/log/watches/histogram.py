@@ -8,7 +8,7 @@ import numpy.typing as npt
 # Ratio of two edges. A quantile is off by at most half of it, 0.25 %, below the scatter of repeated runs. Smaller: more memory
 # (now 5500 bins of 8 bytes). Larger: visibly stepped percentiles.
 _RATIO = 1.005
-_LOWEST, _HIGHEST = 1e-3, 1e9  # values beyond count in the first or last bin
+_LOWEST, _HIGHEST = 1e-3, 1e9  # range of the bins; values outside count in the first or last bin
 _BINS_PER_BAR = 23  # 20 bars a decade
 _BINS = int(np.ceil(np.log(_HIGHEST / _LOWEST) / np.log(_RATIO)))
 

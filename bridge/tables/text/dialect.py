@@ -19,7 +19,7 @@ _SNIFFED_LINES = 60  # CleverCSV takes 30 ms for these, and its time grows with 
 _NO_NUMBER = frozenset(("", *"- -- --- nan #nv #n/a n/a na null none inf -inf ovl ovr ovrflw #nan 1.#qnan".split(" ")))  # noqa: SIM905
 _FIRST_LINES = 2000  # lines in which a time that begins at 0 is still below 1 s, up to 2 kHz
 _BELOW_ONE = re.compile(r"[-+]?0([.,])\d+")
-# decimals and thousands in the order in which equally good ones are chosen
+# marks of decimals and thousands; of several that fit equally well, the first is chosen
 _FORMS = ((".", ""), (",", ""), (".", ","), (",", "."), (".", "'"), (",", "'"), (".", " "), (",", " "))
 
 
@@ -31,10 +31,10 @@ class Dialect(NamedTuple):
     skip_rows: int | None = None  # lines before the line of the names
     encoding: str | None = None
     thousands: str | None = None
-    names: tuple[str, ...] | None = None  # of the columns, instead of names in the file
+    names: tuple[str, ...] | None = None  # names of the columns, in place of the file's names
     units_row: bool | None = None  # whether a line of units follows the names
     comment: str | None = None  # start of lines to skip
-    sheet: str | None = None  # of a workbook
+    sheet: str | None = None  # name of a workbook's sheet
 
 
 class TextLayout(NamedTuple):
@@ -75,7 +75,7 @@ def form_of(lines: Sequence[str], given: Dialect, quoted: bool, begin: Sequence[
     return TextLayout(delimiter, quote, decimal, thousands)
 
 
-def _delimiter(lines: Sequence[str], whole: Sequence[str], given: Dialect, quote: str) -> tuple[str, str]:
+def _delimiter(lines: Sequence[str], all_lines: Sequence[str], given: Dialect, quote: str) -> tuple[str, str]:
     if given.delimiter is not None:
         return given.delimiter, quote
     # numbers never contain these marks: if all lines have equally many, they separate columns, and commas are decimal
@@ -88,7 +88,7 @@ def _delimiter(lines: Sequence[str], whole: Sequence[str], given: Dialect, quote
     result = Detector().detect("\n".join(lines), delimiters=_DELIMITERS) if lines else None
     if result is None or not result.delimiter:
         return ",", quote
-    if result.delimiter == "," and given.decimal != "." and _one_column_with_commas(whole):
+    if result.delimiter == "," and given.decimal != "." and _one_column_with_commas(all_lines):
         return ";", quote
     return result.delimiter, result.quotechar or quote
 

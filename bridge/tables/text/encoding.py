@@ -12,7 +12,7 @@ _MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16-le"),
     (codecs.BOM_UTF16_BE, "utf-16-be"),
 )
-_LOOKED_AT = 4096  # bytes that reveal UTF-16 without a mark: every other byte of western text is 0
+_LOOKED_AT = 4096  # first bytes, which reveal UTF-16 without a mark: every other byte of western text is 0
 
 
 def decoded(data: bytes, encoding: str | None, file: str) -> tuple[str, str]:

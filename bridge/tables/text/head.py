@@ -10,8 +10,8 @@ from bridge.tables.text.dialect import BLANK, Dialect, TextLayout
 from bridge.tables.unit_words import is_unit_row, known_unit
 
 COMMENTS = ("#", "%", "//", "!", "*", ";;", "'")
-_CONFIRMED = 5  # lines after the first row, of which most must be rows too
-_LABEL = "Y_Unit_Label"  # start of a line of units of LabVIEW, each above its column
+_CONFIRMED = 5  # number of lines after the first row of which at least half must be rows too
+_LABEL = "Y_Unit_Label"  # start of LabVIEW's line of units, each above its column
 _MOST_ABOVE = 6  # lines above the first row in which names are searched
 _RATE = re.compile(
     r"(?:sampl|abtast|scan|acqui|messrate|datenrate|data\s*rate)[\w .\-/]*?(?:rate|freq\w*|messrate)?"
@@ -32,9 +32,9 @@ class Head(NamedTuple):
     lines: int
     names_line: int  # from 0; -1: missing
     names: list[str]  # as many as there are columns
-    units: list[str]  # as many, or none
+    units: list[str]  # as many as there are columns, or none
     units_line: int  # from 0; -1: missing
-    step_s: float | None  # between rows, as stated by a line above them
+    step_s: float | None  # time between rows, if a line above them states it
 
     @property
     def unit_of(self) -> dict[str, str]:
@@ -78,12 +78,12 @@ def _columns(body: Sequence[str], form: TextLayout) -> tuple[int, list[bool]]:
     if not rows:
         return 1, [True]
     width = Counter(len(row) for row in rows).most_common(1)[0][0]
-    whole = [row for row in rows if len(row) == width]
-    return width, [sum(form.is_value(row[i]) for row in whole) > 0.9 * len(whole) for i in range(width)]
+    full = [row for row in rows if len(row) == width]
+    return width, [sum(form.is_value(row[i]) for row in full) > 0.9 * len(full) for i in range(width)]
 
 
 def _first_row(lines: Sequence[str], form: TextLayout, width: int, numeric: list[bool], given: Dialect) -> int | None:
-    """The line of the first row."""
+    """The number of the line that holds the first row, from 0; None without a row."""
 
     def is_row(line: str) -> bool:
         if line.lstrip().startswith(given.comment or COMMENTS):
@@ -97,8 +97,8 @@ def _first_row(lines: Sequence[str], form: TextLayout, width: int, numeric: list
     for at in range(begin, len(lines)):
         if not is_row(lines[at]):
             continue
-        next_ones = [line for line in lines[at + 1 : at + 1 + _CONFIRMED] if line.strip()]
-        if 2 * sum(map(is_row, next_ones)) >= len(next_ones):
+        following = [line for line in lines[at + 1 : at + 1 + _CONFIRMED] if line.strip()]
+        if 2 * sum(map(is_row, following)) >= len(following):
             return at
     return None
 
@@ -124,7 +124,7 @@ def _names_above(lines: Sequence[str], first: int, form: TextLayout, width: int,
     units_line = -1
     for at in fitting:
         units = _named(lines[at], form, width)
-        above = any(other < at for other in fitting)
+        above = any(line < at for line in fitting)
         if is_unit_row(units) and (given.units_row is True or (above and given.units_row is None)):
             units_line = at
             break

@@ -22,15 +22,15 @@ from bridge.units import counted
 # While reading a CSV file, Arrow handles Ctrl-C and SIGTERM itself, and loses a signal near the end.
 pa.enable_signal_handlers(False)
 
-_HEAD_CHARACTERS = 1 << 18  # within which the rows must begin; LabVIEW and DIAdem write about 10 kB above them
+_HEAD_CHARACTERS = 1 << 18  # part of the file in which the rows must begin; LabVIEW and DIAdem write 10 kB above
 _PIECES, _PIECE_CHARACTERS = 12, 4096  # samples of the rest, from which the form of the rows is detected
-_MOST_LEFT_OUT = 0.1  # share of rows with too many or too few cells, from which the file is refused
+_MOST_LEFT_OUT = 0.1  # share of rows with too many or too few cells above which the file is refused
 # a quoted name over several lines, as spreadsheets write a cell with line breaks; other quotes may be inch marks
 _NAME_OF_LINES = re.compile(r'(?:^|(?<=[,;\t|]))"[^"\r\n]{0,80}[\r\n][^"]{0,80}"(?=[,;\t|\r\n]|\Z)', re.MULTILINE)
 # signs of word processors in place of the ASCII minus: U+2212, a dash, and the full-width minus
 _MINUS = ("\u2212", "\u2013", "\uff0d")
 _MINUS_OF_NUMBER = re.compile(rf'(?<![^\n\r;,\t |"eE])[{"".join(_MINUS)}](?=[\d.,])')
-_SHOWN = 60  # characters of a line in a finding
+_SHOWN = 60  # longest part of a line that a finding shows [characters]
 
 
 def read_text(path: Path, given: Dialect) -> Table:
@@ -98,7 +98,7 @@ def _rows(text: str, head: Head, form: TextLayout, given: Dialect) -> tuple[Any,
         delimiter = "\t"
     lost: list[str] = []
 
-    def pass_over(row: Any) -> str:
+    def skip(row: Any) -> str:
         lost.append(row.text)
         return "skip"
 
@@ -106,7 +106,7 @@ def _rows(text: str, head: Head, form: TextLayout, given: Dialect) -> tuple[Any,
         pa.BufferReader(rows.encode()),
         read_options=pa_csv.ReadOptions(column_names=head.names, use_threads=True),
         parse_options=pa_csv.ParseOptions(
-            delimiter=delimiter, quote_char=form.quote or False, invalid_row_handler=pass_over
+            delimiter=delimiter, quote_char=form.quote or False, invalid_row_handler=skip
         ),
         convert_options=pa_csv.ConvertOptions(decimal_point=form.decimal, strings_can_be_null=True),
     )

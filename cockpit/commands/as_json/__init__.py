@@ -1,1 +1,1 @@
-"""Results as JSON: the option `--json`, types, and the schemas of what is printed."""
+"""Results as JSON: the option `--json`, types, and the schemas of the results."""

@@ -74,7 +74,7 @@ def with_places(words: Sequence[str]) -> list[str]:
 
 
 def carry_out(work: Callable[[], int | None], as_json: Path | None) -> NoReturn:
-    """Do the work of a command and end with its exit status; a JSON file that cannot be written is refused before."""
+    """Do the work of a command and end with its exit status; a JSON file that cannot be written is refused before the work."""
 
     def checked() -> int | None:
         _check(as_json)
@@ -99,7 +99,7 @@ def print_result(as_json: Path | None, result: Any, words: Iterable[str], indent
         as_json: value of `--json`.
         result: named tuples, dictionaries, lists, numbers and texts.
         words: lines for the operator.
-        indent: of JSON on stdout; one line if not given.
+        indent: indentation of JSON on stdout; one line if not given.
 
     """
     if as_json == STDOUT:
@@ -107,7 +107,7 @@ def print_result(as_json: Path | None, result: Any, words: Iterable[str], indent
         return
     if as_json is not None:
         refuse_to_replace(as_json, JSON, f"{_OPTION} {as_json}")  # the command itself may have written its log there
-        with writing(as_json):  # before the lines: a reader that closes stdout ends the command
+        with writing(as_json):  # written before the lines: a reader that closes stdout ends the command
             write_json(as_json, result)
     for line in words:
         print(plain(line))

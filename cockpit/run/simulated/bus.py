@@ -16,7 +16,7 @@ class Hub:
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
-        self.there: set[str] = set()
+        self.present: set[str] = set()  # roles on the bus
         self.came: dict[str, int] = {}  # number of announcements by role
         self.down: set[str] = set()  # roles without a link
         self._listeners: dict[str, list[tuple[str, Receive]]] = {}
@@ -36,18 +36,18 @@ class Hub:
                 self.stage.heard(listener)
 
     def announce(self, role: str) -> None:
-        """A role joins the bus."""
+        """Let a role join the bus."""
         self.down.discard(role)
-        self.there.add(role)
+        self.present.add(role)
         self.came[role] = self.came.get(role, 0) + 1
 
     def lose(self, role: str) -> None:
-        """The link of a role goes down, and its announcement with it."""
+        """Take the link of a role down, and with it its announcement."""
         self.down.add(role)
-        self.there.discard(role)
+        self.present.discard(role)
 
     def forget(self, role: str) -> None:
-        """A process ends, and its subscriptions with it."""
+        """End the subscriptions of a role, as its process has ended."""
         self.lose(role)
         for name, listeners in self._listeners.items():
             self._listeners[name] = [listener for listener in listeners if listener[0] != role]
@@ -77,7 +77,7 @@ class Session:
 
     def alive(self, role: str) -> bool:
         """Whether this role sees another role on the bus; always False while its link is down."""
-        return self._role not in self._hub.down and role in self._hub.there
+        return self._role not in self._hub.down and role in self._hub.present
 
     def came(self, role: str) -> int:
         """Number of announcements of a role."""
@@ -89,4 +89,4 @@ class Session:
 
     def withdraw(self) -> None:
         """Withdraw the announcement; messages of this role still arrive."""
-        self._hub.there.discard(self._role)
+        self._hub.present.discard(self._role)

@@ -24,7 +24,7 @@ def run_with_faults(
 
     Args:
         scenario: the scenario.
-        path: of the log.
+        path: path of the log.
         about: metadata of the run for the log.
         progress: called every 0.1 s of simulated time with that time [s].
         stopped: called at every turn; True ends the run as at its full duration.

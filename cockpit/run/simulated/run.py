@@ -24,10 +24,10 @@ from plant.faults.table import FaultTable
 from plant.node import PlantNode
 from plant.records import TRUTH
 
-_LINKED_S = 0.05  # from the resumption of a frozen process to its new link
-_LONGEST_AFTER_S = 2.0  # for the fade-out and the end of the processes after the last block
+_LINKED_S = 0.05  # time from the resumption of a frozen process to its new link
+_LONGEST_AFTER_S = 2.0  # time after the last block for the fade-out and the end of the processes
 _POSITION, _VELOCITY = TRUTH.index("true_drive_position_m"), TRUTH.index("true_velocity_mps")
-_GRANTED = "simulated time"
+_GRANTED = "simulated time"  # text of the events START
 
 
 class Truth(NamedTuple):
@@ -36,7 +36,7 @@ class Truth(NamedTuple):
     t_s: npt.NDArray[np.float64]  # simulated time at the end of each block
     vibration_mps: npt.NDArray[np.float64]  # v_a of the base
     drive_mps: npt.NDArray[np.float64]  # v_d, mean of the block
-    slide_mps: npt.NDArray[np.float64]  # of largest magnitude in the block, negative backwards
+    slide_mps: npt.NDArray[np.float64]  # slide velocity of largest magnitude in the block, negative backwards
 
 
 class _TruthNode(PlantNode):
@@ -64,8 +64,8 @@ class SimulatedRun:
     """One run. Runs share the simulated clock, so a process can make only one at a time.
 
     Args:
-        scenario: with its faults, faults of processes included.
-        words: operator commands.
+        scenario: the scenario with its faults, faults of processes included.
+        words: operator commands with their times.
         arm: whether the rig starts ARMED; the scenario's value if not given.
 
     """
@@ -83,8 +83,8 @@ class SimulatedRun:
         faults = [table for table in scenario.fault if table.group == PROCESS]
         for table in faults:
             self._stage.cue(round(table.from_s * 1e9), lambda table=table: self._disturb(table))
-        for word in words:
-            self._stage.cue(word.t_ns, lambda word=word: self._send(word))
+        for order in words:
+            self._stage.cue(order.t_ns, lambda order=order: self._send(order))
 
     def listen(self, receive: Receive) -> None:
         """Receive every message of the run, as a recorder does."""
@@ -159,8 +159,8 @@ class SimulatedRun:
         self._hub.announce("controller")
         self._players["controller"] = stage.enter(Player("controller", lambda: process.loop(self._stop, _GRANTED)))
 
-    def _send(self, word: TimedAction) -> None:
-        command = wire.Operator(action=cast(Any, word.action), who="a person")
+    def _send(self, order: TimedAction) -> None:
+        command = wire.Operator(action=cast(Any, order.action), who="the operator")
         self._hub.put("cockpit", OPERATOR, command.SerializeToString())
 
     def _disturb(self, table: FaultTable) -> None:

@@ -15,7 +15,7 @@ class _Left(BaseException):
 
 
 class Player:
-    """One thread of the play: the loop of one process.
+    """A thread with the loop of one process.
 
     Args:
         name: role of the process.
@@ -27,8 +27,8 @@ class Player:
         self.name = name
         self.over = False
         self.failed: BaseException | None = None
-        self.wakes_ns = 0  # time at which it continues
-        self.hears = False  # whether a message wakes it earlier
+        self.wakes_ns = 0  # time at which the thread continues
+        self.hears = False  # whether a message wakes the thread earlier
         self.frozen_until_ns = 0
         self._killed = False
         self._work = work
@@ -49,7 +49,7 @@ class Player:
         self._done.release()
 
     def turn(self) -> None:
-        """Let it run until it waits again or ends; called by the stage."""
+        """Let the thread run until it waits again or ends; called by the stage."""
         self._go.release()
         self._done.acquire()
 
@@ -62,13 +62,13 @@ class Player:
             raise _Left
 
     def leave(self) -> None:
-        """End it at its wait."""
+        """End the thread at its wait."""
         self._killed = True
         self.turn()
 
     @property
     def next_ns(self) -> int:
-        """Time at which it continues, unless a message wakes it."""
+        """Time at which the thread continues, unless a message wakes it."""
         return max(self.wakes_ns, self.frozen_until_ns)
 
 
@@ -126,7 +126,7 @@ class Stage:
         player.pause()
 
     def heard(self, name: str) -> None:
-        """A message has arrived for a player."""
+        """Wake a player that waits for the message that has arrived."""
         for player in self.players:
             if player.name == name and player.hears:
                 player.wakes_ns = min(player.wakes_ns, self.now_ns)

@@ -3,11 +3,11 @@
 kernel.py    the rig's equations of motion and their integrator     rig.py      the numbers of one rig
 surface.py   friction along the track                               runs.py     the commands of drive and piezo in each run
 chain.py     the sensor chain: noise, hum, bandwidth, resolution    effect.py   an effect and its formulas
-library.py   the 26 named effects                                   outside.py  effects that have no name in the library
-evidence.py  one folder on disk                                     outside_2.py  others, for sets after those of outside.py
+library.py   the 26 named effects                                   outside.py  effects outside the library
+evidence.py  one folder on disk                                     outside_2.py  others, for sets after the first list
 case.py      a case, from seed to folder
 
-Signs as in the paper: a force is positive when it pulls in +x. Sources of the formulas stand beside them.
+Signs as in the paper: a force is positive when it pulls in +x. The sources of the formulas are named next to them.
 """
 
 from tests.blind.generator.case import Case, make, simulate

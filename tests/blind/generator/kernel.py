@@ -3,9 +3,9 @@
 State y, float64[15]: x, v of the slide [m, m/s]; z of four bristle elements [m]; frame x, v; base x, v; Maxwell
 force [N]; inner mass x, v; seal deflection [m]; deflection of a second guide [m]. Bristle rate as LuGre (Canudas de Wit
 et al. 1995): z' = v_r - sigma0 |v_r| z / g(v_r). At 22 mm/s of slip sigma0 |v| / g is 1.2e5 1/s, 0.45 per step of 3.85 us;
-Runge-Kutta is stable up to 2.78, so there is room for a stiff element and a slip five times as fast.
+Runge-Kutta is stable up to 2.78, so a stiff element or a slip five times as fast is stable too.
 
-Memory that is no rate (rest time, lag of g, clamp slider, heat, distance slid one way) is carried from step to step.
+Memory without a rate (rest time, lag of g, clamp slider, heat, distance slid one way) is carried from step to step.
 An effect that is off is a factor of exactly 1 or an addend of exactly 0.
 """
 
@@ -135,7 +135,7 @@ def _rates(p, y, dy, drive_m, drive_mps, base_mps, level, aged, lagged_mps, stri
         mass += p.acceleration_friction_s2_per_m * abs(friction)  # friction grows while the slide speeds up
     dy[0] = v
     dy[1] = total / mass
-    if p.frame_inverse_mass_1_per_kg > 0.0:  # the support bends back under what it pulls
+    if p.frame_inverse_mass_1_per_kg > 0.0:  # the pull of the drive bends the support back
         w = p.frame_omega_radps
         dy[6] = y[7]
         dy[7] = -force * p.frame_inverse_mass_1_per_kg - w * w * y[6] - 2.0 * p.frame_damping_ratio * w * y[7]
@@ -231,7 +231,7 @@ def integrate(
             phase += h * omega
             if phase > 4.0 * math.pi:  # two turns, so that the subharmonic does not jump
                 phase -= 4.0 * math.pi
-            slip = abs(over * v_r)  # what is not elastic of the relative speed
+            slip = abs(over * v_r)  # inelastic part of the relative speed
             smooth_slip += h / SMOOTHING_S * (slip - smooth_slip)
             smooth_force += h / SMOOTHING_S * (abs(force) - smooth_force)
             if p.ageing != 0.0:

@@ -30,7 +30,7 @@ def _drift_power(signals: Signals, s: float, n: Numbers) -> None:
 def _low_pass(signals: Signals, s: float, n: Numbers) -> None:
     """A filter of unit gain whose corner is in proportion to 1 / strength; it has settled before the run begins."""
     corner_Hz = n["corner_Hz"] / s
-    if corner_Hz > 0.4 * SAMPLE_RATE_HZ:  # beyond what 20 kHz can hold: a first-order mix that vanishes with s
+    if corner_Hz > 0.4 * SAMPLE_RATE_HZ:  # above the range of 20 kHz sampling: a first-order mix that vanishes with s
         share = 0.4 * SAMPLE_RATE_HZ / corner_Hz
         signals[FORCE][1:] -= 0.5 * share * np.diff(signals[FORCE])
         return

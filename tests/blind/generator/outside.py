@@ -1,4 +1,4 @@
-"""Effects of real rigs that are none of the library's mechanisms."""
+"""Effects of real rigs outside the mechanisms of the library."""
 
 import numpy as np
 from scipy.interpolate import CubicSpline

@@ -1,4 +1,4 @@
-"""A second list of effects of real rigs that are none of the library's mechanisms, for sets after those of `outside.py`."""
+"""A second list of effects of real rigs outside the library, for sets made after the first list, `outside.py`."""
 
 import numba as nb
 import numpy as np
@@ -51,7 +51,7 @@ def _capillary(tracks: Tracks, s: float, n: Numbers) -> None:
 
 
 def _beat(tracks: Tracks, s: float, n: Numbers) -> None:
-    """The exciter's amplifier lets the ripple of its own supply through: the amplitude swings some times a second.
+    """The exciter's amplifier passes the ripple of its supply: the amplitude swings some times a second.
 
     Two converters on one intermediate circuit beat at the difference of their clocks (Erickson & Maksimovic 2001, ch. 10).
     """
@@ -61,7 +61,7 @@ def _beat(tracks: Tracks, s: float, n: Numbers) -> None:
 
 @nb.njit(cache=True)
 def played(x: np.ndarray, width: float) -> np.ndarray:
-    """What follows `x` with play (samples,): it stands still until `x` has moved on by half the width either way."""
+    """A follower of `x` with play (samples,): it rests until `x` has moved on by half the width either way."""
     out = np.empty_like(x)
     at = x[0]
     for i in range(len(x)):
@@ -71,7 +71,7 @@ def played(x: np.ndarray, width: float) -> np.ndarray:
 
 
 def _yaw(signals: Signals, s: float, n: Numbers) -> None:
-    """A guide with play lets the slide yaw at each reversal, and the displacement sensor beside its axis reads that as motion.
+    """A guide with play lets the slide yaw at each reversal, and the displacement sensor off its axis reads that as motion.
 
     Abbe's error: the angle of the play times the sensor's distance from the axis (Slocum 1992, Precision Machine Design, ch. 2).
     """
@@ -79,7 +79,7 @@ def _yaw(signals: Signals, s: float, n: Numbers) -> None:
 
 
 def _converter_line(signals: Signals, s: float, n: Numbers) -> None:
-    """A converter that switches near the sampling rate is folded to a slow sine in the force, as there is no filter before it.
+    """A converter that switches near the sampling rate aliases to a slow sine in the force, without a filter before it.
 
     Its frequency is the difference of two clocks and wanders with their temperature (Oppenheim & Schafer 1999, ch. 4).
     """
@@ -121,9 +121,9 @@ def _multiplexed(signals: Signals, s: float, n: Numbers) -> None:
 
 
 def _rectified(signals: Signals, s: float, n: Numbers) -> None:
-    """The force amplifier's input stage rectifies what the vibration shakes into the cable: its zero moves with the power.
+    """The force amplifier's input stage rectifies the cable's pick-up of the vibration: its zero moves with the power.
 
-    Analog Devices AN-671: rectification of what lies far above an instrumentation amplifier's band.
+    Analog Devices AN-671: rectification of signals far above an instrumentation amplifier's band.
     """
     keep = np.exp(-1.0 / (n["smooth_s"] * SAMPLE_RATE_HZ))
     power = lfilter([1.0 - keep], [1.0, -keep], signals["base_accel_mps2"] ** 2)

@@ -89,7 +89,7 @@ PARAMS = np.dtype(
         # other forces on the slide
         ("seal_force_N", "f8"),
         ("seal_stiffness_N_per_m", "f8"),
-        ("guide_force_N", "f8"),  # Coulomb friction of a second guide, beside the vibrated contact
+        ("guide_force_N", "f8"),  # Coulomb friction of a second guide, next to the vibrated contact
         ("guide_static_share", "f8"),  # by which its static friction is higher
         ("guide_stribeck_mps", "f8"),
         ("guide_stiffness_N_per_m", "f8"),
@@ -132,7 +132,7 @@ def _draw_elements(random: np.random.Generator, p: np.ndarray) -> None:
     """Elements of a generalized Maxwell slip with LuGre's rate equation (Lampaert, Al-Bender & Swevers 2003).
 
     The yield displacements spread by at most a factor of 1.6 either way, so the hysteresis of presliding is rounder. The
-    steady force, the total stiffness and the total damping are those of the model with one element.
+    steady force, the total stiffness and the total damping equal the model with one element.
     """
     count = int(random.integers(3, ELEMENTS + 1))
     force = random.uniform(0.7, 1.3, count)

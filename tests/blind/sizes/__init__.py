@@ -38,8 +38,8 @@ def write_sizes(path: Path, answers: Iterable[Mapping[str, Any]]) -> None:
         "# seed of a case, and of each of its effects the strength and the detection limits that it is worth there"
     ]
     for answer in sorted(answers, key=lambda one: one["counterfactual_seed"]):
-        sized = [one for one in answer["effects"] if one["detectability"] is not None]
+        sized = [effect for effect in answer["effects"] if effect["detectability"] is not None]
         if sized:
             lines += ["", f"[{answer['counterfactual_seed']}]"]
-            lines += [f"{one['name']} = [{one['strength']}, {one['detectability']}]" for one in sized]
+            lines += [f"{size['name']} = [{size['strength']}, {size['detectability']}]" for size in sized]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")

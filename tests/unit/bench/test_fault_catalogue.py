@@ -26,14 +26,14 @@ def quiet(_share: float, _line: str) -> None:
 
 
 def test_every_entry_is_a_scenario_with_its_faults() -> None:
-    for one in load_catalogue():
-        made = load_scenario(one.entry.scenario, one.settings)
+    for case in load_catalogue():
+        made = load_scenario(case.entry.scenario, case.settings)
         assert made.rig.solver.block_s > 0.0
-        assert one.faults or one.entry.said
-        assert one.told or one.entry.told == [], one.entry.name
+        assert case.faults or case.entry.said
+        assert case.told or case.entry.told == [], case.entry.name
 
 
-def test_a_dead_controller_is_safe_and_told_and_the_page_says_so() -> None:
+def test_a_dead_controller_is_safe_and_reported_on_the_page() -> None:
     result = bench([short("controller-killed", watch_s=2.0)], 1, quiet)
     (outcome,) = result.outcomes
     assert (outcome.verdict, outcome.slips > 0) == (SAFE, True)
@@ -47,7 +47,7 @@ def test_a_dead_controller_is_safe_and_told_and_the_page_says_so() -> None:
     assert strict_json(result)["counts"] == {SAFE: 1, SILENT: 0, UNSAFE: 0}
 
 
-def test_what_no_word_says_is_silent_and_worse_than_is_known() -> None:
+def test_a_fault_without_its_expected_event_is_silent_and_worse_than_the_catalogue() -> None:
     one = short("controller-killed")
     outcome = judge(one.model_copy(update={"told": ["NO_SUCH_WORD"]}))
     assert outcome.verdict == SILENT
@@ -61,7 +61,7 @@ def test_a_vibration_that_is_due_to_end_and_does_not_is_unsafe() -> None:
     assert judge(short("controller-killed", fault=[], zero_s=0.3)).verdict == UNSAFE
 
 
-def test_a_name_that_is_none_says_what_is_near() -> None:
+def test_an_unknown_name_suggests_a_similar_name() -> None:
     with pytest.raises(Fault, match="perhaps controller-killed"):
         find_entry("controller-dead")
     with pytest.raises(Fault, match="no such group"):
@@ -77,6 +77,6 @@ def test_a_name_is_there_once(tmp_path: Path) -> None:
 
 
 @pytest.mark.nightly
-def test_the_catalogue_is_no_worse_than_is_known() -> None:
+def test_no_entry_is_worse_than_the_catalogue() -> None:
     result = bench(load_catalogue(), 2, quiet)
-    assert [(one.name, one.verdict, one.why) for one in result.worse] == []
+    assert [(outcome.name, outcome.verdict, outcome.why) for outcome in result.worse] == []

@@ -1,4 +1,4 @@
-"""The files of the bench fit their schemas, and the kept schemas are those of the code."""
+"""The files of the bench fit their schemas, and the kept schemas match the code."""
 
 import json
 import tomllib
@@ -12,10 +12,10 @@ from bench.schemas import FOLDER, FORMATS
 FAMILIES = sorted((FOLDER.parent / "control" / "scenarios").glob("*.toml"))
 
 
-def test_the_kept_schemas_are_those_of_the_code() -> None:
+def test_the_kept_schemas_match_the_code() -> None:
     """After a change of a format: `make schemas`."""
     kept = {path.stem: json.loads(path.read_text()) for path in FOLDER.iterdir()}
-    assert kept == {name: one.schema() for name, one in FORMATS.items()}
+    assert kept == {name: table.schema() for name, table in FORMATS.items()}
     for schema in kept.values():
         jsonschema.Draft202012Validator.check_schema(schema)
 

@@ -31,7 +31,7 @@ def test_a_gap_is_taken_and_a_late_one_is_not() -> None:
 
 
 @pytest.mark.parametrize("other", [range(300), range(10**6, 10**6 + 300), range(2**62, 2**62 + 300)])
-def test_another_count_beside_the_present_one_is_never_believed(other: range) -> None:
+def test_a_second_count_in_parallel_to_the_present_count_is_never_accepted(other: range) -> None:
     made = after(range(1000, 1010))
     for step, strange in enumerate(other):
         assert made.judge(strange, (1010 + step) * MS) is NumberCheck.STRAY
@@ -63,7 +63,7 @@ def test_a_number_that_is_repeated_is_never_another_count() -> None:
     assert {made.judge(1009, (1100 + step) * MS) for step in range(100)} == {NumberCheck.AGAIN}
 
 
-def test_a_sender_that_was_away_begins_anew_at_once() -> None:
+def test_a_sender_that_was_away_restarts_the_count_at_once() -> None:
     made = after(range(1000, 1010))
     made.sender_was_away()
     assert made.judge(0, 1011 * MS) is NumberCheck.ANEW

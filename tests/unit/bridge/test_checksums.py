@@ -30,7 +30,7 @@ def changed(folder: Path, at: int, bit: int = 0) -> Path:
     return path
 
 
-def test_a_log_as_it_was_written(tmp_path: Path) -> None:
+def test_an_unchanged_log_passes(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     path.write_bytes(short_log())
     sums = checksums_of(path)
@@ -52,8 +52,8 @@ def places() -> list[int]:
     """Every kind of record: the definitions, the configuration, chunks, indexes, the summary, the footer, the end."""
     data = short_log()
     chosen = random.Random(1)
-    some = [*range(8, 60), *chosen.sample(range(len(data)), 40), *range(len(data) - 60, len(data))]
-    return [*some, data.index(b'"v_ratio": ') + 11]
+    offsets = [*range(8, 60), *chosen.sample(range(len(data)), 40), *range(len(data) - 60, len(data))]
+    return [*offsets, data.index(b'"v_ratio": ') + 11]
 
 
 def test_one_changed_byte_is_found_wherever_it_is(tmp_path: Path) -> None:
@@ -109,3 +109,16 @@ def test_other_programs_read_it_and_its_checksums(tmp_path: Path) -> None:
         ends = [record for record in StreamReader(file, validate_crcs=True).records if isinstance(record, DataEnd)]
     assert ends[0].data_section_crc
     assert read_run(path).headers.keys() == {"run", "plant", "controller"}
+
+
+@pytest.mark.parametrize("end", [(None, b"x"), (-1, b""), (-8, b"")])
+def test_another_end_of_the_file_hides_no_changed_byte(tmp_path: Path, end: tuple[int | None, bytes]) -> None:
+    path = changed(tmp_path, 2000)
+    path.write_bytes(path.read_bytes()[: end[0]] + end[1])
+    assert "cut" in [finding.kind for finding in check_log(path).findings]
+
+
+def test_recovery_keeps_the_mark_of_a_changed_log(tmp_path: Path) -> None:
+    out = tmp_path / "recovered.mcap"
+    assert "its bytes were changed after writing" in recover(changed(tmp_path, 2000), out).damage.before
+    assert "recovered" in [finding.kind for finding in check_log(out).findings]

@@ -1,4 +1,4 @@
-"""The messages of chunks are those of a walk through their records, whatever their indexes say."""
+"""Messages are read by a walk through the records of a chunk; its message indexes do not matter."""
 
 import struct
 
@@ -23,9 +23,9 @@ def _chunk(payloads: list[tuple[int, bytes]], first: bytes = b"") -> tuple[bytes
     return data, [struct.pack("<HI", channel, len(body)) + body for channel, body in entries.items()]
 
 
-def _found(chunks: list[Chunked]) -> list[tuple[int, int, bytes]]:
-    found = messages_of(chunks)
-    return list(zip(found.channel.tolist(), found.heads["sequence"].tolist(), found.payloads(), strict=True))
+def _messages(chunks: list[Chunked]) -> list[tuple[int, int, bytes]]:
+    messages = messages_of(chunks)
+    return list(zip(messages.channel.tolist(), messages.heads["sequence"].tolist(), messages.payloads(), strict=True))
 
 
 DATA, INDEXES = _chunk(_PAYLOADS)
@@ -48,14 +48,14 @@ OTHER = _chunk([(1, b"x" * 20)] * 5)[1]
     ids=["right", "in another order", "none", "one lost", "one twice", "cut", "of another chunk", "out of the chunk"],
 )
 def test_a_wrong_index_changes_nothing(indexes: list[bytes]) -> None:
-    assert _found([Chunked(DATA, indexes)]) == EXPECTED
-    assert _found([Chunked(DATA, INDEXES), Chunked(DATA, indexes)]) == EXPECTED * 2
+    assert _messages([Chunked(DATA, indexes)]) == EXPECTED
+    assert _messages([Chunked(DATA, INDEXES), Chunked(DATA, indexes)]) == EXPECTED * 2
 
 
 def test_other_records_in_a_chunk_are_passed_over() -> None:
     data, indexes = _chunk(_PAYLOADS, struct.pack("<BQ3s", 4, 3, b"any"))
-    assert _found([Chunked(data, indexes)]) == EXPECTED
-    assert _found([Chunked(data, []), Chunked(b"", [])]) == EXPECTED
+    assert _messages([Chunked(data, indexes)]) == EXPECTED
+    assert _messages([Chunked(data, []), Chunked(b"", [])]) == EXPECTED
 
 
 def test_a_message_does_not_go_on_in_the_next_chunk() -> None:
@@ -63,16 +63,16 @@ def test_a_message_does_not_go_on_in_the_next_chunk() -> None:
     broken = (
         DATA[: -len(_record(1, 4, b"d" * 20))] + struct.pack("<BQHIQQ", 5, 22 + 20 + len(DATA), 1, 4, 0, 0) + b"d" * 20
     )
-    assert _found([Chunked(broken, INDEXES), Chunked(DATA, [])]) == [*EXPECTED[:-1], *EXPECTED]
+    assert _messages([Chunked(broken, INDEXES), Chunked(DATA, [])]) == [*EXPECTED[:-1], *EXPECTED]
 
 
 def test_messages_of_one_channel_keep_their_order() -> None:
-    found = messages_of([Chunked(DATA, INDEXES)] * 2)
-    assert sorted(found.by_channel) == [1, 2, 3]
-    for mine in (found.of([1]), found.by_channel[1]):
+    messages = messages_of([Chunked(DATA, INDEXES)] * 2)
+    assert sorted(messages.by_channel) == [1, 2, 3]
+    for mine in (messages.of([1]), messages.by_channel[1]):
         assert mine.heads["sequence"].tolist() == [0, 2, 4] * 2
         assert mine.payloads(2) == [b"a" * 20, b"c" * 20]
         assert mine.stacked is not None
         assert mine.stacked.tobytes() == 2 * (b"a" * 20 + b"c" * 20 + b"d" * 20)
-    assert found.of([1, 2]).heads["sequence"].tolist() == [0, 1, 2, 4] * 2
-    assert found.stacked is None
+    assert messages.of([1, 2]).heads["sequence"].tolist() == [0, 1, 2, 4] * 2
+    assert messages.stacked is None

@@ -52,7 +52,7 @@ def test_kernels_are_counted_with_all_that_they_call() -> None:
 COMMAND = """
 import ctypes, sys
 from bridge.compiling import compiling
-from cockpit.run.child_process import end_like_ctrl_c, guarded
+from cockpit.run.child_process import end_like_ctrl_c, exit_status_of
 
 def work():
     end_like_ctrl_c()
@@ -61,7 +61,7 @@ def work():
         while True:
             ctypes.CDLL(None).sleep(1000)
 
-sys.exit(guarded(work))
+sys.exit(exit_status_of(work))
 """
 
 

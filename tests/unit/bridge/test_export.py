@@ -54,13 +54,13 @@ def test_every_value_comes_back(log: Path, tmp_path: Path, suffix: str) -> None:
     run = read_run(log)
     for topic in ALL:
         expected = getattr(run, topic)
-        found = columns_of(suffix, to, topic)
+        exported = columns_of(suffix, to, topic)
         for name in expected.dtype.names:
             if topic == "sensors" and name not in CHANNELS:
                 continue
-            # a CSV file holds a float32 in as few digits as tell it from all others
-            assert (found[name].astype(expected[name].dtype) == expected[name].ravel()).all(), name
-        assert len(found["t_s"]) == written.rows[topic]
+            # a CSV file holds a float32 in as few digits as identify it
+            assert (exported[name].astype(expected[name].dtype) == expected[name].ravel()).all(), name
+        assert len(exported["t_s"]) == written.rows[topic]
     t_s = columns_of(suffix, to, "sensors")["t_s"]
     assert t_s == pytest.approx(np.arange(1, 8001) / 20000, abs=1e-12)
     assert shares == sorted(shares)
@@ -69,7 +69,7 @@ def test_every_value_comes_back(log: Path, tmp_path: Path, suffix: str) -> None:
     assert not list(tmp_path.glob("*.columns"))
 
 
-def test_units_are_told(log: Path, tmp_path: Path) -> None:
+def test_units_are_exported(log: Path, tmp_path: Path) -> None:
     export(log, tmp_path / "one.parquet", ["sensors"])
     schema = pyarrow.parquet.read_schema(tmp_path / "one.parquet")
     assert schema.field("mass_accel_mps2").metadata[b"unit"] == b"m/s^2"

@@ -1,4 +1,4 @@
-"""What is written goes through no link of somebody else, and into no file that somebody laid in its way."""
+"""Files are never written through a symbolic link or into a file of another user."""
 
 import os
 import stat
@@ -55,7 +55,7 @@ def test_a_link_where_the_unfinished_file_used_to_be_is_left_alone(tmp_path: Pat
 
 @pytest.fixture
 def of_somebody_else(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Files are those of another user, as seen by the process."""
+    """Make all files look as if another user owned them."""
     real = os.geteuid()
     monkeypatch.setattr(os, "geteuid", lambda: real + 12345)
     if real == 0:  # root's links count as the system's own
@@ -92,10 +92,10 @@ def test_a_link_of_our_own_stays_a_link(tmp_path: Path) -> None:
     assert (tmp_path / "there" / "page.html").read_text() == "new"
     assert (tmp_path / "second").is_symlink()
     (tmp_path / "round").symlink_to("round")
-    assert followed(tmp_path / "round").name == "round"  # who opens it says that it leads nowhere
+    assert followed(tmp_path / "round").name == "round"  # opening it reports the loop of links
 
 
-def test_what_fails_leaves_what_was_there(tmp_path: Path) -> None:
+def test_a_failed_write_leaves_the_old_file(tmp_path: Path) -> None:
     path = tmp_path / "page.html"
     path.write_text("old")
 

@@ -1,4 +1,4 @@
-"""What a log says of nobody in charge, of a weak exciter, of a clock and of its own definitions: told by check and verdict."""
+"""Check and verdict report a log without a controller, a weak exciter, a wrong clock and wrong definitions."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -42,7 +42,7 @@ def controller_dies(tables: Tables) -> None:
     applied["fallback"][DIED * 3 + 50 :] = 1
 
 
-def test_a_controller_that_died_is_told_and_was_not_in_charge(long_run: Path, tmp_path: Path) -> None:
+def test_a_controller_that_died_is_reported_and_was_not_in_charge(long_run: Path, tmp_path: Path) -> None:
     path = changed(long_run, tmp_path / "died.mcap", controller_dies)
     verdict = judge(path)
     assert not verdict.good
@@ -50,18 +50,18 @@ def test_a_controller_that_died_is_told_and_was_not_in_charge(long_run: Path, tm
     assert verdict.alone is not None
     assert verdict.alone.seconds == pytest.approx(1.05)
     words = "\n".join(in_words(verdict, verbose=True))
-    for said in ("without a controller", "FALLBACK: ", "CONTROLLER_LOST: ", "UNANSWERED: 1099 blocks of 1999"):
-        assert said in words
+    for phrase in ("without a controller", "FALLBACK: ", "CONTROLLER_LOST: ", "UNANSWERED: 1099 blocks of 1999"):
+        assert phrase in words
     assert {"fallback", "controller-lost", "unanswered"} <= {finding.kind for finding in check_log(path).findings}
 
 
-def test_a_sound_run_had_somebody_in_charge(long_run: Path) -> None:
+def test_a_sound_run_had_a_controller_in_charge(long_run: Path) -> None:
     verdict = judge(long_run)
     assert verdict.good
     assert (verdict.charge.fallback_s, verdict.charge.unanswered, verdict.charge.alone) == (0.0, 0, False)
 
 
-def test_a_short_fallback_is_told_and_no_fault(long_run: Path, tmp_path: Path) -> None:
+def test_a_short_fallback_is_reported_without_a_fault(long_run: Path, tmp_path: Path) -> None:
     def pause(tables: Tables) -> None:
         tables["applied"]["fallback"][500:560] = 1
 
@@ -71,7 +71,7 @@ def test_a_short_fallback_is_told_and_no_fault(long_run: Path, tmp_path: Path) -
     assert "FALLBACK: the rig was without a fresh command for 0.06 s, 1 time, first from 0.50 s on" in verdict.told[0]
 
 
-def test_the_way_out_of_a_rig_that_is_stopped_is_no_fallback(long_run: Path, tmp_path: Path) -> None:
+def test_the_fade_of_a_stopped_rig_does_not_count_as_fallback(long_run: Path, tmp_path: Path) -> None:
     def stopped(tables: Tables) -> None:
         tables["applied"]["fallback"][-40:] = 1
         tables["applied"]["command_block"][-40:] = NO_COMMAND
@@ -79,7 +79,7 @@ def test_the_way_out_of_a_rig_that_is_stopped_is_no_fallback(long_run: Path, tmp
     assert judge(changed(long_run, tmp_path / "out.mcap", stopped)).charge.fallbacks == 0
 
 
-def test_a_rig_that_nobody_ever_commanded(long_run: Path, tmp_path: Path) -> None:
+def test_a_rig_that_never_got_a_command_is_reported(long_run: Path, tmp_path: Path) -> None:
     def nobody(tables: Tables) -> None:
         tables["command"] = tables["command"][:0]
         tables["applied"]["fallback"][:] = 1
@@ -90,7 +90,7 @@ def test_a_rig_that_nobody_ever_commanded(long_run: Path, tmp_path: Path) -> Non
     assert "the controller was in charge for 0.00 of 2.00 s only" in headline(verdict)
 
 
-def test_a_weak_exciter_is_told(long_run: Path, tmp_path: Path) -> None:
+def test_a_weak_exciter_is_reported(long_run: Path, tmp_path: Path) -> None:
     def weak(tables: Tables) -> None:
         tables["trace"]["reason"][500:1900] = wire.PIEZO_WEAK
 
@@ -103,21 +103,21 @@ def test_a_weak_exciter_is_told(long_run: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("stands", "told"), [(True, "is constant at "), (False, "jumps at 1 block, first 200 by -3000 ms")]
+    ("stands", "reported"), [(True, "is constant at "), (False, "jumps at 1 block, first 200 by -3000 ms")]
 )
-def test_a_clock_that_jumps_or_stands_is_told(tmp_path: Path, stands: bool, told: str) -> None:
+def test_a_clock_that_jumps_or_freezes_is_reported(tmp_path: Path, stands: bool, reported: str) -> None:
     def change(tables: Tables) -> None:
         t_ns = tables["sensors"]["t_ns"]
         t_ns[:] += 3_000_000_000
         t_ns[200:] = t_ns[199] if stands else t_ns[200:] - 3_000_000_000
 
     path = doctored(tmp_path, change)
-    assert any(fault.startswith(f"CLOCK: t_ns of /sensors {told}") for fault in judge(path).faults)
+    assert any(fault.startswith(f"CLOCK: t_ns of /sensors {reported}") for fault in judge(path).faults)
     assert "clock-jump" in {finding.kind for finding in check_log(path).findings}
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "reported"),
     [
         (b"stickslip.Command", b"stickslip.Applied", "its schema is "),
         (b"\n\x0fstickslip.proto", b"\n\xffstickslip.proto", "its schema "),
@@ -125,17 +125,17 @@ def test_a_clock_that_jumps_or_stands_is_told(tmp_path: Path, stands: bool, told
     ],
     ids=["exchanged", "garbage", "renamed"],
 )
-def test_definitions_that_are_not_those_of_the_messages_are_found(
-    tmp_path: Path, old: bytes, new: bytes, told: str
+def test_definitions_that_differ_from_the_messages_are_found(
+    tmp_path: Path, old: bytes, new: bytes, reported: str
 ) -> None:
     path = tmp_path / "run.mcap"
     assert old in short_log()
     path.write_bytes(short_log().replace(old, new))
-    assert any(told in finding.text for finding in check_log(path).findings if finding.kind == "schema")
+    assert any(reported in finding.text for finding in check_log(path).findings if finding.kind == "schema")
 
 
 def test_every_code_has_its_severity_and_place() -> None:
-    assert {one.letter for one in EVENTS.values()} <= SEVERITIES.keys()
+    assert {kind.letter for kind in EVENTS.values()} <= SEVERITIES.keys()
     protocol = (Path(__file__).parents[3] / "bridge/wire/PROTOCOL.md").read_text(encoding="utf-8")
     assert not [code for code in EVENTS if f"`{code}`" not in protocol]
     assert (harms("GAP"), harms("STALE"), is_listed("STALE"), is_listed("START")) == (True, False, True, False)

@@ -1,4 +1,4 @@
-"""Inboxes are bounded, and what is rare has room of its own."""
+"""Inboxes are bounded, and rare topics have reserved capacity."""
 
 from bridge.wire.inbox import Inbox, Received
 from bridge.wire.topics import ANNOUNCE, OPERATOR, SENSORS, Topic
@@ -8,7 +8,7 @@ def message(topic: Topic, payload: bytes = b"") -> Received:
     return Received(topic, payload, 0)
 
 
-def test_what_does_not_fit_is_dropped_and_counted_by_topic() -> None:
+def test_overflow_is_dropped_and_counted_by_topic() -> None:
     inbox = Inbox(3)
     for number in range(5):
         inbox.push(message(SENSORS, bytes([number])))
@@ -22,7 +22,7 @@ def test_what_does_not_fit_is_dropped_and_counted_by_topic() -> None:
     assert came == ["sensors"] * 3 + ["operator"] * 256 + ["announce"] * 10
 
 
-def test_what_was_read_makes_room() -> None:
+def test_reading_frees_capacity() -> None:
     inbox = Inbox(2)
     for number in range(10):
         inbox.push(message(SENSORS, bytes([number])))

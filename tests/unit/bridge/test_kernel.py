@@ -75,8 +75,8 @@ def test_a_shared_kernel_is_compiled_once_and_loaded_before_its_callers(tmp_path
         "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
         "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path]),
     }
-    for hits, one in (("0", "code.twice"), ("1", "code.twice"), ("1", "code.longer")):
-        command = [sys.executable, "-c", CALLED.replace("{one}", one)]
+    for hits, signature in (("0", "code.twice"), ("1", "code.twice"), ("1", "code.longer")):
+        command = [sys.executable, "-c", CALLED.replace("{one}", signature)]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
         # one compilation for both values in the source
         assert done.stdout.split() == ["1.75", "1", hits]

@@ -49,14 +49,14 @@ def project(tmp_path: Path) -> Path:
         "plant/effects/rigs/four.py",
     ],
 )
-def test_what_a_kernel_imports_is_in_its_key_in_any_sub_package(project: Path, place: str) -> None:
+def test_the_imports_of_a_kernel_are_in_its_key_in_any_sub_package(project: Path, place: str) -> None:
     before = digest(project)
     (project / place).write_text((project / place).read_text() + "STEP_S = 2e-5\n")
     assert digest(project) != before
 
 
 @pytest.mark.parametrize("place", ["plant/node.py", "cockpit/app.py"])
-def test_an_edit_elsewhere_compiles_nothing_anew(project: Path, place: str) -> None:
+def test_an_edit_elsewhere_recompiles_nothing(project: Path, place: str) -> None:
     before = digest(project)
     (project / place).write_text("STEP_S = 2e-5\n")
     assert digest(project) == before
@@ -68,14 +68,16 @@ def test_the_kernels_of_the_plant_hang_on_no_command_and_no_diagnosis() -> None:
     assert not [path for path in files if path.parts[len(ROOT.parts)] in {"cockpit", "diagnosis", "controller"}]
 
 
-def test_two_copies_of_the_project_have_marks_of_their_own(project: Path) -> None:
+def test_two_copies_of_the_project_have_separate_marks(project: Path) -> None:
     copy = shutil.copytree(project, project.with_name("copy"))
     own, other = mark_of("x", project / "plant/core.py", project), mark_of("x", copy / "plant/core.py", copy)
     assert own != other
     assert own.rpartition("-")[2] == other.rpartition("-")[2]  # of the same sources
 
 
-def test_one_process_compiles_and_the_others_wait_and_say_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_process_compiles_and_the_others_wait_and_report_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     code = """
 from pathlib import Path

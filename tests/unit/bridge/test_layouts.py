@@ -26,7 +26,7 @@ def scope(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
     scenario = load_scenario("from-the-start", ["duration_s=0.5"])
     run_onboard(scenario, path, {})
     assert messages(path, "/log")
-    return [said for said, _ in messages(path, "/scope")]
+    return [message for message, _ in messages(path, "/scope")]
 
 
 def paths_of_foxglove() -> list[str]:
@@ -40,12 +40,12 @@ def paths_of_plotjuggler() -> list[str]:
 
 
 def paths_of_rerun() -> list[str]:
-    found: dict[str, Any] = {}
+    namespace: dict[str, Any] = {}
     for node in ast.parse((FOLDER / "view_in_rerun.py").read_text()).body:
         if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
-            found[node.targets[0].id] = ast.literal_eval(node.value)
-    fields = [field for view in found["VIEWS"].values() for field in view]
-    return [f"/scope.{field}" for field in (*fields, *found["WORDS"])]
+            namespace[node.targets[0].id] = ast.literal_eval(node.value)
+    fields = [field for view in namespace["VIEWS"].values() for field in view]
+    return [f"/scope.{field}" for field in (*fields, *namespace["WORDS"])]
 
 
 @pytest.mark.parametrize("paths", [paths_of_foxglove, paths_of_plotjuggler, paths_of_rerun])
@@ -56,7 +56,7 @@ def test_every_path_is_a_field_with_data(scope: list[Any], paths: Any) -> None:
         topic, field = path.split(".")
         assert topic == "/scope"
         assert field in SCOPE.dtype.names
-        values = [getattr(said, field) for said in scope]
+        values = [getattr(message, field) for message in scope]
         assert all(math.isfinite(value) for value in values)
         if field not in {"limit", "time_to_slip_s"}:  # nothing may hold the command, and no slip be ahead
             assert np.any(values), field

@@ -1,4 +1,4 @@
-"""Files that are made to fill the memory, to take minutes or to stand where none should be: one line, at once."""
+"""Files made to fill the memory or to take minutes, pipes and devices are refused at once with a one-line message."""
 
 import os
 import stat
@@ -24,7 +24,7 @@ from cockpit.run.scenario_file import load_bus
 
 
 def bomb(path: Path, chunks: int, messages: int) -> None:
-    """Chunks of equal commands, without their indexes, as somebody makes them who wants a small file to be large."""
+    """Chunks of equal commands without message indexes: a small compressed file that expands to a large one."""
     with path.open("wb") as file:
         writer = ChunkWriter(file, LIBRARY)
         schema = writer.add_schema("stickslip.Command", "protobuf", b"")
@@ -38,25 +38,25 @@ def bomb(path: Path, chunks: int, messages: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("chunks", "messages", "told"),
+    ("chunks", "messages", "message"),
     [(1, 800_000, "holds a chunk of "), (60, 60_000, "would unpack to more than ")],
 )
 def test_a_log_that_is_made_to_fill_the_memory_is_refused(
-    tmp_path: Path, chunks: int, messages: int, told: str
+    tmp_path: Path, chunks: int, messages: int, message: str
 ) -> None:
     path = tmp_path / "bomb.mcap"
     bomb(path, chunks, messages)
     assert path.stat().st_size < 200_000
     began_s = time.process_time()
     for use in (read_run, check_log, lambda one: recover(one, tmp_path / "saved.mcap")):
-        with pytest.raises(Fault, match=rf"BAD_LOG: .*bomb.mcap: .*{told}.*do not trust it"):
+        with pytest.raises(Fault, match=rf"BAD_LOG: .*bomb.mcap: .*{message}.*do not trust it"):
             use(path)
     assert time.process_time() - began_s < 4.0
     assert not (tmp_path / "saved.mcap").exists()
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("x = [" + "1," * 1_500_000 + "]", "3 MB: must be at most 2 MiB"),
         (".".join("a" * 20_000) + " = 1", "has a key of more than 32 parts"),
@@ -67,22 +67,22 @@ def test_a_log_that_is_made_to_fill_the_memory_is_refused(
     ],
     ids=["large", "dotted", "quoted", "header", "inline", "brackets"],
 )
-def test_a_toml_file_that_would_take_minutes_is_refused_at_once(tmp_path: Path, text: str, told: str) -> None:
+def test_a_toml_file_that_would_take_minutes_is_refused_at_once(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "manifest.toml"
     path.write_text(text)
     began_s = time.process_time()
-    with pytest.raises(Fault, match=rf"CONFIG: .*manifest.toml: {told}"):
+    with pytest.raises(Fault, match=rf"CONFIG: .*manifest.toml: {message}"):
         read_toml(path)
     assert time.process_time() - began_s < 1.0
 
 
-def test_numbers_and_texts_with_many_points_are_no_keys(tmp_path: Path) -> None:
+def test_numbers_and_texts_with_many_points_are_not_counted_as_keys(tmp_path: Path) -> None:
     path = tmp_path / "rig.toml"
     path.write_text("x = [" + ", ".join(["1.5"] * 200) + ']\ny = "' + "a." * 100 + '"\n# ' + "... " * 100 + "\n")
     assert len(read_toml(path)["x"]) == 200
 
 
-def test_of_many_problems_the_first_are_told() -> None:
+def test_only_the_first_of_many_problems_are_listed() -> None:
     class Model(Strict):
         numbers: list[int]
 
@@ -109,7 +109,7 @@ INPUTS = (
 
 @pytest.mark.parametrize("words", INPUTS, ids=lambda words: " ".join(words[:3]))
 @pytest.mark.timeout(120)
-def test_a_pipe_is_no_input(tmp_path: Path, words: tuple[str, ...]) -> None:
+def test_a_pipe_as_input_is_refused(tmp_path: Path, words: tuple[str, ...]) -> None:
     for suffix in ("toml", "mcap", "csv", "json"):
         os.mkfifo(tmp_path / f"pipe.{suffix}")
     given = [word.format(pipe=tmp_path / "pipe", folder=tmp_path) for word in words]
@@ -118,14 +118,14 @@ def test_a_pipe_is_no_input(tmp_path: Path, words: tuple[str, ...]) -> None:
     assert "must be a file on a disk" in result.output or "no file on a disk" in result.output
 
 
-def test_a_pipe_is_no_key_and_no_set(tmp_path: Path) -> None:
+def test_a_pipe_as_key_or_set_is_refused(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.json")
     for read in (read_key, opened_set):
         with pytest.raises(Fault, match=r"BAD_SET: .*pipe.json: cannot be read: must be a file on a disk"):
             read(tmp_path / "pipe.json")
 
 
-def test_a_device_is_no_scenario() -> None:
+def test_a_device_as_scenario_is_refused() -> None:
     with pytest.raises(Fault, match=r"CONFIG: /dev/zero.*: (no such file|must be a file on a disk)"):
         load_bus("/dev/zero/x.toml", [])
 
@@ -159,13 +159,13 @@ def test_a_folder_that_others_may_write_to_keeps_no_kernels(
     shared.mkdir()
     shared.chmod(0o777)
     monkeypatch.setenv(kernel_cache.FOLDER, str(shared))
-    own = kernel_cache.usable_folder()
-    assert own.parent == shared
-    assert stat.S_IMODE(own.stat().st_mode) == 0o700
+    cache = kernel_cache.usable_folder()
+    assert cache.parent == shared
+    assert stat.S_IMODE(cache.stat().st_mode) == 0o700
     assert "others may write there: compiled kernels are code, so they are stored in" in capsys.readouterr().err
-    assert kernel_cache.usable_folder() == own
-    assert capsys.readouterr().err == ""  # told once
-    own.chmod(0o777)
+    assert kernel_cache.usable_folder() == cache
+    assert capsys.readouterr().err == ""  # reported only once
+    cache.chmod(0o777)
     other = kernel_cache.usable_folder()
     assert shared not in other.parents
     assert "others may write to it" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""A link that ends holds up nobody."""
+"""A link that ends does not block its process."""
 
 import os
 import socket
@@ -10,16 +10,16 @@ from tests.system.ports import free_endpoint
 
 def lingering() -> list[int]:
     """The sockets of this process whose closing waits for the other side."""
-    found: list[int] = []
+    counts: list[int] = []
     for name in os.listdir("/proc/self/fd"):
         try:
             link = socket.socket(fileno=int(name))
         except OSError:
             continue
         if link.getsockopt(socket.SOL_SOCKET, socket.SO_LINGER):
-            found.append(link.fileno())
+            counts.append(link.fileno())
         link.detach()
-    return found
+    return counts
 
 
 def test_no_link_of_a_rig_or_its_viewer_waits_for_the_other_side_when_it_is_closed() -> None:
@@ -31,5 +31,5 @@ def test_no_link_of_a_rig_or_its_viewer_waits_for_the_other_side_when_it_is_clos
         for _ in range(100):
             if not lingering():
                 break
-            viewer.wait_for(["recorder"], 0.02)  # nobody: a moment
+            viewer.wait_for(["recorder"], 0.02)  # no recorder answers within this time
         assert lingering() == []

@@ -1,4 +1,4 @@
-"""`log check` finds what was done to a log, and nothing in a sound one."""
+"""`log check` finds each change of a log, and nothing in a sound log."""
 
 import json
 from collections.abc import Callable
@@ -47,7 +47,7 @@ def twice(tables: Tables) -> None:
     tables["command"] = np.insert(tables["command"], 50, tables["command"][50])
 
 
-def late_one(tables: Tables) -> None:
+def late_command(tables: Tables) -> None:
     order = np.arange(400)
     order[[200, 202]] = [202, 200]
     tables["sensors"] = tables["sensors"][order]
@@ -98,7 +98,7 @@ def begins_late(tables: Tables) -> None:
         (gap, "gap", "/sensors: 3 messages lost: 100 to 102"),
         (begins_late, "gap", "begins with block 7"),
         (twice, "duplicate", "/command: repeated numbers at 1 place, first 50"),
-        (late_one, "order", "/sensors: 2 messages arrived after a later message"),
+        (late_command, "order", "/sensors: 2 messages arrived after a later message"),
         (two_runs, "two-runs", "numbers start again at 0 after"),
         (clipped, "clipped", "/sensors drive_force_N: "),
         (at_range, "clipped", "/sensors mass_accel_mps2: reaches the end of its range, 490.33"),
@@ -110,7 +110,7 @@ def begins_late(tables: Tables) -> None:
         (late, "late", "/applied: 10.0 % of the messages were later than 1 ms"),
     ],
 )
-def test_what_was_done_is_found(tmp_path: Path, change: Callable[[Tables], None], kind: str, text: str) -> None:
+def test_each_change_is_found(tmp_path: Path, change: Callable[[Tables], None], kind: str, text: str) -> None:
     path = doctored(tmp_path, change)
     assert text in kinds(path)[kind]
     result = CliRunner().invoke(log_app, ["check", str(path), "--json"])
@@ -118,7 +118,7 @@ def test_what_was_done_is_found(tmp_path: Path, change: Callable[[Tables], None]
     assert kind in {finding["kind"] for finding in json.loads(result.stdout)["findings"]}
 
 
-def test_noise_alone_and_a_coarse_position_at_rest_are_no_finding() -> None:
+def test_noise_alone_and_a_coarse_position_at_rest_give_no_finding() -> None:
     """Both repeat values: noise of a few steps its largest value, and a position that rests within a step."""
     noise = np.clip(np.random.default_rng(1).standard_normal(100_000), -3.5, 3.5)
     accel_mps2 = (0.001 * np.round(1.5 * noise)).astype(np.float32)
@@ -131,25 +131,25 @@ def test_noise_alone_and_a_coarse_position_at_rest_are_no_finding() -> None:
 
 
 def test_the_lower_end_of_a_range_is_known(tmp_path: Path) -> None:
-    """A sensor that ends at -8 N, on a stroke back that pushes harder, and one that measures the whole of it."""
+    """A return stroke pushes beyond -8 N: a sensor that ends at -8 N is clipped, one that ends at -50 N is not."""
     back = ["duration_s=0.4", "rig.drive.profile=[[0.0, -0.01]]", "rig.sensors.position_lowest_m=-0.01"]
-    for lowest_N, found in ((-8.0, "clipped"), (-50.0, None)):
+    for lowest_N, reported in ((-8.0, "clipped"), (-50.0, None)):
         scenario = load_scenario("from-the-start", [*back, "rig.sensors.force_lowest_N=-50.0"])
         sensors = scenario.rig.sensors.model_copy(update={"force_lowest_N": lowest_N})  # a file with -8 N is refused
         scenario = scenario.model_copy(update={"rig": scenario.rig.model_copy(update={"sensors": sensors})})
         path = tmp_path / f"{-lowest_N:g}.mcap"
         run_onboard(scenario, path, {})
-        assert kinds(path).get("clipped", "").startswith("/sensors drive_force_N" if found else "")
-        assert ("clipped" in kinds(path)) == (found is not None)
+        assert kinds(path).get("clipped", "").startswith("/sensors drive_force_N" if reported else "")
+        assert ("clipped" in kinds(path)) == (reported is not None)
 
 
 def test_a_late_message_closes_its_gap(tmp_path: Path) -> None:
     def change(tables: Tables) -> None:
         tables["sensors"] = tables["sensors"][[*range(2), 3, 2, 4, *range(6, 400)]]
 
-    found = kinds(doctored(tmp_path, change))
-    assert "/sensors: 1 message lost: 5" in found["gap"]
-    assert "order" in found
+    reported = kinds(doctored(tmp_path, change))
+    assert "/sensors: 1 message lost: 5" in reported["gap"]
+    assert "order" in reported
 
 
 def test_missing_messages_are_counted_in_whatever_order_the_others_came() -> None:
@@ -220,14 +220,14 @@ def test_no_log_is_a_fault(tmp_path: Path) -> None:
         assert CliRunner().invoke(log_app, export).exit_code == 7
 
 
-def test_the_verdict_on_a_cut_log_says_what_was_lost(tmp_path: Path) -> None:
+def test_the_verdict_on_a_cut_log_reports_the_loss(tmp_path: Path) -> None:
     path = tmp_path / "cut.mcap"
     path.write_bytes(short_log()[: len(short_log()) * 2 // 3])
     result = CliRunner().invoke(log_app, ["info", str(path), "--json"])
-    told = json.loads(result.stdout)
-    assert (result.exit_code, told["good"], told["control"]) == (14, False, "not judged")
-    assert "bytes of an open chunk were lost" in " ".join(told["faults"])
-    assert told["all_losses_known"] is False
+    verdict = json.loads(result.stdout)
+    assert (result.exit_code, verdict["good"], verdict["control"]) == (14, False, "not judged")
+    assert "after its last whole record cannot be read" in " ".join(verdict["faults"])
+    assert verdict["all_losses_known"] is False
 
 
 @pytest.mark.parametrize(("chunk", "lost", "known"), [(0, 40, True), (4, 40, True), (9, 40, True), (-1, 0, False)])
@@ -239,19 +239,19 @@ def test_the_verdict_counts_the_blocks_of_a_damaged_chunk(tmp_path: Path, chunk:
         start = make_reader(file).get_summary().chunk_indexes[chunk].chunk_start_offset
     data[start + 60] ^= 0x40
     path.write_bytes(data)
-    told = judge(path)
-    assert (told.lost_blocks, told.all_losses_known) == (lost, known)
+    verdict = judge(path)
+    assert (verdict.lost_blocks, verdict.all_losses_known) == (lost, known)
     expected = (
         f"{lost} of 400 blocks missing in the log" if known else "400 blocks; the number of missing blocks is unknown"
     )
-    assert f"data     {expected}" in "\n".join(in_words(told, verbose=False))
+    assert f"data     {expected}" in "\n".join(in_words(verdict, verbose=False))
 
 
-def test_a_log_that_was_saved_says_what_had_been_lost(tmp_path: Path) -> None:
+def test_a_recovered_log_reports_the_loss(tmp_path: Path) -> None:
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(short_log()[: len(short_log()) * 2 // 3])
     for path, out in ((cut, tmp_path / "saved.mcap"), (tmp_path / "saved.mcap", tmp_path / "again.mcap")):
         recover(path, out)
         assert "cut.mcap: " in kinds(out)["recovered"]
-        assert "bytes of an open chunk" in kinds(out)["recovered"]
+        assert "at the end" in kinds(out)["recovered"]
         assert judge(out).all_losses_known is False

@@ -143,7 +143,7 @@ def replaced(path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("act", "code", "told"),
+    ("act", "code", "text"),
     [
         (deleted, "LOG_LOST", "was deleted: the recording so far is lost"),
         (renamed, "LOG_LOST", "was renamed: it is whole, under another name"),
@@ -152,8 +152,8 @@ def replaced(path: Path) -> None:
     ],
     ids=lambda value: getattr(value, "__name__", None),
 )
-def test_a_file_that_is_taken_away_is_told_and_the_log_goes_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, act: Callable[[Path], None], code: str, told: str
+def test_a_file_that_is_taken_away_is_reported_and_the_log_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, act: Callable[[Path], None], code: str, text: str
 ) -> None:
     monkeypatch.setattr(log_files, "_LOOK_S", 0.0)
     events: list[wire.Event] = []
@@ -165,7 +165,7 @@ def test_a_file_that_is_taken_away_is_told_and_the_log_goes_on(
     act(path)
     write(log, range(100, 200))
     write(log, range(200, 300))
-    with pytest.raises(Fault, match=rf"LOG_LOST: .*run.mcap: {told}.*; it goes on in run-0001.mcap"):
+    with pytest.raises(Fault, match=rf"LOG_LOST: .*run.mcap: {text}.*; it continues in run-0001.mcap"):
         log.close()
     assert [event.code for event in events] == ["WATCH", code, "WATCH"]
     run = read_run(tmp_path / "run-0001.mcap")
@@ -221,9 +221,7 @@ def test_a_full_disk_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert changes(log.path) == []
 
 
-def test_a_disk_that_never_takes_more_says_how_many_are_missing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_reports_the_number_of_missing_messages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     log = RunLog(tmp_path / "run.mcap", lockstep=False, patient=True)
 
     def full(_self: ChunkWriter) -> None:
@@ -238,7 +236,7 @@ def test_a_disk_that_never_takes_more_says_how_many_are_missing(
     log.close()
 
 
-def test_a_slow_disk_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_slow_disk_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     events: list[wire.Event] = []
     log = RunLog(tmp_path / "run.mcap", lockstep=False, patient=True, on_event=events.append)
     log._files._look_s = 0.0
@@ -267,7 +265,7 @@ def test_the_index_of_a_long_log_does_not_stay_in_memory(tmp_path: Path) -> None
     assert [entry.name for entry in tmp_path.iterdir()] == ["run.mcap"]
 
 
-def test_memory_that_grows_while_a_log_is_read_keeps_what_is_there(
+def test_memory_that_grows_while_a_log_is_read_keeps_its_content(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "run.mcap"

@@ -1,4 +1,4 @@
-"""The passwords of a rig on loopback: private, found again, and never through a file that somebody else has laid."""
+"""The passwords of a rig on loopback: private, kept between runs, and never read from a file of another user."""
 
 import os
 from pathlib import Path
@@ -38,7 +38,7 @@ def test_the_file_is_private_and_stays(place: Path) -> None:
 
 
 @pytest.mark.parametrize("harm", ["readable", "cut", "link"])
-def test_a_file_that_cannot_be_trusted_is_made_anew(place: Path, harm: str) -> None:
+def test_an_untrusted_file_is_replaced(place: Path, harm: str) -> None:
     before = loopback_users.make(ENDPOINT).read_text()
     if harm == "readable":
         place.chmod(0o644)

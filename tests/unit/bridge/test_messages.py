@@ -27,7 +27,7 @@ from bridge.wire.payloads import sequence_and_time
 
 
 @pytest.mark.parametrize("layout", [COMMAND, APPLIED, TRACE, STATE, sensor_block(20), sensor_block(50)])
-def test_the_library_reads_what_a_record_holds(layout: Layout) -> None:
+def test_the_protobuf_library_reads_the_content_of_a_record(layout: Layout) -> None:
     record = layout.blank()
     for n, field in enumerate(layout.message.DESCRIPTOR.fields, start=1):
         record[field.name] = n
@@ -63,5 +63,5 @@ def test_a_copy_is_not_shared() -> None:
     assert np.array_equal(COMMAND.read(first.tobytes(), "command"), first)
 
 
-def test_the_bits_of_a_step_are_those_of_the_schema() -> None:
+def test_the_bits_of_a_step_match_the_schema() -> None:
     assert (BLOCK, GAP, STALE, STOP, RESET, ANNOUNCED, LATE) == (1, 2, 4, 8, 16, 32, 64)

@@ -1,4 +1,4 @@
-"""A configuration in a log may be anything: every command that needs it says BAD_LOG, and `log check` has a finding."""
+"""A damaged configuration in a log: every command that needs it ends with BAD_LOG, and `log check` reports it."""
 
 from pathlib import Path
 
@@ -44,9 +44,9 @@ def test_a_configuration_that_cannot_be_used_is_a_bad_log(tmp_path: Path, config
         judge(path)
     with pytest.raises(Fault, match=r"(BAD_LOG|CONFIG): .*(configuration|block_s)"):
         replay_log(path, 0.0, [])
-    found = [finding for finding in check_log(path).findings if finding.kind == "configuration"]
-    assert why in found[0].text
-    assert found[0].where == "run.mcap"
+    findings = [finding for finding in check_log(path).findings if finding.kind == "configuration"]
+    assert why in findings[0].text
+    assert findings[0].where == "run.mcap"
 
 
 def test_a_bad_configuration_is_not_blamed_on_a_setting(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""A log that another program wrote anew, in every form that the MCAP format allows, is read as it was; and read by others."""
+"""A log rewritten by another program, in every form that MCAP allows, reads the same; other programs read ours."""
 
 import struct
 from collections.abc import Callable
@@ -84,7 +84,7 @@ FORMS = [
 
 
 @pytest.mark.parametrize(("compression", "chunks", "index", "crcs"), FORMS)
-def test_every_form_is_read_and_recovered_as_it_was(
+def test_every_form_is_read_and_recovered_unchanged(
     tmp_path: Path, compression: CompressionType, chunks: bool, index: str, crcs: bool
 ) -> None:
     summary = index != "none"
@@ -129,7 +129,7 @@ def test_channels_of_one_topic_that_alternate_are_one_topic(tmp_path: Path, chun
 
 
 @pytest.mark.parametrize("library", [LIBRARY, "mcap-cli/0.1.0", ""])
-def test_what_it_says_of_itself_is_right(tmp_path: Path, library: str) -> None:
+def test_a_log_rewritten_by_another_library_passes_all_checks(tmp_path: Path, library: str) -> None:
     path = written_anew(tmp_path / "anew.mcap", library)
     check = check_log(path)
     assert check.findings == []
@@ -139,7 +139,7 @@ def test_what_it_says_of_itself_is_right(tmp_path: Path, library: str) -> None:
     assert not [fault for fault in judge(path).faults if "changed" in fault]
 
 
-def test_topics_of_other_programs_beside_ours_are_counted_and_told_once(tmp_path: Path) -> None:
+def test_topics_of_other_programs_are_counted_and_reported_once(tmp_path: Path) -> None:
     def more(writer: Writer) -> None:
         schema = writer.register_schema("sensor_msgs/msg/Image", "ros2msg", b"uint8[] data")
         camera = writer.register_channel("/camera", "cdr", schema)
@@ -155,8 +155,8 @@ def test_topics_of_other_programs_beside_ours_are_counted_and_told_once(tmp_path
     assert run.damage.whole
     assert same(run, tmp_path / "source.mcap")
     assert run.foreign == {"/camera": 5, "/state": 5}
-    told = [line for line in judge(path).told if "of other programs" in line]
-    assert told == ["10 messages of other programs passed over: /camera, /state"]
+    lines = [line for line in judge(path).told if "of other programs" in line]
+    assert lines == ["10 messages of other programs skipped: /camera, /state"]
     assert check_log(path).foreign == run.foreign
     recovered = recover(path, tmp_path / "recovered.mcap")
     with (tmp_path / "recovered.mcap").open("rb") as file:
@@ -198,7 +198,7 @@ def test_after_a_hole_the_next_chunk_is_read(tmp_path: Path, compression: Compre
     assert run.damage.missing > 0
 
 
-def test_a_frame_that_does_not_tell_its_size_is_read(tmp_path: Path) -> None:
+def test_a_frame_without_its_size_is_read(tmp_path: Path) -> None:
     """As of a streaming compressor, which begins to write before it knows how much comes."""
     data = written_anew(
         tmp_path / "anew.mcap", compression=CompressionType.NONE, index_types=IndexType.NONE
@@ -210,7 +210,7 @@ def test_a_frame_that_does_not_tell_its_size_is_read(tmp_path: Path) -> None:
         if opcode == 6:
             packed = zstandard.ZstdCompressor(write_content_size=False).compress(content[40:])
             content = content[:28] + struct.pack("<I", 4) + b"zstd" + struct.pack("<Q", len(packed)) + packed
-        if opcode == 15:  # the end of the data; the footer then says that there is no summary
+        if opcode == 15:  # the end of the data; the footer that follows names no summary
             out += data[at : at + 9 + length] + struct.pack("<BQQQI", 2, 20, 0, 0, 0) + data[-8:]
             break
         out += struct.pack("<BQ", opcode, len(content)) + content
@@ -221,11 +221,11 @@ def test_a_frame_that_does_not_tell_its_size_is_read(tmp_path: Path) -> None:
     assert same(run, tmp_path / "source.mcap")
 
 
-def test_a_topic_whose_definition_is_lost_is_told_and_never_guessed(tmp_path: Path) -> None:
+def test_a_topic_whose_definition_is_lost_is_reported_and_never_guessed(tmp_path: Path) -> None:
     data = short_log()
     name = data.index(b"/sensors")
     path = tmp_path / "nameless.mcap"
-    # the channel's record becomes one of a program of its own, and the summary, which has it again, is gone
+    # the record of the channel gets an opcode of private use; the summary, which repeats the record, is removed
     at = name - 4 - 2 - 2 - 9
     cut = data.index(b"/sensors", name + 8) - 5000
     path.write_bytes(data[:at] + b"\x90" + data[at + 1 : cut])
@@ -250,7 +250,7 @@ def test_a_definition_that_is_lost_at_the_front_is_taken_from_the_summary(tmp_pa
     assert checksums_of(path).damaged
 
 
-def test_without_its_metadata_the_cause_is_told_rightly(tmp_path: Path) -> None:
+def test_the_cause_of_missing_metadata_is_reported_correctly(tmp_path: Path) -> None:
     path = written_anew(tmp_path / "anew.mcap", keep=lambda topic: topic != "/trace")
     data = path.read_bytes().replace(b"controller", b"controllex")  # as a tool that leaves the tables out
     path.write_bytes(data)
@@ -281,6 +281,6 @@ def test_the_files_of_a_log_may_number_their_channels_differently(tmp_path: Path
 
 def test_a_topic_that_a_filter_left_out_is_named(tmp_path: Path) -> None:
     path = written_anew(tmp_path / "filtered.mcap", keep=lambda topic: topic not in {"/trace", "/applied"})
-    found = {one.where: one.text for one in check_log(path).findings if one.kind == "absent"}
-    assert found.keys() == {"/trace", "/applied"}
-    assert "the controller sent none, or a program left the topic out" in found["/trace"]
+    absent = {finding.where: finding.text for finding in check_log(path).findings if finding.kind == "absent"}
+    assert absent.keys() == {"/trace", "/applied"}
+    assert "the controller sent none, or a program left the topic out" in absent["/trace"]

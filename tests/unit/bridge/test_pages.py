@@ -1,4 +1,4 @@
-"""All pages share one style sheet and one frame; no template brings colours or a frame of its own."""
+"""All pages share one style sheet and one frame; no template defines colours or a frame."""
 
 import re
 from pathlib import Path
@@ -37,10 +37,10 @@ def test_a_template_has_one_h1_and_leaves_colours_to_the_style_sheet(template: P
 
 
 def test_there_is_one_style_sheet() -> None:
-    found = {
+    colours = {
         name_of(path) for top in ("bridge", "bench", "cockpit", "diagnosis") for path in (ROOT / top).rglob("*.css")
     }
-    assert found == {"bridge/page.css", "cockpit/review/vendor/uPlot.min.css"}
+    assert colours == {"bridge/page.css", "cockpit/review/vendor/uPlot.min.css"}
 
 
 def test_every_kind_of_page_has_the_style_sheet_once_and_one_main(tmp_path: Path) -> None:

@@ -43,24 +43,24 @@ def still(*stretches: tuple[int, int]) -> list[Pause]:
         ([], []),
     ],
 )
-def test_only_what_all_cores_share_is_the_machines(cores: list[list[Pause]], expected: list[Pause]) -> None:
+def test_only_a_pause_of_all_cores_is_a_pause_of_the_computer(cores: list[list[Pause]], expected: list[Pause]) -> None:
     assert shared(cores) == expected
     assert shared(cores[::-1]) == expected
 
 
-def test_a_pause_is_told_once_however_often_is_looked() -> None:
-    told = {0: still((0, 20 * MS)), 1: still((0, 5 * MS), (8 * MS, 30 * MS))}
-    first, told = settled(told, 6 * MS)
-    second, told = settled(told, 40 * MS)
+def test_a_pause_is_reported_once_however_often_it_is_polled() -> None:
+    pauses_by_core = {0: still((0, 20 * MS)), 1: still((0, 5 * MS), (8 * MS, 30 * MS))}
+    first, pauses_by_core = settled(pauses_by_core, 6 * MS)
+    second, pauses_by_core = settled(pauses_by_core, 40 * MS)
     alone = [Pause(5 * MS, 8 * MS, core=0), Pause(20 * MS, 30 * MS, core=1)]
     assert (first, second) == (still((0, 5 * MS)), [alone[0], Pause(8 * MS, 20 * MS), alone[1]])
-    assert settled(told, 100 * MS)[0] == []
+    assert settled(pauses_by_core, 100 * MS)[0] == []
 
 
-def test_what_one_core_tells_alone_is_told_of_that_core() -> None:
+def test_a_pause_of_one_core_is_reported_for_that_core() -> None:
     cores = {2: still((0, 3 * MS), (10 * MS, 20 * MS)), 5: still((10 * MS, 20 * MS + 1), (40 * MS, 50 * MS))}
-    found, later = settled(cores, 60 * MS)
-    assert found == [Pause(0, 3 * MS, core=2), Pause(10 * MS, 20 * MS), Pause(40 * MS, 50 * MS, core=5)]
+    pauses, later = settled(cores, 60 * MS)
+    assert pauses == [Pause(0, 3 * MS, core=2), Pause(10 * MS, 20 * MS), Pause(40 * MS, 50 * MS, core=5)]
     assert later == {2: [], 5: []}
 
 
@@ -78,15 +78,15 @@ def test_the_clock_of_a_run_goes_by_the_message_that_was_delayed_least() -> None
     for block in range(3000):  # the run began at 500 ms, its messages take 0.1 to 0.9 ms
         clock.note(500 * MS + block * MS + (100_000 + 1000 * (block * 7919 % 800)), block * MS)
     assert clock.run_ns(2600 * MS) == pytest.approx(2100 * MS, abs=0.11 * MS)
-    clock.note(9000 * MS, 3000 * MS)  # the plant paused; its clock began anew
+    clock.note(9000 * MS, 3000 * MS)  # the plant paused and restarted its clock
     clock.note(10_001 * MS, 4000 * MS)
     clock.note(11_002 * MS, 5000 * MS)
     assert clock.run_ns(11_000 * MS) == pytest.approx(5000 * MS, abs=2 * MS)
 
 
 class FakeWatch:
-    def __init__(self, *told: list[Pause]) -> None:
-        self.cores, self.refused, self._told = [0, 1], "", list(told)
+    def __init__(self, *pauses: list[Pause]) -> None:
+        self.cores, self.refused, self._told = [0, 1], "", list(pauses)
 
     def poll(self, all_of_them: bool = False) -> list[Pause]:  # noqa: ARG002
         return self._told.pop(0) if self._told else []
@@ -98,7 +98,7 @@ def applied(number: int, arrival_ns: int) -> Received:
     return Received(APPLIED, record.tobytes(), arrival_ns)
 
 
-def test_a_log_tells_of_pauses_in_the_time_of_its_run(tmp_path: Path) -> None:
+def test_a_log_holds_pauses_in_the_time_of_its_run(tmp_path: Path) -> None:
     sent: list[wire.Event] = []
     watch = FakeWatch([], [*still((7 * MS, 9 * MS)), Pause(9 * MS, 12 * MS, core=1)])
     log = RunLog(tmp_path / "run.mcap", lockstep=False, on_event=sent.append)
@@ -118,7 +118,7 @@ def test_a_log_tells_of_pauses_in_the_time_of_its_run(tmp_path: Path) -> None:
     assert sent == events
 
 
-def test_a_watch_that_is_refused_or_ends_is_told_and_no_pause_is_claimed(tmp_path: Path) -> None:
+def test_a_watch_that_is_refused_or_ends_is_reported_and_no_pause_is_claimed(tmp_path: Path) -> None:
     log, watch = RunLog(tmp_path / "run.mcap", lockstep=False), FakeWatch([], still((7 * MS, 9 * MS)))
     writer = PauseWriter(log, watch)  # pyright: ignore[reportArgumentType]
     writer.report_when_due()
@@ -158,7 +158,7 @@ def _wait_until_they_watch(timers: Iterable[int]) -> None:
 
 @pytest.mark.realtime
 @needs_priority
-def test_timers_that_stand_still_together_tell_of_a_pause_and_one_alone_does_not() -> None:
+def test_a_pause_needs_all_timers_to_stall_together() -> None:
     watch = PauseWatch()
     try:
         assert watch.refused == ""
@@ -172,10 +172,10 @@ def test_timers_that_stand_still_together_tell_of_a_pause_and_one_alone_does_not
         began_ns = time.perf_counter_ns()
         _hold(watch._timers, 0.2)
         time.sleep(0.2)
-        found = [pause for pause in watch.poll() if pause.until_ns - pause.from_ns > 100 * MS]
-        assert [pause.core for pause in found] == [None]
-        assert began_ns < found[0].from_ns + 5 * MS
-        assert found[0].until_ns < time.perf_counter_ns()
+        pauses = [pause for pause in watch.poll() if pause.until_ns - pause.from_ns > 100 * MS]
+        assert [pause.core for pause in pauses] == [None]
+        assert began_ns < pauses[0].from_ns + 5 * MS
+        assert pauses[0].until_ns < time.perf_counter_ns()
         watch._timers[0].kill()
         watch._timers[0].wait()
         watch.poll()

@@ -1,4 +1,4 @@
-"""Which process somebody is."""
+"""How a process is identified."""
 
 import json
 import os
@@ -9,7 +9,7 @@ from bridge.faults import Fault
 from bridge.processes import pid_here, this_process
 
 
-def test_a_process_is_known_by_what_it_said() -> None:
+def test_a_process_is_known_by_its_record() -> None:
     assert pid_here("plant", this_process()) == os.getpid()
 
 
@@ -27,10 +27,10 @@ def test_another_process_is_not_taken_for_it(changed: dict[str, object], line: s
         pid_here("plant", json.dumps(json.loads(this_process()) | changed))
 
 
-@pytest.mark.parametrize("told", ["", "[]", "{}", '{"pid": "x"}'])
-def test_what_tells_nothing_is_no_process(told: str) -> None:
+@pytest.mark.parametrize("record", ["", "[]", "{}", '{"pid": "x"}'])
+def test_an_invalid_record_names_no_process(record: str) -> None:
     with pytest.raises(Fault, match="sends no process identity"):
-        pid_here("plant", told)
+        pid_here("plant", record)
 
 
 def test_a_process_of_another_user_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:

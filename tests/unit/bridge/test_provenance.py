@@ -1,4 +1,4 @@
-"""What a page or a picture says of what made it."""
+"""The provenance in pages and pictures."""
 
 import hashlib
 import os

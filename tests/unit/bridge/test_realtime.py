@@ -42,7 +42,7 @@ def test_pinning_keeps_every_thread_on_the_core() -> None:
 def test_a_wait_that_ended_in_time_was_no_pause() -> None:
     now_s = time.monotonic()
     assert not realtime.was_paused(now_s, now_s + 0.05)
-    assert not realtime.was_paused(now_s, now_s - 3.0)  # what was due is late: this process did not stand still
+    assert not realtime.was_paused(now_s, now_s - 3.0)  # the deadline was already past: the process did not stall
     assert realtime.was_paused(now_s - 3.0, now_s - 2.9)
 
 

@@ -1,4 +1,4 @@
-"""What a log that cannot be written to its end says of what it holds."""
+"""The message about a log that cannot be written to its end."""
 
 import math
 import os
@@ -21,8 +21,10 @@ def _write(log: RunLog, blocks: range) -> None:
         log.write(SENSORS, record.tobytes())
 
 
-@pytest.mark.parametrize(("blocks", "told"), [(20, "closed at 0.02 s, "), (0, "closed before anything was recorded; ")])
-def test_a_full_disk_tells_the_time_of_the_last_whole_chunk(tmp_path: Path, blocks: int, told: str) -> None:
+@pytest.mark.parametrize(
+    ("blocks", "message"), [(20, "closed at 0.02 s, "), (0, "closed before anything was recorded; ")]
+)
+def test_a_full_disk_reports_the_time_of_the_last_whole_chunk(tmp_path: Path, blocks: int, message: str) -> None:
     path = tmp_path / "run.mcap"
     log = RunLog(path, lockstep=True)
     log._due_s = math.inf  # no chunk ends by itself
@@ -32,14 +34,14 @@ def test_a_full_disk_tells_the_time_of_the_last_whole_chunk(tmp_path: Path, bloc
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (path.stat().st_size + 60, before[1]))
     try:
-        with pytest.raises(Fault, match=f"LOG_WRITE: .*{told}"):
+        with pytest.raises(Fault, match=f"LOG_WRITE: .*{message}"):
             log.close()
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert len(read_run(path).sensors) == blocks
 
 
-def test_a_pipe_is_no_place_for_a_log(tmp_path: Path) -> None:
+def test_a_log_is_not_written_to_a_pipe(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.mcap")
     with pytest.raises(Fault, match=r"CONFIG: .*pipe.mcap: is a pipe or socket"):
         RunLog(tmp_path / "pipe.mcap", lockstep=True)

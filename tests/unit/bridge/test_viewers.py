@@ -1,4 +1,4 @@
-"""What the recorder adds to a log for viewers: the topics scope and log, the comments in the descriptors."""
+"""Additions of the recorder for viewers: the topics scope and log, the comments in the descriptors."""
 
 from pathlib import Path
 from typing import Any
@@ -32,15 +32,15 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def messages(path: Path, topic: str) -> list[tuple[Any, Any]]:
     """The messages of a topic with their log times, decoded by the schema in the log alone, as another program does it."""
-    found: list[tuple[Any, Any]] = []
+    schemas: list[tuple[Any, Any]] = []
     with path.open("rb") as file:
         for schema, _, message in make_reader(file).iter_messages(topics=[topic]):
-            found.append((schema, message))
+            schemas.append((schema, message))
     pool = DescriptorPool()
-    for one in descriptor_pb2.FileDescriptorSet.FromString(found[0][0].data).file:
+    for one in descriptor_pb2.FileDescriptorSet.FromString(schemas[0][0].data).file:
         pool.Add(one)
-    kind = GetMessageClass(pool.FindMessageTypeByName(found[0][0].name))
-    return [(kind.FromString(message.data), message.log_time) for _, message in found]
+    kind = GetMessageClass(pool.FindMessageTypeByName(schemas[0][0].name))
+    return [(kind.FromString(message.data), message.log_time) for _, message in schemas]
 
 
 def test_scope_has_the_smallest_mean_and_largest_sample_of_each_stretch(log: Path) -> None:
@@ -53,17 +53,17 @@ def test_scope_has_the_smallest_mean_and_largest_sample_of_each_stretch(log: Pat
         at = name.rindex("_")
         each = [run.sensors[name][5 * i : 5 * i + 5] for i in range(241)]
         for which, figure in {"min": np.min, "max": np.max, "mean": np.mean}.items():
-            told = [getattr(said, f"{name[:at]}_{which}{name[at:]}") for said, _ in scope]
-            np.testing.assert_allclose(told, [figure(one) for one in each], rtol=2e-6, err_msg=name)
+            values = [getattr(said, f"{name[:at]}_{which}{name[at:]}") for said, _ in scope]
+            np.testing.assert_allclose(values, [figure(stretch) for stretch in each], rtol=2e-6, err_msg=name)
 
 
-def test_scope_tells_what_was_in_force_in_words(log: Path) -> None:
+def test_scope_names_mode_and_limits_in_force(log: Path) -> None:
     run = read_run(log)
     scope = messages(log, "/scope")
     rows = [min(5 * i + 4, 1202) for i in range(241)]
     for field in ("mode", "state", "reason", "limit", "drive_velocity_mps", "vibration_velocity_mps"):
-        told = [getattr(said, field) for said, _ in scope]
-        np.testing.assert_allclose(told, run.trace[field][rows], rtol=1e-6, err_msg=field)
+        values = [getattr(said, field) for said, _ in scope]
+        np.testing.assert_allclose(values, run.trace[field][rows], rtol=1e-6, err_msg=field)
     assert [said.amplitude_m for said, _ in scope] == pytest.approx(run.applied["amplitude_m"][rows], rel=1e-6)
     names = {said.DESCRIPTOR.fields_by_name["mode"].enum_type.values_by_number[said.mode].name for said, _ in scope}
     assert "EXCITE" in names
@@ -102,12 +102,12 @@ def test_blocks_of_any_length_lost_ones_and_no_controller(tmp_path: Path) -> Non
     for number in range(100):
         if number not in lost:
             stretches.setdefault((2_000_000 * (number + 1) - 1) // 5_000_000, []).append(number)
-    assert [said.drive_force_min_N for said in scope] == [min(one) for one in stretches.values()]
-    assert [said.drive_force_max_N for said in scope] == [max(one) for one in stretches.values()]
+    assert [said.drive_force_min_N for said in scope] == [min(stretch) for stretch in stretches.values()]
+    assert [said.drive_force_max_N for said in scope] == [max(stretch) for stretch in stretches.values()]
     assert {(said.mode, said.amplitude_m) for said in scope} == {(0, 0.0)}
 
 
-def test_blocks_of_another_length_begin_anew_and_odd_messages_are_left_out(
+def test_blocks_of_another_length_restart_the_scope_and_odd_messages_are_left_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("bridge.log.viewers.scope.AT_ONCE_BLOCKS", 10)
@@ -135,7 +135,7 @@ def test_a_log_without_a_block_has_no_scope(tmp_path: Path) -> None:
         assert list(make_reader(file).iter_messages(topics=["/scope"])) == []
 
 
-def test_events_are_said_again_as_foxglove_log_with_a_level(tmp_path: Path) -> None:
+def test_events_are_repeated_as_foxglove_log_with_a_level(tmp_path: Path) -> None:
     log = RunLog(tmp_path / "run.mcap", lockstep=True)
     for number, code in enumerate(["START", "FALLBACK", "FAULT", "NOT_KNOWN"]):
         event = wire.Event(sequence=number, t_ns=1_500_000_000, source="plant", code=code, text="so it is")
@@ -162,11 +162,11 @@ def test_the_comments_with_units_are_in_the_descriptors(log: Path) -> None:
         if not schema.name.startswith("stickslip."):
             continue
         file_set = descriptor_pb2.FileDescriptorSet.FromString(schema.data)
-        names = [one.name for one in file_set.file[0].message_type]
-        own = names.index(schema.name.removeprefix("stickslip."))
-        told = [place for place in file_set.file[0].source_code_info.location if list(place.path[:2]) == [4, own]]
-        assert told[0].leading_comments
-        described += len(told)
+        names = [entry.name for entry in file_set.file[0].message_type]
+        index = names.index(schema.name.removeprefix("stickslip."))
+        places = [place for place in file_set.file[0].source_code_info.location if list(place.path[:2]) == [4, index]]
+        assert places[0].leading_comments
+        described += len(places)
     assert described > 60
     assert {channel.topic for channel in summary.channels.values()} == {
         *("/" + topic.name for topic in TOPICS if topic.logged),

@@ -1,4 +1,4 @@
-"""Each channel broken in each way on three logs: what the judge calls ok, beside the simplest rule that could do.
+"""Each channel broken in each way on three logs: the judge's misses, compared with the simplest rule that could do.
 
 `pytest tests/unit/cockpit/test_broken_channels.py -m nightly -s` counts for the table of docs/method/sensors.md. In `make test`
 test_sensor_watch.py breaks the channels of one short log.
@@ -26,7 +26,7 @@ SHIPPED = sorted(path.stem for path in (Path(__file__).parents[3] / "deploy/scen
 HELPED = [axis for axis in BANK if axis.bank.small and axis.bank.expect == "helped"]
 BROKEN = {"paper-c45-c45", "stop-and-go", "drawn-05"}
 DRAWN = [axis for axis in BANK if axis.name in BROKEN]
-# What no other channel shows: the sign of an acceleration, the scale of one that the controller saw as well, and a limit that the
+# Not visible in other channels: the sign of an acceleration, a scale that the controller saw as well, and a limit that the
 # channel itself exceeded before.
 UNSEEN = {(accel, word) for accel in ("base_accel_mps2", "mass_accel_mps2") for word in ("negated", "x 0.5", "clipped")}
 UNSEEN |= {("mass_accel_mps2", "x 2"), ("mass_accel_mps2", "x 10")}
@@ -79,12 +79,12 @@ def test_sound_logs_are_without_a_doubt_and_broken_ones_are_not_ok(name: str, tm
             for from_s in (0.0, 0.5 * verdict.seconds, verdict.seconds - 1.5):
                 seen = edited(run, edit, from_s)
                 for broken in (seen, seen._replace(trace=run.trace)):  # by the controller, too, or in the log alone
-                    found = verdict_of(broken)
+                    judged = verdict_of(broken)
                     counts["judged"] += 1
-                    counts["rival ok"] += rival_is_ok(broken, found, channels)
+                    counts["rival ok"] += rival_is_ok(broken, judged, channels)
                     counts["rival ok, and visible"] += (channel, word) not in UNSEEN and rival_is_ok(
-                        broken, found, channels
+                        broken, judged, channels
                     )
-                    counts["ok"] += found.control == OK
-                    assert found.control != OK or (channel, word) in UNSEEN, (channel, word, from_s)
+                    counts["ok"] += judged.control == OK
+                    assert judged.control != OK or (channel, word) in UNSEEN, (channel, word, from_s)
     print(dict(counts))

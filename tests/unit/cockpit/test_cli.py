@@ -1,4 +1,4 @@
-"""Commands that read a log or draw: what comes of logs and options that are not as usual."""
+"""Commands that read a log or draw, with unusual logs and options."""
 
 import json
 import os
@@ -47,7 +47,7 @@ def call(*arguments: str):
         pytest.param("map", ".svg", b"<?xml", marks=[pytest.mark.slow, pytest.mark.nightly]),
     ],
 )
-def test_a_picture_is_what_its_name_says(log: Path, command: str, suffix: str, begins: bytes) -> None:
+def test_a_picture_has_the_format_of_its_suffix(log: Path, command: str, suffix: str, begins: bytes) -> None:
     out = log.with_name(f"picture{suffix}")
     result = call(command, *([str(log)] if command == "plot" else []), "--out", str(out))
     assert result.exit_code == 0, result.output
@@ -65,7 +65,7 @@ def test_a_picture_of_another_kind_is_refused(log: Path, command: str, name: str
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         (["diagnose", ".", "--report", "r.pdf"], "--report r.pdf: must end in .html, .htm; "),
         (["diagnose", ".", "--apply", "r.json"], "--apply r.json: must end in .toml; "),
@@ -87,17 +87,17 @@ def test_a_picture_of_another_kind_is_refused(log: Path, command: str, name: str
         (["example", "r.toml"], "FOLDER r.toml: must be a folder, but .toml is a suffix of files; "),
     ],
 )
-def test_what_would_be_of_another_kind_than_its_name_is_refused_before_the_work(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], told: str
+def test_an_output_of_the_wrong_suffix_is_refused_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], message: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
     result = call(*words)
     assert result.exit_code == 2
-    assert result.stderr.startswith(f"stickslip: CONFIG: {told}")
+    assert result.stderr.startswith(f"stickslip: CONFIG: {message}")
     assert not list(tmp_path.iterdir())
 
 
-def test_a_picture_without_a_name_is_beside_its_log(log: Path) -> None:
+def test_a_picture_without_a_name_is_written_next_to_its_log(log: Path) -> None:
     result = call("plot", str(log))
     assert result.exit_code == 0, result.output
     assert log.with_name("run.png").read_bytes().startswith(PNG)
@@ -118,7 +118,7 @@ def test_a_picture_never_replaces_its_log(log: Path) -> None:
 
 
 @pytest.mark.parametrize("time", ["inf", "nan", "-1s", "1e300s", "soon"])
-def test_what_is_no_time_is_refused(log: Path, time: str) -> None:
+def test_an_invalid_time_is_refused(log: Path, time: str) -> None:
     for option in (f"--from={time}", f"--set=limits.v_ratio=1.1@{time}"):
         result = call("replay", str(log), option)
         assert result.exit_code == 2, result.output
@@ -140,7 +140,7 @@ def test_a_folder_as_the_file_to_write_is_refused_at_once(log: Path, command: st
     assert f"{long}: cannot be written: File name too long" in call(command, *more, "--out", str(long)).stderr
 
 
-def test_a_rig_that_cannot_be_read_is_no_picture_that_cannot_be_written(tmp_path: Path) -> None:
+def test_a_rig_that_cannot_be_read_is_not_reported_as_a_write_error(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").mkdir()
     result = call("map", "--rig", str(tmp_path / "mine.toml"), "--out", str(tmp_path / "map.png"))
     assert result.exit_code != 0
@@ -176,7 +176,7 @@ def test_options_that_a_replay_would_not_follow_are_refused(
     assert remedy in words
 
 
-def test_what_is_made_of_a_damaged_log_says_so(log: Path, tmp_path: Path) -> None:
+def test_results_from_a_damaged_log_carry_a_warning(log: Path, tmp_path: Path) -> None:
     data = bytearray(short_log())
     data[data.index(b"zstd", len(data) // 2) + 100] ^= 0x40
     log.write_bytes(data)
@@ -186,11 +186,11 @@ def test_what_is_made_of_a_damaged_log_says_so(log: Path, tmp_path: Path) -> Non
     )
     for words, warning in (
         (replay, "warning: damaged: 1 chunk is damaged"),
-        (export, "lost: 1 damaged chunk, 160 messages by the log's own count\n"),
+        (export, "lost: 1 damaged chunk, 160 messages that the log's statistics count\n"),
     ):
-        said = call(*words)
-        assert said.exit_code == 1
-        assert warning in said.stdout
+        output = call(*words)
+        assert output.exit_code == 1
+        assert warning in output.stdout
     [replayed] = json.loads(call(*replay, "--json").stdout)
     assert replayed["identical"]
     assert replayed["skipped_steps"] > 0
@@ -203,9 +203,9 @@ def test_a_log_that_needs_too_much_memory_is_one_line(log: Path, monkeypatch: py
 
     monkeypatch.setattr("cockpit.judge.judged.judge_log", full)
     monkeypatch.setattr(sys, "argv", ["stickslip", "log", "info", str(log)])
-    said = call("log", "info", str(log))
-    assert said.exit_code == FAULTS["NO_MEMORY"].exit_status
-    assert said.stderr.startswith(f"stickslip: NO_MEMORY: {log}: needs more memory than is free; ")
+    output = call("log", "info", str(log))
+    assert output.exit_code == FAULTS["NO_MEMORY"].exit_status
+    assert output.stderr.startswith(f"stickslip: NO_MEMORY: {log}: needs more memory than is free; ")
 
 
 def test_export_takes_times_as_replay_does(log: Path, tmp_path: Path) -> None:
@@ -229,13 +229,13 @@ def test_a_log_that_is_being_recorded_is_not_renamed(tmp_path: Path) -> None:
         (["run", "--rig", "deploy/scenarios/stop-and-go.toml"], "is a scenario, not a rig; give the rig that it names"),
     ],
 )
-def test_a_rig_in_the_place_of_a_scenario_is_told(arguments: list[str], expected: str) -> None:
+def test_a_rig_given_as_a_scenario_is_reported(arguments: list[str], expected: str) -> None:
     result = call(*arguments)
     assert result.exit_code == 2
     assert expected in result.stderr
 
 
-def test_a_controller_that_does_not_tell_what_a_verdict_needs_is_a_bad_log(tmp_path: Path) -> None:
+def test_a_controller_configuration_that_lacks_a_key_of_the_verdict_is_a_bad_log(tmp_path: Path) -> None:
     run = read_run(doctored(tmp_path, lambda _tables: None))
     bare = run._replace(headers=run.headers | {"controller": {"configuration": '{"block_s": 0.001}'}})
     with pytest.raises(
@@ -253,13 +253,13 @@ def test_a_log_that_is_there_is_kept(tmp_path: Path, capsys: pytest.CaptureFixtu
         keep_aside(log)
         assert not log.exists()
     kept = {path.read_bytes(): str(path) for path in tmp_path.iterdir()}
-    said = capsys.readouterr().err
+    output = capsys.readouterr().err
     assert kept.keys() == {b"first", b"second"}
-    assert all(path in said for path in kept.values())
+    assert all(path in output for path in kept.values())
 
 
 @pytest.mark.parametrize("from_block", [0, 100])
-def test_a_force_that_is_no_number_any_more_is_no_error(tmp_path: Path, from_block: int) -> None:
+def test_a_force_of_nan_gives_a_verdict_without_an_error(tmp_path: Path, from_block: int) -> None:
     def spoil(tables):
         tables["sensors"]["drive_force_N"][from_block:] = np.nan
 
@@ -279,8 +279,8 @@ def test_messages_out_of_order_are_not_lost(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("arguments", [["log", "check", "bad.mcap"], ["explain"], ["explain", "CONFIG"], ["scenarios"]])
-def test_a_reader_that_leaves_is_no_success(tmp_path: Path, arguments: list[str]) -> None:
-    """`stickslip ... | head` with a reader that is gone before the first word."""
+def test_a_closed_pipe_is_not_a_success(tmp_path: Path, arguments: list[str]) -> None:
+    """`stickslip ... | head` with a reader that has closed the pipe before the first output."""
     (tmp_path / "bad.mcap").write_bytes(short_log()[:-2000])
     reader, writer = os.pipe()
     os.close(reader)

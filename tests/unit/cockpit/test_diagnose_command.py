@@ -1,4 +1,4 @@
-"""`stickslip diagnose`: what it prints and writes, for one folder and for many, with a stand-in for the diagnosing."""
+"""Output and files of `stickslip diagnose` for one folder and for many, with a fake diagnosis."""
 
 import json
 import os
@@ -42,7 +42,7 @@ def files(at: Path) -> set[str]:
     return {str(path.relative_to(at)) for path in at.rglob("*") if path.is_file()}
 
 
-def test_one_folder_says_the_verdict_first(tmp_path):
+def test_one_folder_prints_the_verdict_first(tmp_path):
     result = diagnose(folders(tmp_path, "rig") / "rig")
     assert result.exit_code == 0
     lines = result.stdout.splitlines()
@@ -70,7 +70,7 @@ def test_one_folder_says_the_verdict_first(tmp_path):
     assert all("described" in line for line in lines[13:after])
     assert lines[after].startswith("next       Reverse the drive")
     assert lines[after + 1 :] == [
-        "data       run-01.parquet: base_accel_mps2: not there: what the piezo delivers cannot be seen",
+        "data       run-01.parquet: base_accel_mps2: missing: what the piezo delivers cannot be seen",
         "           run-02.parquet: drive_force_N: 12 samples at 20 N were left out",
     ]
     assert "off by 6 noise floors" in result.stderr
@@ -100,7 +100,7 @@ def test_one_folder_writes_json_report_and_rig(tmp_path, monkeypatch):
     assert files(out) == {"a.json", "a.html"}
     written = json.loads((out / "a.json").read_text())
     assert written["format"] == "diagnosis/2"
-    assert written["elapsed_s"] == 3.0  # the stand-in says the number of jobs here
+    assert written["elapsed_s"] == 3.0  # the fake diagnosis puts the number of jobs here
     assert rigs == [(("drive-backlash",), "rig", "a.toml")]
     assert "Diagnosis of rig" in (out / "a.html").read_text()
 
@@ -148,7 +148,7 @@ def test_evidence_that_cannot_be_looked_at_is_bad_and_ends_no_other(name, why, t
     ("name", "why"),
     [("absent", "no such folder; "), ("file.txt", "no folder; "), ("x" * 300, "cannot be read: File name too long; ")],
 )
-def test_evidence_that_is_not_there_is_said_before_the_work(name, why, tmp_path, monkeypatch):
+def test_missing_evidence_is_reported_before_the_work(name, why, tmp_path, monkeypatch):
     monkeypatch.chdir(folders(tmp_path, "rig", "rig2"))
     Path("file.txt").touch()
     monkeypatch.setattr(many, "real_diagnose", made_up.endless)
@@ -167,7 +167,7 @@ def test_an_option_that_would_be_the_name_of_a_file_is_refused_before_the_work(t
 
 
 @pytest.mark.parametrize("option", ["--json", "--report", "--apply"])
-def test_a_name_too_long_to_be_written_is_said_before_the_work(option, tmp_path, monkeypatch):
+def test_a_name_too_long_to_be_written_is_reported_before_the_work(option, tmp_path, monkeypatch):
     monkeypatch.setattr(many, "real_diagnose", made_up.endless)
     result = diagnose(folders(tmp_path, "rig") / "rig", option, tmp_path / f"{'x' * 251}.json")
     assert result.exit_code == FAULTS["LOG_WRITE"].exit_status
@@ -212,12 +212,12 @@ def test_a_folder_of_folders_gives_every_result_in_order(tmp_path):
     assert pages(out) == {"reports/a.html", "reports/c.html", "reports/index.html"}
     written = json.loads((out / "a.json").read_text())
     assert written["format"] == "diagnoses/2"
-    results = {one["evidence"]: one for one in written["results"]}
+    results = {result["evidence"]: result for result in written["results"]}
     assert results["a"]["diagnosis"]["verdict"] == "effect"
     assert results["refused"]["fault"] == {"fault": "BAD_EVIDENCE", "line": "run-01.csv: too short"}
 
 
-def test_a_broken_program_is_no_bad_evidence(tmp_path):
+def test_a_broken_program_is_not_reported_as_bad_evidence(tmp_path):
     folders(tmp_path, "a", "broken")
     assert diagnose(tmp_path, "--jobs", 1).exit_code == FAULTS["DIAGNOSIS_BROKE"].exit_status
 
@@ -247,7 +247,7 @@ def test_folders_of_the_same_name_keep_apart(tmp_path):
         (["--apply", "-"], "CONFIG"),
     ],
 )
-def test_what_cannot_be_written_is_said_before_the_work(options, code, tmp_path, monkeypatch):
+def test_an_output_that_cannot_be_written_is_reported_before_the_work(options, code, tmp_path, monkeypatch):
     folders(tmp_path, "rig", "rig2")
     (tmp_path / "folder.json").mkdir()
     (tmp_path / "mine.toml").write_text("mine = 1\n")
@@ -283,7 +283,7 @@ def test_interrupted_is_130_and_writes_nothing(tmp_path, monkeypatch):
     assert not (tmp_path / "a.json").exists()
 
 
-def test_an_interrupted_fleet_says_where_it_goes_on(tmp_path, monkeypatch):
+def test_an_interrupted_fleet_reports_how_to_continue(tmp_path, monkeypatch):
     def interrupted(sources, *_):
         yield many.FolderResult(sources[0], made_up.diagnosis(), None)
         raise KeyboardInterrupt
@@ -296,8 +296,8 @@ def test_an_interrupted_fleet_says_where_it_goes_on(tmp_path, monkeypatch):
     assert json.loads((out / "index.json").read_text())["left"] == ["b"]
 
 
-def test_the_answer_is_said_whatever_cannot_be_written(tmp_path):
-    """A folder appears where the JSON goes, while the diagnosis works: report and words are there all the same."""
+def test_the_answer_is_printed_whatever_cannot_be_written(tmp_path):
+    """A folder appears at the place of the JSON during the diagnosis: report and text are still written."""
 
     def in_the_way(evidence, progress, jobs, budget_s=None):
         (tmp_path / "a.json").mkdir()
@@ -328,8 +328,8 @@ def test_a_link_stays_one_and_a_device_is_written_into(tmp_path):
     assert (tmp_path / "pipe").is_fifo()
 
 
-def test_a_folder_whose_name_is_not_utf_8_is_told_and_ends_no_other(tmp_path):
-    """As an old archive of Windows leaves them: neither the reader of CSV nor a report takes such a name."""
+def test_a_folder_whose_name_is_not_utf_8_is_reported_and_the_others_go_on(tmp_path):
+    """Old archives of Windows hold such names; neither the reader of CSV nor a report accepts them."""
     odd = tmp_path / os.fsdecode(b"m\xe4rz")
     made_up.evidence_folder(odd)
     folders(tmp_path, "rig")
@@ -344,13 +344,13 @@ def test_a_folder_whose_name_is_not_utf_8_is_told_and_ends_no_other(tmp_path):
 
 def test_one_folder_given_twice_is_one(tmp_path):
     rig = folders(tmp_path, "rig") / "rig"
-    for _ in range(2):  # what it wrote it replaces
+    for _ in range(2):  # a second call replaces the output of the first
         assert diagnose(rig, rig, "--apply", tmp_path / "found.toml").exit_code == 0
     assert (tmp_path / "found.toml").is_file()
 
 
 def test_a_report_that_cannot_be_written_ends_no_other(tmp_path):
-    """A folder is where one report goes: the others, the JSON and the words are there, and the exit status tells."""
+    """A folder at the place of one report: the others, the JSON and the text are written; the exit status is a fault."""
     folders(tmp_path / "all", "a", "b", "c")
     out = tmp_path / "out"
     (out / "b.html").mkdir(parents=True)
@@ -375,7 +375,7 @@ def test_json_on_stdout_stays_one_whatever_else_cannot_be_written(tmp_path, monk
     assert "LOG_WRITE" in result.stderr
 
 
-def test_every_report_has_a_name_of_its_own_that_a_disk_takes(tmp_path):
+def test_every_report_has_a_unique_name_that_a_disk_accepts(tmp_path):
     long = "ä" * 120
     folders(tmp_path, "a_b/rig", "a/b/rig", f"c/{long}", f"d/{long}")
     given = [tmp_path / "a_b/rig", tmp_path / "a/b/rig", tmp_path / "c" / long, tmp_path / "d" / long]

@@ -31,7 +31,7 @@ def example(*arguments: str):
 
 
 @pytest.mark.slow
-def test_an_example_can_be_read_and_does_not_tell_its_fault() -> None:
+def test_an_example_can_be_read_and_does_not_reveal_its_fault() -> None:
     result = example("runs/example")
     assert result.exit_code == 0, result.output
     assert result.stdout.splitlines()[-1] == "next     stickslip diagnose runs/example"
@@ -50,9 +50,9 @@ def test_the_seed_and_a_chosen_fault_make_another_one() -> None:
 
 
 def test_json_lists_the_runs() -> None:
-    told = json.loads(example("made", "--json").stdout)
-    jsonschema.validate(told, FORMATS["example-result"].schema())
-    assert told == {
+    table = json.loads(example("made", "--json").stdout)
+    jsonschema.validate(table, FORMATS["example-result"].schema())
+    assert table == {
         "folder": "made",
         "runs": ["run-01.parquet", "run-02.parquet"],
         "held_out": ["run-02.parquet"],
@@ -60,10 +60,10 @@ def test_json_lists_the_runs() -> None:
     }
 
 
-@pytest.mark.parametrize("there", ["folder", "file", "link"])
-def test_nothing_is_overwritten(there: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("existing", ["folder", "file", "link"])
+def test_nothing_is_overwritten(existing: str, tmp_path: Path) -> None:
     made = tmp_path / "made"
-    {"folder": made.mkdir, "file": made.touch, "link": lambda: made.symlink_to("nowhere")}[there]()
+    {"folder": made.mkdir, "file": made.touch, "link": lambda: made.symlink_to("nowhere")}[existing]()
     result = example("made")
     assert result.exit_code == 2
     assert "made: exists already; nothing was written" in result.stderr
@@ -86,7 +86,7 @@ def test_ctrl_c_leaves_nothing_behind(number: int, tmp_path: Path, monkeypatch: 
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_place_that_cannot_be_written_is_told(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_reported(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     result = example("file/example")
     assert result.exit_code == 5

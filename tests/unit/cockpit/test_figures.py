@@ -1,4 +1,4 @@
-"""Figures of a log: what they show, what they say of themselves, and the numbers behind them."""
+"""Figures of a log: their curves, their provenance, and the numbers of the curves."""
 
 import csv
 import hashlib
@@ -34,7 +34,7 @@ def log(tmp_path: Path) -> Path:
 
 
 def call(*arguments: str | Path):
-    return CliRunner().invoke(app, [str(one) for one in arguments])
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def sawtooth_log(path: Path, slips: int = 4) -> Path:
@@ -53,7 +53,7 @@ def sawtooth_log(path: Path, slips: int = 4) -> Path:
     return path
 
 
-def test_bins_hold_the_least_the_mean_and_the_largest_of_what_is_in_them() -> None:
+def test_bins_hold_the_least_the_mean_and_the_largest_sample() -> None:
     t_s = np.array([0.0, 1.0, 1.2, 0.8, 3.0, 9.0])  # not in order
     made = on_grid(t_s, np.array([5.0, 1.0, 2.0, 6.0, np.nan, 7.0]), Grid(0.0, 1.0, 4))
     nan = np.nan
@@ -62,7 +62,7 @@ def test_bins_hold_the_least_the_mean_and_the_largest_of_what_is_in_them() -> No
     np.testing.assert_array_equal(made.most, [5.0, 6.0, nan, nan])
 
 
-def test_a_figure_says_what_made_it_and_is_the_same_each_time(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_figure_names_its_source_and_is_reproducible(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
     out = log.with_name("x.svg")
     words = ["plot", log, "--out", out, "--from", "0.1s", "--to", "0.2s"]
@@ -88,7 +88,7 @@ def test_a_paper_has_its_width_and_its_metadata(log: Path) -> None:
 
 
 @pytest.mark.parametrize(("to", "named"), [("0.1s", False), ("0.4s", True)])
-def test_a_legend_names_what_is_in_the_picture_alone(tmp_path: Path, to: str, named: bool) -> None:
+def test_a_legend_names_only_drawn_curves(tmp_path: Path, to: str, named: bool) -> None:
     path, out = tmp_path / "run.mcap", tmp_path / "x.svg"
     scenario = load_scenario("paper-c45-c45", ["duration_s=0.4", "controller.policy.enabled_from_s=0.2"])
     run_onboard(scenario, path, {"scenario": scenario.name})
@@ -97,7 +97,7 @@ def test_a_legend_names_what_is_in_the_picture_alone(tmp_path: Path, to: str, na
         assert (f"<!-- {words} -->" in out.read_text()) == named, words
 
 
-def test_the_numbers_of_the_curves_are_those_of_the_log(log: Path) -> None:
+def test_the_numbers_of_the_curves_match_the_log(log: Path) -> None:
     out, data = log.with_name("x.pdf"), log.with_name("x.csv")
     for signals in ("drive_force_N", "drive_force_N,drive_position_m"):  # its own table it replaces
         result = call("plot", log, "--vs", log, "--out", out, "--data", data, "--signals", signals)
@@ -123,7 +123,7 @@ def test_the_numbers_of_the_curves_are_those_of_the_log(log: Path) -> None:
         (["--vs", "none.mcap"], "none.mcap: no such file"),
     ],
 )
-def test_what_cannot_be_drawn_is_said_in_one_line(log: Path, options: list[str], told: str) -> None:
+def test_a_figure_that_cannot_be_drawn_is_refused_in_one_line(log: Path, options: list[str], told: str) -> None:
     result = call("plot", log, *options)
     assert result.exit_code in {2, 7}
     assert told in result.stderr

@@ -1,4 +1,4 @@
-"""A first start: who still compiles is told, and a run waits for it; the wait can be set."""
+"""A first start: a process that still compiles is reported, and the run waits for it; the wait can be set."""
 
 import re
 import sys
@@ -16,7 +16,7 @@ from tests.patience import PATIENCE_S
 
 
 class Child:
-    """As a process that was started: its role, and what it still does."""
+    """Fake of a started process: its role and its present activity."""
 
     def __init__(self, role: str, still: str = processes.READY, left: tuple[int, int] = (0, 0)) -> None:
         self.role, self.still, self.left = role, still, left
@@ -26,7 +26,7 @@ def beginning(log: Path, wait_s: float | None, *children: Any) -> processes.Star
     return processes.StartWatch(list(children), log, wait_s)
 
 
-def test_who_still_starts_is_told_now_and_then(tmp_path, monkeypatch, capsys):
+def test_a_starting_process_is_reported_now_and_then(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(processes, "_REPORT_S", 0.0)
     start = beginning(tmp_path / "run.mcap", None, Child("plant"), Child("controller", processes.STARTS))
     time.sleep(0.01)
@@ -34,17 +34,17 @@ def test_who_still_starts_is_told_now_and_then(tmp_path, monkeypatch, capsys):
     assert re.search(r"waiting  the controller still starts, since \d+ s; Ctrl-C ends it", capsys.readouterr().err)
 
 
-def test_the_kernels_that_are_left_are_those_of_all_processes(tmp_path, monkeypatch, capsys):
+def test_the_kernels_left_are_summed_over_all_processes(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(processes, "_REPORT_S", 0.0)
     plant, controller = (Child(role, processes.COMPILES, (30, 40)) for role in ("plant", "controller"))
     start = beginning(tmp_path / "run.mcap", None, plant, controller)
     for plant.left, controller.left in (((30, 40), (30, 40)), ((0, 40), (20, 40)), ((0, 40), (0, 40))):
         start.look()
-    said = capsys.readouterr().err.splitlines()
-    assert said == [f"stickslip: {PROGRESS}{left} of 80 left" for left in (60, 20, 0)]
+    printed = capsys.readouterr().err.splitlines()
+    assert printed == [f"stickslip: {PROGRESS}{left} of 80 left" for left in (60, 20, 0)]
 
 
-def test_nothing_is_told_once_the_log_has_begun(tmp_path, monkeypatch, capsys):
+def test_nothing_is_reported_once_the_log_has_begun(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(processes, "_REPORT_S", 0.0)
     log = tmp_path / "run.mcap"
     log.write_bytes(b"of the run before")
@@ -63,18 +63,18 @@ def test_nothing_is_told_once_the_log_has_begun(tmp_path, monkeypatch, capsys):
         (processes.READY, "have not connected to each other after"),
     ],
 )
-def test_after_the_longest_wait_the_fault_says_who_is_not_ready(tmp_path, still, words):
+def test_after_the_longest_wait_the_fault_names_the_processes_that_are_not_ready(tmp_path, still, words):
     start = beginning(tmp_path / "run.mcap", 0.001, Child("plant", still), Child("controller", still))
     time.sleep(0.01)
     with pytest.raises(Fault, match=rf"NO_PEER: .*{words} .*--wait S"):
         start.look()
 
 
-def test_what_a_child_says_of_its_kernels_is_heard_and_told(monkeypatch, capsys):
-    said = f"print('stickslip: {PROGRESS}3 of 4 left', file=sys.stderr, flush=True)"
+def test_the_kernel_progress_of_a_child_is_read_and_reported(monkeypatch, capsys):
+    progress = f"print('stickslip: {PROGRESS}3 of 4 left', file=sys.stderr, flush=True)"
     over = f"print('stickslip: {PROGRESS}0 of 4 left', file=sys.stderr, flush=True)"
     more = f"print('other', file=sys.stderr); print('stickslip: {LOADED}', file=sys.stderr)"
-    code = f"import sys; sys.stdin.readline(); {said}; sys.stdin.readline(); {over}; {more}"
+    code = f"import sys; sys.stdin.readline(); {progress}; sys.stdin.readline(); {over}; {more}"
     started = processes.subprocess.Popen
 
     def instead(_words: list[str], **how: Any) -> Any:

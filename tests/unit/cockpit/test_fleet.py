@@ -1,4 +1,4 @@
-"""The folder of a fleet: what counts as done, which rigs share a gap, and in which order."""
+"""The folder of a fleet: finished rigs, rigs that share a gap, and their order."""
 
 import json
 import os
@@ -43,11 +43,14 @@ def test_a_digest_is_of_the_files_the_version_and_the_time_allowed(tmp_path):
     assert digest(one) != digest(other)
 
 
-def test_what_is_kept_comes_back_and_nothing_that_is_half_there(tmp_path):
+def test_a_kept_result_is_read_back_and_a_partial_result_is_not(tmp_path):
     (tmp_path / "a.html").write_text("report")
     keep(tmp_path, "d", TOLD, "a.html")
     diagnosis, report = kept(tmp_path, "d") or (None, "")
-    assert (repr(diagnosis), report) == (repr(TOLD._replace(pictures=())), "a.html")  # NaN is not NaN, but repr says so
+    assert (repr(diagnosis), report) == (
+        repr(TOLD._replace(pictures=())),
+        "a.html",
+    )  # by repr, as NaN does not equal NaN
     assert kept(tmp_path, "e") is None
     place = tmp_path / RESULTS / "d.json"
     whole = place.read_text()
@@ -65,7 +68,7 @@ def test_what_is_kept_comes_back_and_nothing_that_is_half_there(tmp_path):
     assert kept(tmp_path, "d") is None
 
 
-def test_only_what_changed_or_failed_is_missing(tmp_path):
+def test_only_changed_or_failed_folders_are_diagnosed_again(tmp_path):
     folders = [made_up.evidence_folder(tmp_path / "all" / name) for name in ("a", "b", "c")]
     sources = find_sources(folders)
     fleet = FleetFolder(tmp_path / "out", sources, None)
@@ -74,18 +77,18 @@ def test_only_what_changed_or_failed_is_missing(tmp_path):
         fleet.add(FolderResult(source, TOLD, None))
     fleet.add(FolderResult(sources[2], None, FolderFault("PEER_DIED", "c: its worker process died")))
     assert fleet.refused == []
-    assert [one.evidence for one in fleet.fleet().failed] == ["c"]
+    assert [failure.evidence for failure in fleet.fleet().failed] == ["c"]
     again = FleetFolder(tmp_path / "out", sources, None)
-    assert [one.source.name for one in again.kept()] == ["a", "b"]
+    assert [result.source.name for result in again.kept()] == ["a", "b"]
     assert again.fleet().left == ("c",)
     assert [rig.report for rig in again.fleet().groups[0].rigs] == ["a.html", "b.html"]
     (folders[1] / "manifest.toml").write_text(made_up.MANIFEST.replace("14.49", "14.5"))
-    assert [one.source.name for one in FleetFolder(tmp_path / "out", sources, None).kept()] == ["a"]
+    assert [result.source.name for result in FleetFolder(tmp_path / "out", sources, None).kept()] == ["a"]
     assert FleetFolder(tmp_path / "out", sources, 30.0).kept() == []
 
 
-def test_whoever_is_killed_while_writing_leaves_what_was_done(tmp_path, monkeypatch):
-    """A child writes one result and is killed on the next, its report written and its result half so."""
+def test_a_process_killed_while_writing_keeps_finished_results(tmp_path, monkeypatch):
+    """A child writes one result and is killed during the next: its report is written, its result is partial."""
     sources = find_sources([made_up.evidence_folder(tmp_path / name) for name in ("a", "b")])
 
     def half_kept(fleet, digest, diagnosis, report):
@@ -103,7 +106,7 @@ def test_whoever_is_killed_while_writing_leaves_what_was_done(tmp_path, monkeypa
     assert os.WTERMSIG(os.waitpid(child, 0)[1]) == signal.SIGKILL
     assert (tmp_path / "out/b.html").is_file()
     assert json.loads((tmp_path / "out/index.json").read_text())["left"] == ["b"]
-    assert [one.source.name for one in FleetFolder(tmp_path / "out", sources, None).kept()] == ["a"]
+    assert [result.source.name for result in FleetFolder(tmp_path / "out", sources, None).kept()] == ["a"]
 
 
 def test_an_evidence_that_changed_under_way_is_not_kept(tmp_path):
@@ -140,9 +143,9 @@ def test_where_mending_helps_most_comes_first():
     assert [round(group.helps, 6) for group in fleet.groups] == [1.3, 1.0, 0.73, 0.0, 0.0, 0.0]
 
 
-def test_without_a_fit_the_relations_say_how_much():
-    told = TOLD._replace(verdict="partly", gap=TOLD.gap._replace(shrinkage=None, interval_90=None))
-    (group,) = fleet_of([Diagnosed("rig", told, "")], [], []).groups
+def test_without_a_fit_the_relations_give_the_share():
+    diagnosed = TOLD._replace(verdict="partly", gap=TOLD.gap._replace(shrinkage=None, interval_90=None))
+    (group,) = fleet_of([Diagnosed("rig", diagnosed, "")], [], []).groups
     assert (group.helps, group.rigs[0].interval_90) == (0.73, (0.61, 0.92))
     assert group.rigs[0].size.startswith("spring relation: drive-backlash 73 %")
 
@@ -166,8 +169,8 @@ def test_an_estimate_is_of_the_folders_that_are_left(tmp_path, monkeypatch):
     clock_s = iter([0.0, 100.0, 400.0, 450.0])
     monkeypatch.setattr(work.time, "monotonic", lambda: next(clock_s))
     source = find_sources([made_up.evidence_folder(tmp_path / "a")])[0]
-    told = [text for _, text in with_estimate(iter([FolderResult(source, None, None)] * 3), 3)]
-    assert told == ["about 3 min left", "about 3 min left", ""]
+    texts = [text for _, text in with_estimate(iter([FolderResult(source, None, None)] * 3), 3)]
+    assert texts == ["about 3 min left", "about 3 min left", ""]
 
 
 def test_the_index_as_json_is_the_same(tmp_path):

@@ -1,4 +1,4 @@
-"""`--json`: one rule for every command of which word is its file, and what goes where."""
+"""`--json`: one rule for every command about its file and about the output to stdout and stderr."""
 
 import json
 import subprocess
@@ -35,10 +35,10 @@ def call(*arguments: str):
 
 def leaves(group, path: str = "") -> dict[str, typer.core.TyperCommand]:
     """Every command by its words."""
-    found = {}
+    places = {}
     for name, command in group.commands.items():
-        found |= leaves(command, f"{path}{name} ") if hasattr(command, "commands") else {f"{path}{name}": command}
-    return found
+        places |= leaves(command, f"{path}{name} ") if hasattr(command, "commands") else {f"{path}{name}": command}
+    return places
 
 
 COMMANDS = leaves(typer.main.get_command(app))
@@ -121,7 +121,7 @@ def test_with_a_file_the_words_stay_on_stdout(arguments: list[str]) -> None:
         ("", "CONFIG", "--json=.: must be - for stdout or end in .json"),
     ],
 )
-def test_what_is_no_place_for_it_is_refused_before_the_work(place: str, code: str, why: str, log: Path) -> None:
+def test_an_invalid_place_for_the_json_is_refused_before_the_work(place: str, code: str, why: str, log: Path) -> None:
     Path("folder.json").mkdir()
     before = log.read_bytes()
     result = call("plot", "run.mcap", f"--json={place}")
@@ -204,7 +204,7 @@ def test_results_are_objects(arguments: list[str], keys: set[str]) -> None:
 def test_a_replay_of_several_logs_is_a_list_and_words_come_as_they_are_known() -> None:
     Path("again.mcap").write_bytes(Path("run.mcap").read_bytes())
     told = json.loads(call("replay", "run.mcap", "--json", "again.mcap").stdout)
-    assert [(one["log"], one["identical"]) for one in told] == [("run.mcap", True), ("again.mcap", True)]
+    assert [(entry["log"], entry["identical"]) for entry in told] == [("run.mcap", True), ("again.mcap", True)]
     Path("bad.mcap").write_bytes(b"no log")
     result = call("replay", "run.mcap", "bad.mcap", "--json", "x.json")
     assert result.exit_code == FAULTS["BAD_LOG"].exit_status
@@ -216,30 +216,30 @@ def test_explain_is_a_list() -> None:
         {"exit_status": 6, "fault": "PEER_DIED", "help": FAULTS["PEER_DIED"].help}
     ]
     every = json.loads(call("explain", "--json").stdout)
-    assert {one["fault"] for one in every if "fault" in one} == {*FAULTS, None}
+    assert {entry["fault"] for entry in every if "fault" in entry} == {*FAULTS, None}
 
 
 def test_explain_knows_every_word_of_a_log() -> None:
     enums = {"mode": wire.Mode, "state": wire.ContactState, "reason": wire.Reason, "limit": wire.Limit}
     for column, enum in enums.items():
         told = json.loads(call("explain", column, "--json").stdout)
-        assert {(one["word"], one["number"]) for one in told} == {*enum.items()}
-        assert all(one["help"] and one["column"] == column for one in told)
-    said = call("explain", "piezo_weak").stdout
-    assert said.startswith("reason 10  PIEZO_WEAK      v_a stays below 1.05 v_d with the amplitude at its limit")
+        assert {(entry["word"], entry["number"]) for entry in told} == {*enum.items()}
+        assert all(entry["help"] and entry["column"] == column for entry in told)
+    output = call("explain", "piezo_weak").stdout
+    assert output.startswith("reason 10  PIEZO_WEAK      v_a stays below 1.05 v_d with the amplitude at its limit")
 
 
-def test_a_named_tuple_is_an_object_and_what_json_does_not_know_is_null() -> None:
+def test_a_named_tuple_becomes_an_object_and_a_not_finite_number_null() -> None:
     value = {"a": [Finding("gap", "x", "y")], "b": (float("nan"), Path("z")), "c": float("-inf")}
     told = {"kind": "gap", "where": "x", "text": "y", "times": 1}
     assert strict_json(value) == {"a": [told], "b": [None, "z"], "c": None}
 
 
-def test_version_says_what_is_installed() -> None:
+def test_version_lists_the_installed_versions() -> None:
     command = [sys.executable, "-P", "-m", "cockpit", "--version"]
-    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert said.startswith("stickslip ")
-    assert said.strip().endswith(f"Python {sys.version.split()[0]}")
+    output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert output.startswith("stickslip ")
+    assert output.strip().endswith(f"Python {sys.version.split()[0]}")
 
 
 def test_a_shell_completes_commands_and_options() -> None:
@@ -253,7 +253,7 @@ def test_a_shell_completes_commands_and_options() -> None:
         assert expected in result.stdout.split()
 
 
-def test_an_export_of_nothing_is_told_and_leaves_an_older_table(tmp_path: Path) -> None:
+def test_an_export_of_nothing_is_reported_and_leaves_an_older_table(tmp_path: Path) -> None:
     table = tmp_path / "run.csv"
     table.write_text("of yesterday\n")
     result = call("log", "export", "run.mcap", "--to", "run.csv", "--topic", "trace", "--from", "90s", "--overwrite")
@@ -271,14 +271,14 @@ def test_an_export_of_nothing_is_told_and_leaves_an_older_table(tmp_path: Path) 
         ("diagnose", ".", "--json", "out.txt"),
     ],
 )
-def test_a_file_of_another_suffix_is_told_as_what_it_may_be(words: tuple[str, ...]) -> None:
+def test_a_file_of_another_suffix_is_reported_with_its_likely_meaning(words: tuple[str, ...]) -> None:
     result = call(*words)
     assert result.exit_code in {FAULTS["CONFIG"].exit_status, FAULTS["BAD_LOG"].exit_status}
     assert "out.txt" in json.loads(result.stdout)["line"]
     assert "; if it is meant as the file of --json, it must end in .json" in json.loads(result.stdout)["line"]
 
 
-def test_a_missing_input_is_told_before_the_others_are_read(log: Path) -> None:
+def test_a_missing_input_is_reported_before_the_others_are_read(log: Path) -> None:
     result = call("replay", str(log), "absent.mcap")
     assert result.exit_code == FAULTS["BAD_LOG"].exit_status
     assert result.stderr == "stickslip: BAD_LOG: absent.mcap: no such file; give the path of a run log, .mcap\n"

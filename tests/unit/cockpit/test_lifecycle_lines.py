@@ -1,4 +1,4 @@
-"""Life of a process, told without waiting for a terminal."""
+"""Lifecycle messages of a process, printed without blocking on a terminal."""
 
 import threading
 
@@ -16,14 +16,14 @@ def test_lines_are_printed_in_order_and_all_before_the_end(capsys: pytest.Captur
     assert capsys.readouterr().err == "waiting  for a rig\nrunning  \\x1b[2J\n"
 
 
-def test_a_child_says_only_once_that_all_is_loaded(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_child_reports_only_once_that_all_is_loaded(capsys: pytest.CaptureFixture[str]) -> None:
     with step_reports(quiet=True) as report:
         report("waiting", "for a rig")
         report("joined", "a rig")
     assert capsys.readouterr().err == "stickslip: loaded\n"
 
 
-def test_a_terminal_that_stands_still_holds_up_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_stalled_terminal_blocks_no_process(monkeypatch: pytest.MonkeyPatch) -> None:
     goes_on, over = threading.Event(), threading.Event()
 
     def print_line(_line: str) -> None:

@@ -1,4 +1,4 @@
-"""`stickslip look`: one file, one answer, and what it writes."""
+"""`stickslip look`: one file, one answer, and its output files."""
 
 import json
 import re
@@ -30,7 +30,7 @@ def test_a_file_at_a_glance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     source = tribometer(tmp_path)
     outs = [tmp_path / f"out{suffix}" for suffix in (".html", ".csv", ".xlsx", ".svg", ".toml")]
     arguments = ["look", str(source), "--speed", "0.5mm/s", "--mass", "700kg", "--json"]
-    for _ in range(2):  # what it wrote it replaces
+    for _ in range(2):  # a second call replaces the output of the first
         result = CliRunner().invoke(app, [*arguments, *(word for out in outs for word in ("--out", str(out)))])
         assert result.exit_code == 0, result.output
     table = json.loads(result.stdout)
@@ -38,7 +38,7 @@ def test_a_file_at_a_glance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert table["numbers"]["static_force_N"]["value"] == pytest.approx(16.0, rel=2e-3)
     assert table["numbers"]["mu_k"]["value"] == pytest.approx(14.5 / 94.5, rel=2e-3)
     assert table["numbers"]["stiffness_N_per_m"]["value"] == pytest.approx(3.0 / 1.46 / 5e-4, rel=2e-3)
-    texts = " ".join(one["text"] for one in table["findings"])
+    texts = " ".join(finding["text"] for finding in table["findings"])
     assert "delimiter = ';', decimal = ',', encoding = 'cp1252', skip_rows = 2" in texts
     assert "700 is" in texts
     page = outs[0].read_text(encoding="utf-8")
@@ -56,12 +56,12 @@ def test_a_file_at_a_glance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (["--speed", "0.5"], "--speed 0.5: has no unit, and may be in m/s or not; write for example --speed 0.5mm/s"),
-        (["--load", "3kg"], "--load 3kg: is no force above 0; write for example --load 94.5N"),
+        (["--speed", "0.5"], "--speed 0.5: has no unit, such as m/s; write for example --speed 0.5mm/s"),
+        (["--load", "3kg"], "--load 3kg: must be a force above 0; write for example --load 94.5N"),
         (["--out", "a.doc"], "--out a.doc: must end in .html"),
     ],
 )
-def test_what_cannot_be_known_is_asked_for(tmp_path: Path, words: list[str], expected: str) -> None:
+def test_missing_information_is_asked_for(tmp_path: Path, words: list[str], expected: str) -> None:
     result = CliRunner().invoke(app, ["look", str(tribometer(tmp_path)), *words, "--json"])
     assert result.exit_code == 2
     assert expected in json.loads(result.stdout)["line"]
@@ -84,7 +84,7 @@ def test_a_column_of_clock_times_is_the_time_whatever_its_name(tmp_path: Path) -
     (tmp_path / "a.csv").write_text("When,F [N]\n" + "".join(rows))
     table = seen_in(tmp_path / "a.csv")
     assert table["slips"] == 5
-    assert "time = 'When', which holds times" in said(table)
+    assert "time = 'When', which holds times" in findings_of(table)
 
 
 def test_an_import_without_a_map_writes_the_one_it_assumed(tmp_path: Path) -> None:
@@ -104,7 +104,7 @@ def test_a_map_that_was_corrected_stays(tmp_path: Path, name: str) -> None:
         name, tmp_path / "map.toml"
     )
     words = ["log", "import", str(source), "--out", str(out)] if name else ["look", str(source), "--out", str(kept)]
-    for _ in range(2):  # what it wrote it replaces
+    for _ in range(2):  # a second call replaces the output of the first
         assert CliRunner().invoke(app, [*words, "--speed", "0.5mm/s"]).exit_code == 0
         for path in tmp_path.rglob("*"):
             if path.is_file() and path not in (source, kept):
@@ -127,8 +127,8 @@ def seen_in(path: Path, *words: str) -> dict[str, Any]:
     return json.loads(result.stdout)
 
 
-def said(table: dict[str, Any]) -> str:
-    return "\n".join(f"{one['kind']}: {one['text']}" for one in table["findings"])
+def findings_of(table: dict[str, Any]) -> str:
+    return "\n".join(f"{finding['kind']}: {finding['text']}" for finding in table["findings"])
 
 
 def saw_teeth(seconds: float = 8.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -145,13 +145,13 @@ def table_of(path: Path, head: str, *columns: np.ndarray) -> Path:
     return path
 
 
-def test_a_position_that_stands_still_in_the_sticks_is_the_slides(tmp_path: Path) -> None:
+def test_a_position_that_rests_during_the_sticks_belongs_to_the_slide(tmp_path: Path) -> None:
     t_s, force_N, drive_mm = saw_teeth()
     stiffness_N_per_mm = 3.0 / 1.46 / 0.5
     slide_mm = drive_mm - force_N / stiffness_N_per_mm + 5e-4 * np.random.default_rng(5).standard_normal(len(t_s))
     path = table_of(tmp_path / "a.csv", "Time (s),Force (N),Displacement (mm)", t_s, force_N, slide_mm)
     table = seen_in(path)
-    assert "'Displacement (mm)' is constant during the sticks: it belongs to the slide" in said(table)
+    assert "'Displacement (mm)' is constant during the sticks: it belongs to the slide" in findings_of(table)
     assert not {"stiffness_N_per_m", "mass_kg"} & table["numbers"].keys()
     table = seen_in(path, "--speed", "0.5mm/s", "--out", str(tmp_path / "a.toml"))
     assert table["numbers"]["stiffness_N_per_m"]["value"] == pytest.approx(1e3 * stiffness_N_per_mm, rel=2e-3)
@@ -162,7 +162,7 @@ def test_a_position_that_stands_still_in_the_sticks_is_the_slides(tmp_path: Path
 
 @pytest.mark.parametrize("force_first", [True, False])
 @pytest.mark.parametrize("heads", [("Time (ms),{}", "Time (ms),{}"), ("t1 (ms),{}", "t2 (ms),{}")])
-def test_channels_with_times_of_their_own_are_merged_by_them(
+def test_channels_with_separate_times_are_merged_by_time(
     tmp_path: Path, force_first: bool, heads: tuple[str, str]
 ) -> None:
     t_s, force_N, _ = saw_teeth()
@@ -178,24 +178,24 @@ def test_channels_with_times_of_their_own_are_merged_by_them(
     table = seen_in(path, "--out", str(made))
     assert table["slips"] == 5
     assert table["numbers"]["stiffness_N_per_m"]["value"] == pytest.approx(1e3 * 3.0 / 1.46 / 0.5, rel=2e-3)
-    assert "is the time of 'Force (N)'" in said(table)
+    assert "is the time of 'Force (N)'" in findings_of(table)
     assert seen_in(path, "--map", str(made))["numbers"] == table["numbers"]
 
 
-def test_a_time_that_only_counts_what_was_on_is_no_clock(tmp_path: Path) -> None:
+def test_a_counter_of_operating_time_is_not_taken_as_the_clock(tmp_path: Path) -> None:
     t_s, force_N, drive_mm = saw_teeth()
     path = tmp_path / "a.csv"
     table_of(path, "t (s),Force (N),t_on (s),Position (mm)", t_s, force_N, 0.1 * t_s, drive_mm)
     table = seen_in(path)
-    assert (table["slips"], "is the time of" in said(table)) == (5, False)
+    assert (table["slips"], "is the time of" in findings_of(table)) == (5, False)
 
 
-def test_a_time_that_is_told_twice_is_one(tmp_path: Path) -> None:
+def test_a_second_column_of_the_same_time_is_ignored(tmp_path: Path) -> None:
     t_s, force_N, drive_mm = saw_teeth()
     path = tmp_path / "a.csv"
     table_of(path, "t (s),Force (N),Time (s),Position (mm)", t_s, force_N, t_s + 1.7e9, drive_mm)
     table = seen_in(path)
-    assert (table["slips"], "is the time of" in said(table)) == (5, False)
+    assert (table["slips"], "is the time of" in findings_of(table)) == (5, False)
 
 
 def test_a_coefficient_is_a_force_only_with_a_load(tmp_path: Path) -> None:
@@ -217,7 +217,7 @@ def test_one_unknown_unit_leaves_the_others_known(tmp_path: Path) -> None:
     table = seen_in(path)
     assert table["seconds"] == pytest.approx(8.0, rel=1e-3)
     assert table["numbers"]["static_force_N"]["value"] == pytest.approx(16.0, rel=2e-3)
-    assert "unknown unit: 'furlong' of column Tx; kept as written" in said(table)
+    assert "unknown unit: 'furlong' of column Tx; kept as written" in findings_of(table)
 
 
 def test_a_group_that_begins_with_0_has_a_decimal_comma(tmp_path: Path) -> None:
@@ -237,50 +237,54 @@ def test_slow_logging_widens_the_interval_of_the_static_force(tmp_path: Path) ->
     assert low < 16.0 < high
 
 
-def test_what_is_no_measurement_is_left_out_and_told(tmp_path: Path) -> None:
+def test_outliers_are_left_out_and_reported(tmp_path: Path) -> None:
     t_s, force_N, _ = saw_teeth()
     for value in (1e308, -9999.0, 999.0, -1e6):
         bad = force_N.copy()
         bad[[500, 1700, 2600]] = value
         table = seen_in(table_of(tmp_path / "a.csv", "Time (s),Force (N)", t_s, bad))
         assert table["numbers"]["kinetic_force_N"]["value"] == pytest.approx(14.5, rel=2e-3)
-        assert "outlier: 3 outliers, first row 501 = " in said(table)
+        assert "outlier: 3 outliers, first row 501 = " in findings_of(table)
 
 
-def test_rows_that_go_back_and_gaps_are_told(tmp_path: Path) -> None:
+def test_rows_that_go_back_and_gaps_are_reported(tmp_path: Path) -> None:
     t_s, force_N, _ = saw_teeth()
     order = np.concatenate([np.arange(1000), np.arange(900, 2000), np.arange(2500, 4000)])
     table = seen_in(table_of(tmp_path / "a.csv", "Time (s),Force (N)", t_s[order], force_N[order]))
-    assert "100 rows not later than the rows before (1 of the same time), first row 1001; left out" in said(table)
-    assert "time-gap: 1 gap in time, first at 3.998 s, the longest 1 s" in said(table)
+    assert "100 rows not later than the rows before (1 of the same time), first row 1001; left out" in findings_of(
+        table
+    )
+    assert "time-gap: 1 gap in time, first at 3.998 s, the longest 1 s" in findings_of(table)
     path = table_of(tmp_path / "b.csv", "Time (s),Force (N)", np.tile(t_s, 2), np.tile(force_N, 2))
     result = CliRunner().invoke(app, ["look", str(path), "--json"])
     assert "4000 rows not later than the rows before" in json.loads(result.stdout)["line"]
 
 
-def test_a_torque_is_told_as_one(tmp_path: Path) -> None:
+def test_a_torque_is_reported_as_a_torque(tmp_path: Path) -> None:
     text = tribometer(tmp_path).read_text(encoding="latin-1").replace("Reibkraft [N]", "Torque [N m]")
     turned = tmp_path / "turned.csv"
     turned.write_text(text.replace(";94,5", "").replace(";Normalkraft [N]", ""), encoding="latin-1")
     result = CliRunner().invoke(app, ["look", str(turned), "--json"])
-    texts = " ".join(one["text"] for one in json.loads(result.stdout)["findings"])
+    texts = " ".join(finding["text"] for finding in json.loads(result.stdout)["findings"])
     assert "'Torque [N m]' is a torque: the rig turns" in texts
 
 
 def after_a_rest(folder: Path, zero: float, names: str, *more: Any) -> Path:
-    """Stick-slip of a drive that begins after 2 s, on a sensor with a zero of its own."""
+    """Stick-slip of a drive that begins after 2 s, on a sensor with a zero offset."""
     t_s = np.arange(0, 12, 2e-3)
     way = np.maximum(t_s - 2.0, 0.0)
     force_N = zero + np.where(way > 0.0, 10.0 + 4.0 * (way % 1.0), 0.0)
-    return table_of(folder / "rest.csv", names, t_s, force_N + 0.01 * np.sin(997.0 * t_s), *[one * way for one in more])
+    return table_of(
+        folder / "rest.csv", names, t_s, force_N + 0.01 * np.sin(997.0 * t_s), *[factor * way for factor in more]
+    )
 
 
 @pytest.mark.parametrize(
-    ("zero", "told"), [(1.5, "is taken as the sensor's zero"), (9.0, "too large for a sensor's zero")]
+    ("zero", "message"), [(1.5, "is taken as the sensor's zero"), (9.0, "too large for a sensor's zero")]
 )
-def test_a_rest_at_the_beginning_is_the_zero_of_the_sensor(tmp_path: Path, zero: float, told: str) -> None:
+def test_a_rest_at_the_beginning_is_the_zero_of_the_sensor(tmp_path: Path, zero: float, message: str) -> None:
     seen = seen_in(after_a_rest(tmp_path, zero, "Time (s),Force (N)"), "--out", str(tmp_path / "map.toml"))
-    assert told in said(seen)
+    assert message in findings_of(seen)
     taken = zero if zero < 2.0 else 0.0
     assert seen["numbers"]["static_force_N"]["value"] == pytest.approx(14.0 + zero - taken, abs=0.1)
     written = (tmp_path / "map.toml").read_text()
@@ -304,7 +308,7 @@ LVM = (
 
 
 @pytest.mark.parametrize(
-    ("file", "head", "row", "told"),
+    ("file", "head", "row", "message"),
     [
         (
             "bluehill.csv",
@@ -315,14 +319,12 @@ LVM = (
         ("klipper.csv", "#time,force_g\n", "{t:.4f},{g:.4f}\n", "is in g: times 0.00980665 to be in N"),
         ("labels.lvm", LVM + "X_Value\tFriction\tComment\n", "\t{kN:.8f}\t\n", "line 4 holds units: kN"),
         ("asked.csv", "t [s],F_soll [N],F_ist [N]\n", "{t:.4f},{ms:.0f},{N:.6f}\n", "force = 'F_ist [N]' by its name"),
-        ("datenum.csv", "time,F\n", "{day:.10f},{N:.6f}\n", "is a time of the calendar in steps of 86400 s"),
+        ("datenum.csv", "time,F\n", "{day:.10f},{N:.6f}\n", "is a calendar time in steps of 86400 s"),
         ("french.csv", "Temps [ms];Effort [N]\n", "{ms:.0f};{N:.6f}\n", "rises in even steps of a unit of time"),
         ("traction.tsv", "Test Time (s)\tTraction Coeff (-)\n", "{t:.4f}\t{N:.6f}\n", "is a coefficient"),
     ],
 )
-def test_what_a_machine_calls_its_columns_is_understood(
-    tmp_path: Path, file: str, head: str, row: str, told: str
-) -> None:
+def test_column_names_of_machines_are_understood(tmp_path: Path, file: str, head: str, row: str, message: str) -> None:
     t_s, force_N, _ = saw_teeth()
     rows = (
         row.format(t=t, N=f, kN=1e-3 * f, g=f / 9.80665e-3, ms=1e3 * t, day=739316.5 + t / 86400)
@@ -333,11 +335,11 @@ def test_what_a_machine_calls_its_columns_is_understood(
     static = seen["numbers"].get("static_force_N") or seen["numbers"]["mu_s"]
     assert static["value"] == pytest.approx(16.0, abs=0.1)
     assert seen["rate_Hz"] == pytest.approx(500.0, rel=1e-3)
-    assert told in said(seen)
-    assert file != "datenum.csv" or "taken as s" not in said(seen)
+    assert message in findings_of(seen)
+    assert file != "datenum.csv" or "taken as s" not in findings_of(seen)
 
 
-def test_beside_the_number_of_the_row_an_even_way_is_no_time(tmp_path: Path) -> None:
+def test_an_evenly_growing_position_is_not_taken_as_time_next_to_row_numbers(tmp_path: Path) -> None:
     _, force_N, drive_mm = saw_teeth()
     path = tmp_path / "halsampler.txt"
     path.write_text("".join(f"{i} {f:.5f} {x:.6f} \n" for i, (f, x) in enumerate(zip(force_N, drive_mm, strict=True))))
@@ -352,7 +354,7 @@ def test_beside_the_number_of_the_row_an_even_way_is_no_time(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("name", ["joint.0.motor-pos-fb", "Extension", "Crosshead"])
-def test_a_way_without_a_unit_is_no_time(tmp_path: Path, name: str) -> None:
+def test_a_position_without_a_unit_is_not_taken_as_time(tmp_path: Path, name: str) -> None:
     _, force_N, drive_mm = saw_teeth()
     path = tmp_path / "halscope.txt"
     path.write_text(f"{name};force\n" + "".join(f"{x:.6f};{f:.5f}\n" for f, x in zip(force_N, drive_mm, strict=True)))

@@ -9,23 +9,23 @@ import xlsxwriter
 from typer.testing import CliRunner
 
 from cockpit.cli import app
-from tests.unit.cockpit.test_look_command import said, saw_teeth, seen_in, table_of
+from tests.unit.cockpit.test_look_command import findings_of, saw_teeth, seen_in, table_of
 
 
-def test_a_unit_in_a_name_that_is_not_known_is_told_with_a_map_too(tmp_path: Path) -> None:
+def test_an_unknown_unit_in_a_name_is_reported_with_a_map_too(tmp_path: Path) -> None:
     t_s, force_N, _ = saw_teeth()
     path = table_of(tmp_path / "a.csv", "Time [shake],Fx [ozf]", t_s, force_N)
     given = tmp_path / "map.toml"
     given.write_text("[channels]\nt_s = 'Time'\ndrive_force_N = 'Fx'\n")
     for more in ([], ["--map", str(given)]):
-        told = said(seen_in(path, *more))
+        message = findings_of(seen_in(path, *more))
         for unit, column in (("shake", "Time [shake]"), ("ozf", "Fx [ozf]")):
-            assert f"units: column {column}: {unit!r} is not a known unit: the values are used unscaled" in told
-        assert "states no unit" not in told
+            assert f"units: column {column}: {unit!r} is not a known unit: the values are used unscaled" in message
+        assert "states no unit" not in message
 
 
 @pytest.mark.parametrize(
-    ("unit", "load", "told"),
+    ("unit", "load", "message"),
     [
         ("kg", 10.0, ""),
         ("g", 1e4, ""),
@@ -34,27 +34,27 @@ def test_a_unit_in_a_name_that_is_not_known_is_told_with_a_map_too(tmp_path: Pat
         ("furlong", 98.0665, "taken as N; add"),
     ],
 )
-def test_a_load_in_grams_is_a_weight(tmp_path: Path, unit: str, load: float, told: str) -> None:
+def test_a_load_in_grams_is_a_weight(tmp_path: Path, unit: str, load: float, message: str) -> None:
     t_s, force_N, _ = saw_teeth()
     seen = seen_in(table_of(tmp_path / "a.csv", f"t [s],Ff [N],Load [{unit}]", t_s, force_N, np.full(len(t_s), load)))
     assert seen["numbers"]["mu_s"]["value"] == pytest.approx(16.0 / 98.0665, rel=2e-3)
-    assert told in said(seen)
+    assert message in findings_of(seen)
 
 
-@pytest.mark.parametrize(("name", "told"), [("Speed", True), ("Speed [mm/tick]", True), ("Speed [m/s]", False)])
-def test_a_speed_without_a_unit_that_is_known_is_told(tmp_path: Path, name: str, told: bool) -> None:
+@pytest.mark.parametrize(("name", "message"), [("Speed", True), ("Speed [mm/tick]", True), ("Speed [m/s]", False)])
+def test_a_speed_without_a_known_unit_is_reported(tmp_path: Path, name: str, message: bool) -> None:
     t_s, force_N, _ = saw_teeth()
     seen = seen_in(table_of(tmp_path / "a.csv", f"t [s],F [N],{name}", t_s, force_N, np.full(len(t_s), 5e-4)))
     assert "stiffness_N_per_m" in seen["numbers"]
-    assert ("states no known unit: taken as m/s; add --speed" in said(seen)) == told
+    assert ("states no known unit: taken as m/s; add --speed" in findings_of(seen)) == message
 
 
 @pytest.mark.parametrize(
-    ("formula", "told"),
+    ("formula", "message"),
     [("Force [N]", "column 'Force [N]' holds no number"), ("Time [s]", "1 of 100 rows have a time and a force")],
 )
-def test_formulas_that_nobody_calculated_are_named(tmp_path: Path, formula: str, told: str) -> None:
-    """As a script writes them: without the values that a spreadsheet program saves beside."""
+def test_formulas_without_a_saved_value_are_named(tmp_path: Path, formula: str, message: str) -> None:
+    """A script writes formulas without the values that a spreadsheet program saves with them."""
     path = tmp_path / "book.xlsx"
     names = ["Time [s]", "Raw [V]", "Force [N]"]
     with xlsxwriter.Workbook(path) as book:
@@ -67,11 +67,11 @@ def test_formulas_that_nobody_calculated_are_named(tmp_path: Path, formula: str,
                 else:
                     sheet.write_number(row, column, row * 1e-3)
     refused = CliRunner().invoke(app, ["look", str(path), "--json"])
-    assert told in json.loads(refused.stdout)["line"]
+    assert message in json.loads(refused.stdout)["line"]
 
 
-def test_cells_without_a_value_are_told_once(tmp_path: Path) -> None:
-    """Those of a workbook with an error come as empty ones; a text in place of a number is told where it is read."""
+def test_cells_without_a_value_are_reported_once(tmp_path: Path) -> None:
+    """Cells of a workbook with an error read as empty; a text in place of a number is reported with its row."""
     path = tmp_path / "book.xlsx"
     with xlsxwriter.Workbook(path) as book:
         sheet = book.add_worksheet()
@@ -85,16 +85,20 @@ def test_cells_without_a_value_are_told_once(tmp_path: Path) -> None:
             sheet.write_formula(row, 3, "=B2", value="")
     findings = json.loads(CliRunner().invoke(app, ["look", str(path), "--json"]).stdout)["findings"]
     assert "no load, as column 'Normal load [N]' holds no number" in findings[0]["text"]
-    told = {(one["where"].partition(": ")[2], one["text"]) for one in findings if one["kind"] == "not-finite"}
+    texts = {
+        (finding["where"].partition(": ")[2], finding["text"])
+        for finding in findings
+        if finding["kind"] == "not-finite"
+    }
     without = "3 rows of 1000 without a number (an empty cell, or one with an error), first row 78; left out"
-    assert told == {
+    assert texts == {
         ("column Force [N]", without),
         ("column Position [mm]", "2 cells without a number, first row 90 = 'lost'; left out"),
     }
 
 
 @pytest.mark.parametrize("cell", ["", "#VALUE!"])
-def test_a_load_does_not_stand_for_a_force_without_numbers(tmp_path: Path, cell: str) -> None:
+def test_a_load_does_not_replace_a_force_without_numbers(tmp_path: Path, cell: str) -> None:
     rows = "".join(f"{1e-3 * row:.3f};{cell};{94.5 + 0.01 * (row % 7):.2f}\n" for row in range(1000))
     (tmp_path / "a.csv").write_text(f"Time [s];Friction force [N];Fz\n{rows}")
     refused = CliRunner().invoke(app, ["look", str(tmp_path / "a.csv"), "--json"])
@@ -106,38 +110,41 @@ def test_a_normal_force_without_numbers_hides_no_force(tmp_path: Path) -> None:
     rows = "".join(f"{t:.6g};;{f:.6g}\n" for t, f in zip(t_s, force_N, strict=True))
     (tmp_path / "a.csv").write_text(f"Time [s];Normal force [N];Load [N]\n{rows}")
     seen = seen_in(tmp_path / "a.csv")
-    assert "force = 'Load [N]', as no other column is one" in said(seen)
+    assert "force = 'Load [N]', as no other column is one" in findings_of(seen)
 
 
-def test_a_column_that_ends_sooner_is_told_with_its_row(tmp_path: Path) -> None:
+def test_a_column_that_ends_sooner_is_reported_with_its_row(tmp_path: Path) -> None:
     t_s, force_N, drive_mm = saw_teeth()
-    there = len(t_s) - 1000
+    rows_with_force = len(t_s) - 1000
     rows = [f"{t:.6g},{f:.6g},{x:.6g}" for t, f, x in zip(t_s, force_N, drive_mm, strict=True)]
-    rows[there:] = [row.rpartition(",")[0] + "," for row in rows[there:]]
+    rows[rows_with_force:] = [row.rpartition(",")[0] + "," for row in rows[rows_with_force:]]
     (tmp_path / "a.csv").write_text("\n".join(["t [s],F [N],Position [mm]", *rows]))
-    told = said(seen_in(tmp_path / "a.csv"))
+    message = findings_of(seen_in(tmp_path / "a.csv"))
     assert (
-        f"1000 rows of {len(t_s)} without a number (an empty cell, or one with an error), first row {there + 1}" in told
+        f"1000 rows of {len(t_s)} without a number (an empty cell, or one with an error), first row {rows_with_force + 1}"
+        in message
     )
-    assert "clock" not in told
+    assert "clock" not in message
 
 
-def test_loads_that_are_missing_or_all_0_are_told(tmp_path: Path) -> None:
+def test_loads_that_are_missing_or_all_0_are_reported(tmp_path: Path) -> None:
     t_s, force_N, _ = saw_teeth()
-    some = table_of(tmp_path / "a.csv", "t [s],F [N],Normal load [N]", t_s, force_N, np.where(t_s < 0.1, np.nan, 94.5))
-    assert "50 rows of 4000 without a number" in said(seen_in(some))
+    partial = table_of(
+        tmp_path / "a.csv", "t [s],F [N],Normal load [N]", t_s, force_N, np.where(t_s < 0.1, np.nan, 94.5)
+    )
+    assert "50 rows of 4000 without a number" in findings_of(seen_in(partial))
     tenth = table_of(
         tmp_path / "c.csv", "t [s],F [N],Normal load [N]", t_s, force_N, np.where(np.arange(4000) % 10, np.nan, 94.5)
     )
-    assert "without a number" not in said(seen_in(tenth))
+    assert "without a number" not in findings_of(seen_in(tenth))
     none = table_of(tmp_path / "b.csv", "t [s],F [N],Normal load [N]", t_s, force_N, np.zeros(len(t_s)))
-    assert "'Normal load [N]' is 0 throughout: no load; add --load 94.5N" in said(seen_in(none))
+    assert "'Normal load [N]' is 0 throughout: no load; add --load 94.5N" in findings_of(seen_in(none))
 
 
 def test_a_force_that_was_tared_about_zero_is_seen_with_its_offset(tmp_path: Path) -> None:
     t_s, force_N, _ = saw_teeth()
     path = table_of(tmp_path / "a.csv", "t [s],F [N]", t_s, force_N - 14.5)
-    assert seen_in(path, "--out", str(tmp_path / "map.toml"))["headline"].endswith("by the offset in a map")
+    assert seen_in(path, "--out", str(tmp_path / "map.toml"))["headline"].endswith("by an offset in a map")
     written = (tmp_path / "map.toml").read_text()
     (tmp_path / "map.toml").write_text(written.replace('column = "F [N]",', 'column = "F [N]", offset = 14.5,'))
     seen = seen_in(path, "--map", str(tmp_path / "map.toml"))

@@ -24,13 +24,13 @@ T_S = (np.arange(4000) + 1) * 1e-3
 
 def following(motion: BlockMotion, from_s: float) -> tuple[Following | None, float]:
     """Of the blocks from a time on; and the dose."""
-    found = FollowingSum()
-    found.add(motion, lambda t_s: t_s > from_s)
-    return found.result(1e-3), found.dose_mm2_per_s
+    terms = FollowingSum()
+    terms.add(motion, lambda t_s: t_s > from_s)
+    return terms.result(1e-3), terms.dose_mm2_per_s
 
 
 def made_turn(noise_m: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Slide and drive: the drive turns at 2 s; the slide stands for 0.3 s, 270 um behind then, and 30 um behind after 20 ms."""
+    """Slide and drive: the drive turns at 2 s; the slide rests for 0.3 s, is then 270 um behind, and 30 um 20 ms later."""
     random = np.random.default_rng(1)
     drive_m = np.where(T_S < 2.0, T_S, 4.0 - T_S) * 1e-3
     ahead_m = np.interp(T_S, [2.3, 2.32], [2.7e-4, 3e-5])  # on the way back
@@ -42,30 +42,30 @@ def made_turn(noise_m: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("late", [0, 30])
 def test_a_change_of_sign(noise_m: float, late: int) -> None:
     direction = np.where(np.arange(4000) < 2000 + late, 1, -1)
-    (found,) = reversals_of(T_S, *made_turn(noise_m), direction)
-    assert found.t_s == pytest.approx(2.0, abs=4e-3)
-    assert found.stick_s == pytest.approx(0.3, abs=8e-3)
+    (terms,) = reversals_of(T_S, *made_turn(noise_m), direction)
+    assert terms.t_s == pytest.approx(2.0, abs=4e-3)
+    assert terms.stick_s == pytest.approx(0.3, abs=8e-3)
     # the mean from the end of the stick on: 20 ms of 150 um, 1.68 s of 30 um
     mean_m = (0.02 * 1.5e-4 + 1.68 * 3e-5) / 1.7
-    assert found.quadrant_error_m == pytest.approx(2.7e-4 - mean_m, rel=0.02)
+    assert terms.quadrant_error_m == pytest.approx(2.7e-4 - mean_m, rel=0.02)
 
 
-def test_a_slide_that_never_follows_stands_to_the_end_of_the_stroke() -> None:
+def test_a_slide_that_never_follows_sticks_to_the_end_of_the_stroke() -> None:
     drive_m = np.where(T_S < 2.0, T_S, 4.0 - T_S) * 1e-3
     slide_m = np.minimum(drive_m, 2e-3) * (T_S < 2.0) + 2e-3 * (T_S >= 2.0)
-    (found,) = reversals_of(T_S, slide_m, drive_m, np.where(T_S < 2.0, 1, -1))
-    assert (found.stick_s, found.quadrant_error_m) == (pytest.approx(2.0, abs=4e-3), 0.0)
+    (terms,) = reversals_of(T_S, slide_m, drive_m, np.where(T_S < 2.0, 1, -1))
+    assert (terms.stick_s, terms.quadrant_error_m) == (pytest.approx(2.0, abs=4e-3), 0.0)
 
 
-def test_a_stop_between_both_signs_is_no_part_of_the_stick() -> None:
+def test_a_stop_between_both_signs_does_not_count_as_part_of_the_stick() -> None:
     slide_m, drive_m = made_turn()
     wait = np.full(500, 0)
     t_s = (np.arange(4500) + 1) * 1e-3
     slide_m = np.concatenate([slide_m[:2000], slide_m[1999] + wait, slide_m[2000:]])
     drive_m = np.concatenate([drive_m[:2000], drive_m[1999] + wait, drive_m[2000:]])
     direction = np.concatenate([np.full(2000, 1), wait, np.full(2000, -1)])
-    (found,) = reversals_of(t_s, slide_m, drive_m, direction)
-    assert (found.t_s, found.stick_s) == (pytest.approx(2.5, abs=4e-3), pytest.approx(0.3, abs=8e-3))
+    (terms,) = reversals_of(t_s, slide_m, drive_m, direction)
+    assert (terms.t_s, terms.stick_s) == (pytest.approx(2.5, abs=4e-3), pytest.approx(0.3, abs=8e-3))
 
 
 def test_following_error_of_a_stretch() -> None:
@@ -100,28 +100,28 @@ def test_pieces_of_a_stretch_are_the_stretch() -> None:
             BlockMotion(T_S[part], error_m[part], direction[part], 0.0 * T_S[part], []),
             lambda t_s: np.ones(len(t_s), bool),
         )
-    found, expected = pieces.result(1e-3), following(whole, 0.0)[0]
-    assert found is not None
+    terms, expected = pieces.result(1e-3), following(whole, 0.0)[0]
+    assert terms is not None
     assert expected is not None
-    assert tuple(found) == pytest.approx(tuple(expected), rel=1e-9)
-    assert found.error_ripple_m == pytest.approx(1e-9 / np.sqrt(2.0), rel=0.01)
+    assert tuple(terms) == pytest.approx(tuple(expected), rel=1e-9)
+    assert terms.error_ripple_m == pytest.approx(1e-9 / np.sqrt(2.0), rel=0.01)
 
 
-def test_the_lines_of_a_stretch_beside_another() -> None:
+def test_the_lines_of_a_stretch_compared_with_another() -> None:
     slide_m, drive_m = made_turn()
     direction = np.where(T_S < 2.0, 1, -1)
     motion = BlockMotion(T_S, drive_m - slide_m, direction, 0.0 * T_S, reversals_of(T_S, slide_m, drive_m, direction))
-    found, _ = following(motion, 0.0)
-    assert found is not None
-    error, reversal = following_in_words(found, found, "before")
+    terms, _ = following(motion, 0.0)
+    assert terms is not None
+    error, reversal = following_in_words(terms, terms, "before")
     assert error.startswith("error    following error ")
     assert reversal.startswith(
         "reversal quadrant error 239 um, the slide rests for 300 ms, the worst of 1 (before: 239 um"
     )
 
 
-def test_the_dose_of_a_run_is_that_of_the_blocks_in_which_the_exciter_moved(tmp_path: Path) -> None:
-    def shake(tables):  # 100 blocks of 1 ms at 0.6 mm/s: 0.036 mm2/s; what is heard else is noise
+def test_the_dose_of_a_run_counts_only_blocks_in_which_the_exciter_moved(tmp_path: Path) -> None:
+    def shake(tables):  # 100 blocks of 1 ms at 0.6 mm/s: 0.036 mm2/s; v_a of all other blocks is noise
         tables["trace"]["vibration_velocity_mps"] = 6e-4
         tables["applied"]["amplitude_m"] = 0.0
         tables["applied"]["amplitude_m"][200:300] = 4e-8
@@ -133,7 +133,7 @@ def test_the_dose_of_a_run_is_that_of_the_blocks_in_which_the_exciter_moved(tmp_
         assert stretch.vibration_dose_mm2_per_s == pytest.approx(dose_mm2_per_s)
 
 
-def test_a_transducer_that_stands_gives_no_following_error(tmp_path: Path) -> None:
+def test_a_frozen_transducer_gives_no_following_error(tmp_path: Path) -> None:
     def stand(tables):
         tables["sensors"]["mass_position_m"] = 0.0
 
@@ -144,7 +144,7 @@ def test_a_transducer_that_stands_gives_no_following_error(tmp_path: Path) -> No
 
 
 def test_the_verdict_has_the_terms_of_the_stretch_after(tmp_path: Path) -> None:
-    """In its first 0.4 s the slide stands, and the drive moves away from it."""
+    """In the first 0.4 s the slide rests, and the drive moves away from it."""
 
     def from_the_start(tables):
         tables["trace"]["state"] = wire.STICK

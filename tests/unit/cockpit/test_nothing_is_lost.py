@@ -47,7 +47,7 @@ def files(tmp_path: Path) -> dict[str, Path]:
         (("look", "run.mcap", "--out", "mine.xlsx"), "mine.xlsx"),
     ],
 )
-def test_what_is_there_and_of_another_kind_stays(files, monkeypatch, words, victim):
+def test_an_existing_file_of_another_kind_is_kept(files, monkeypatch, words, victim):
     monkeypatch.chdir(files[victim].parent)
     before = files[victim].read_bytes()
     result = CliRunner().invoke(app, [*words])
@@ -66,7 +66,7 @@ def test_what_is_there_and_of_another_kind_stays(files, monkeypatch, words, vict
         (("log", "export", "run.mcap", "--to", "link.csv"), "link.trace.csv"),
     ],
 )
-def test_another_name_of_an_input_is_no_place_for_a_result(files, monkeypatch, words, name):
+def test_a_result_is_not_written_to_a_link_of_an_input(files, monkeypatch, words, name):
     log = files["run.mcap"]
     monkeypatch.chdir(log.parent)
     Path(name).hardlink_to(log)
@@ -126,7 +126,7 @@ def test_a_stdout_that_takes_nothing_is_one_line(words, where, why):
     assert done.stderr == f"stickslip: LOG_WRITE: stdout: cannot be written: {why}; free space or write elsewhere\n"
 
 
-def test_stdout_escapes_what_it_cannot_show(tmp_path):
+def test_stdout_escapes_characters_that_it_cannot_encode(tmp_path):
     (tmp_path / "ü.toml").write_bytes(b"")
     done = _in_a_shell(f"-m cockpit schema --out {tmp_path}/ü/ rig", PYTHONIOENCODING="ascii")
     assert (done.returncode, done.stdout) == (0, f"written  {tmp_path}/\\xfc/rig.json\n")

@@ -1,4 +1,4 @@
-"""A person's word: whose it was, what came of it, and what is said of a rig that does not answer."""
+"""Commands of the operator: matching answers, results, and messages about a rig that does not answer."""
 
 import socket
 import threading
@@ -83,7 +83,7 @@ def test_a_word_that_the_rig_took_and_did_is_done(say: Callable[[Rig, str], oper
     assert (obeyed.done, obeyed.taken, obeyed.state, len(rig.words)) == (True, True, "ARMED", 1)
 
 
-def test_a_rig_that_falls_silent_is_not_told_by_what_it_said_before(
+def test_the_last_message_of_a_silent_rig_confirms_nothing(
     say: Callable[[Rig, str], operator.CommandOutcome],
 ) -> None:
     """A cut link leaves the last message from before, which shows the very state that the word asks for."""
@@ -94,8 +94,10 @@ def test_a_rig_that_falls_silent_is_not_told_by_what_it_said_before(
     assert raised.value.kind is FAULTS["NO_PEER"]
 
 
-def test_an_answer_to_another_word_is_none_to_this_one(say: Callable[[Rig, str], operator.CommandOutcome]) -> None:
-    """Somebody else's word, and an earlier one of this process, end in the state that is asked for."""
+def test_an_answer_to_another_command_does_not_confirm_this_command(
+    say: Callable[[Rig, str], operator.CommandOutcome],
+) -> None:
+    """Commands of another sender and earlier commands of this process end in the requested state too."""
     other = wire.Operator(who="somebody else")
     with pytest.raises(Fault, match=r"did not confirm RESET .* is DISARMED .*; send it again") as raised:
         say(Rig([], lambda _word: [taken(other, "RESET"), applied(DISARMED)] * 3), "RESET")
@@ -132,10 +134,10 @@ def test_a_rig_without_a_guard_has_nothing_to_arm(say: Callable[[Rig, str], oper
     assert "`stickslip stop`" in disarmed.in_words()[0]
 
 
-def test_what_the_rig_did_before_it_took_the_word_does_not_count(
+def test_the_state_before_the_rig_took_the_command_does_not_count(
     say: Callable[[Rig, str], operator.CommandOutcome],
 ) -> None:
-    """A rig that is armed is checked anew where its exciter was not; the message before the check shows it armed."""
+    """An armed rig with an unchecked exciter is checked again; the message before the check shows it armed."""
     answers = [[applied(ARMED, wire.CHECK_PASSED)], []]
 
     def answer(word: wire.Operator) -> list[Any]:
@@ -166,7 +168,7 @@ def test_a_stop_that_does_not_stop_is_a_fault(
         say(Rig([], lambda word: [taken(word, "STOP"), answer]), "STOP")
 
 
-def test_a_rig_that_rests_by_a_stop_is_stopped_whoever_said_it(
+def test_a_rig_at_rest_after_a_stop_is_stopped_whoever_sent_it(
     say: Callable[[Rig, str], operator.CommandOutcome],
 ) -> None:
     assert say(Rig([], lambda _word: [applied(FAULT, wire.STOP_BY_PERSON)]), "STOP").done
@@ -175,7 +177,7 @@ def test_a_rig_that_rests_by_a_stop_is_stopped_whoever_said_it(
 @pytest.mark.parametrize(
     ("word", "advice"), [("STOP", "by hand"), ("DISARM", "by hand"), ("ARM", "start one"), ("RESET", "start one")]
 )
-def test_where_no_rig_is_the_advice_is_that_of_the_word(
+def test_without_a_rig_the_advice_depends_on_the_command(
     monkeypatch: pytest.MonkeyPatch, word: str, advice: str
 ) -> None:
     monkeypatch.setattr(operator, "_DIAL_S", 0.2)
@@ -198,7 +200,7 @@ def test_where_no_rig_answers_a_certificate_the_authority_is_asked_about(
             ask()
 
 
-def test_a_rig_that_cannot_listen_tells_why() -> None:
+def test_a_rig_that_cannot_listen_reports_the_reason() -> None:
     config = BusConfig(endpoint=free_endpoint())
     with (
         socket.create_server(("127.0.0.1", config.port)),
@@ -211,11 +213,11 @@ def test_a_rig_that_cannot_listen_tells_why() -> None:
 
 
 def test_the_help_of_a_mode_does_not_name_a_reason_that_is_not_there() -> None:
-    (disabled,) = (one for one in words() if (one.column, one.word) == ("mode", "DISABLED"))
+    (disabled,) = (entry for entry in words() if (entry.column, entry.word) == ("mode", "DISABLED"))
     assert "the rig is not armed" in disabled.help
 
 
-def test_what_listens_and_does_not_read_stands_still(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_that_listens_and_does_not_read_is_frozen(monkeypatch: pytest.MonkeyPatch) -> None:
     config = BusConfig(endpoint=free_endpoint())
     assert not is_frozen(config)
     with socket.create_server(("127.0.0.1", config.port)):

@@ -27,9 +27,9 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> RunData:
 
 
 def account(late_ms: Late, held_ms: tuple[int, int] = (0, 0)) -> Any:
-    """What the plant says of BLOCKS blocks whose commands take 0.3 ms, or what `late_ms` says, and come in order; inf: never.
+    """The plant's record of BLOCKS blocks. Commands take 0.3 ms or their `late_ms` (inf: lost) and arrive in order.
 
-    `held_ms`: from and until when the plant itself stood still, and nothing was sent or taken.
+    `held_ms`: begin and end of a stall of the plant, in which it neither sends nor receives.
     """
     table = APPLIED.blank(BLOCKS)
     due_ms = np.arange(BLOCKS) + 1.0
@@ -59,13 +59,13 @@ def event(code: str, text: str, t_ms: float = 0.0) -> wire.Event:
 
 
 def watched(run: RunData, applied: Any, *pauses_ms: tuple[float, float]) -> RunData:
-    told = [event(PAUSE, in_words(round(length * MS), None), t_ms) for t_ms, length in pauses_ms]
+    pause_events = [event(PAUSE, in_words(round(length * MS), None), t_ms) for t_ms, length in pauses_ms]
     return run._replace(
-        applied=applied, events=[event(WATCH, "pauses of the computer are watched on 2 cores: 0, 1"), *told]
+        applied=applied, events=[event(WATCH, "pauses of the computer are watched on 2 cores: 0, 1"), *pause_events]
     )
 
 
-def found(run: RunData, applied: Any, *pauses_ms: tuple[float, float]) -> Pauses:
+def pauses_of(run: RunData, applied: Any, *pauses_ms: tuple[float, float]) -> Pauses:
     verdict = verdict_of(watched(run, applied, *pauses_ms))
     assert verdict.pauses is not None
     assert verdict.not_watched == ""
@@ -74,18 +74,18 @@ def found(run: RunData, applied: Any, *pauses_ms: tuple[float, float]) -> Pauses
 
 def test_a_command_across_a_pause_is_late_inside_and_another_outside(run: RunData) -> None:
     applied = account({500: 1.5, 800: 1.2})
-    pauses = found(run, applied, (501.2, 1.1))
+    pauses = pauses_of(run, applied, (501.2, 1.1))
     assert (pauses.number, pauses.total_ms, pauses.longest_ms) == (1, pytest.approx(1.1), pytest.approx(1.1))
     assert (pauses.late_inside, pauses.late_outside) == (1, 1)
     assert pauses.within_1_ms_outside == pytest.approx(1 - 1 / BLOCKS, abs=1e-5)
-    assert found(run, applied).late_outside == 2
-    assert found(run, applied, (400.0, 30.0), (600.0, 30.0)).late_inside == 0
+    assert pauses_of(run, applied).late_outside == 2
+    assert pauses_of(run, applied, (400.0, 30.0), (600.0, 30.0)).late_inside == 0
 
 
-def test_a_command_that_is_late_while_one_core_stands_still_is_outside_and_counted_apart(run: RunData) -> None:
-    told = watched(run, account({500: 1.5, 800: 1.2}), (501.2, 1.1))
+def test_a_command_that_is_late_while_one_core_stalls_is_outside_and_counted_apart(run: RunData) -> None:
+    watched_run = watched(run, account({500: 1.5, 800: 1.2}), (501.2, 1.1))
     alone = [event(CORE_PAUSE, in_words(2 * MS, 1), t_ms) for t_ms in (500.5, 801.0)]
-    pauses = verdict_of(told._replace(events=[*told.events, *alone])).pauses
+    pauses = verdict_of(watched_run._replace(events=[*watched_run.events, *alone])).pauses
     assert pauses is not None
     assert (pauses.number, pauses.late_inside, pauses.late_outside, pauses.late_one_core) == (1, 1, 1, 1)
     assert pauses_in_words(pauses) == [
@@ -96,21 +96,21 @@ def test_a_command_that_is_late_while_one_core_stands_still_is_outside_and_count
 
 def test_blocks_that_were_due_in_a_pause_are_inside_it(run: RunData) -> None:
     late = {block: 1.0 + 0.02 * (block - 300) for block in range(301, 320)}
-    pauses = found(run, account(late, held_ms=(301, 321)), (300.8, 20.1))
+    pauses = pauses_of(run, account(late, held_ms=(301, 321)), (300.8, 20.1))
     assert (pauses.late_inside, pauses.late_outside) == (19, 1)  # block 320, due after the pause, waits behind them
 
 
-def test_a_loop_that_stood_still_by_itself_is_late_outside(run: RunData) -> None:
+def test_a_stall_of_the_loop_alone_is_late_outside(run: RunData) -> None:
     late = {400: 201.5}  # and all that wait behind it
-    pauses = found(run, account(late), (100.0, 5.0))
+    pauses = pauses_of(run, account(late), (100.0, 5.0))
     assert (pauses.late_inside, pauses.late_outside) == (0, 201)
     assert pauses.within_1_ms_outside == pytest.approx(0.798, abs=0.001)
-    short = found(run, account(late), (450.0, 4.0))  # a short pause meanwhile excuses nothing
+    short = pauses_of(run, account(late), (450.0, 4.0))  # a short pause within the stall excuses nothing
     assert (short.late_inside, short.late_outside) == (0, 201)
 
 
 def test_every_figure_counts_the_same_late_commands(run: RunData) -> None:
-    """Commands that never came are blocks without a command; "207 late commands" stood beside "228 later than 1 ms"."""
+    """Commands that never arrive are blocks without a command, so they count as late nowhere."""
     never: Late = dict.fromkeys((200, 201, 700, BLOCKS - 2), np.inf)
     verdict = verdict_of(watched(run, account(never | {500: 1.5, 800: 1.2}), (501.2, 1.1)))
     assert verdict.pauses is not None
@@ -118,9 +118,9 @@ def test_every_figure_counts_the_same_late_commands(run: RunData) -> None:
     assert "2 late commands" in verdict.losses()
 
 
-def test_rows_that_the_log_lacks_are_no_late_commands(run: RunData) -> None:
+def test_rows_missing_from_the_log_do_not_count_as_late_commands(run: RunData) -> None:
     applied = account({})
-    assert found(run, np.delete(applied, slice(300, 340))).late_outside == 0
+    assert pauses_of(run, np.delete(applied, slice(300, 340))).late_outside == 0
 
 
 def test_where_nothing_was_watched_no_figure_is_given(run: RunData) -> None:
@@ -131,20 +131,20 @@ def test_where_nothing_was_watched_no_figure_is_given(run: RunData) -> None:
     assert verdict.not_watched == "no real-time priority"
     assert computer_in_words(verdict.computer, verdict.not_watched).endswith("not watched: no real-time priority")
     assert verdict_of(run._replace(applied=applied)).not_watched == "the recorder of this log did not watch them"
-    assert verdict_of(run).not_watched == ""  # in lockstep nobody has to
+    assert verdict_of(run).not_watched == ""  # lockstep needs no watch
 
 
-def test_the_progress_line_tells_of_pauses_once_there_are_some() -> None:
+def test_the_progress_line_shows_pauses_once_there_are_some() -> None:
     assert "paused" not in progress_line(wire.State(), 10.0)
     assert progress_line(wire.State(), 10.0, pauses=2, paused_ms=14.4).endswith("  computer stalled 2 x, 14 ms")
 
 
-def test_what_the_verdict_says(run: RunData, tmp_path: Path) -> None:
+def test_the_verdict_reports_stalls_in_text_and_json(run: RunData, tmp_path: Path) -> None:
     applied = account({500: 1.5, 800: 1.2})
     verdict = verdict_of(watched(run, applied, (501.2, 1.1), (900.0, 12.0)))
     assert pauses_in_words(verdict.pauses)[0].startswith("stalls   every core stalled 2 times (13.1 ms in total, ")
     assert strict_json(verdict)["pauses"]["number"] == 2
-    assert pauses_in_words(found(run, applied)) == [
+    assert pauses_in_words(pauses_of(run, applied)) == [
         "stalls   none of every core; 2 commands later than 1 ms outside of them (0.20 %)"
     ]
     assert computer_in_words(verdict.computer, "") == (
@@ -152,7 +152,7 @@ def test_what_the_verdict_says(run: RunData, tmp_path: Path) -> None:
     )
 
 
-def test_the_longest_stall_is_that_of_whoever_saw_more(run: RunData) -> None:
+def test_the_longest_stall_is_the_larger_of_watch_and_plant(run: RunData) -> None:
     """The log of a demo whose plant was 40.5 ms late read "4.0 ms": the watch saw less than the plant."""
     applied = account({})
     applied["late_ns"][500:503] = np.array([39.1, 40.5, 39.5]) * MS

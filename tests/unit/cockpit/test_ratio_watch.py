@@ -20,7 +20,7 @@ SETUP = Setup("", BLOCK_S, 0.0, 0.1, [], known_gain=False, v_ratio=1.2, duration
 
 
 def made(ratio: Any) -> tuple[Any, Any]:
-    """What the rig did, and steps of a controller in EXCITE at 1 mm/s with this v_a / v_d, one a block."""
+    """Applied table of a rig and trace of a controller in EXCITE at 1 mm/s, with this v_a / v_d in each block."""
     count = len(ratio)
     trace, applied = TRACE.blank(count).copy(), APPLIED.blank(count).copy()
     for table in (trace, applied):
@@ -32,7 +32,7 @@ def made(ratio: Any) -> tuple[Any, Any]:
 
 
 def watched(applied: Any, trace: Any, per_window: int = 2500) -> RatioVerdict:
-    """In windows of so many blocks, each with what came before and comes after."""
+    """Watch the ratio in windows of `per_window` blocks, each with its neighbouring blocks."""
     watch, count = RatioWatch(SETUP), len(trace)
     blocks = JudgedBlocks(*(np.asarray(trace["sequence"]), np.asarray(trace["t_ns"]), *[np.empty(0)] * 5))
     rows = rows_of(trace, TRACE_ROW), rows_of(applied, APPLIED_ROW), np.empty(0, COMMAND_ROW)
@@ -100,7 +100,7 @@ def test_a_stall_of_the_rig_counts_as_well(field: str, value: int) -> None:
     assert seen.left_out_s == pytest.approx(1.0, abs=5e-3)
 
 
-def test_a_run_without_vibration_has_nothing_to_say() -> None:
+def test_a_run_without_vibration_has_no_ratio_lines() -> None:
     applied, trace = made(np.full(100, 1.2))
     trace["mode"] = 0
     seen = watched(applied, trace)

@@ -1,4 +1,4 @@
-"""The page of a log: its data, what it loads (nothing), what it refuses. A browser opens it in tests/system/test_review.py."""
+"""The page of a log: its data, no network access, refused inputs. A browser opens it in tests/system/test_review.py."""
 
 import base64
 import json
@@ -31,13 +31,13 @@ def log(tmp_path: Path) -> Path:
 
 
 def call(*arguments: str | Path):
-    return CliRunner().invoke(app, [str(one) for one in arguments])
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def data_in(page: Path) -> dict[str, Any]:
-    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page.read_text(), re.DOTALL)
-    assert found is not None
-    return json.loads(found[1])
+    match = re.search(r'<script type="application/json" id="data">(.*?)</script>', page.read_text(), re.DOTALL)
+    assert match is not None
+    return json.loads(match[1])
 
 
 def values(text: str) -> Any:
@@ -45,7 +45,9 @@ def values(text: str) -> Any:
 
 
 def curve(data: dict[str, Any], name: str, log: int = 0) -> dict[str, Any]:
-    return next(one for panel in data["panels"] for one in panel["curves"] if (one["name"], one["log"]) == (name, log))
+    return next(
+        curve for panel in data["panels"] for curve in panel["curves"] if (curve["name"], curve["log"]) == (name, log)
+    )
 
 
 def test_a_curve_is_the_log_in_bins_of_a_block(log: Path) -> None:
@@ -61,7 +63,7 @@ def test_a_curve_is_the_log_in_bins_of_a_block(log: Path) -> None:
     np.testing.assert_allclose(values(velocity["mean"]), 1e3 * run.trace["drive_velocity_mps"], rtol=1e-6)
     assert "most" not in velocity  # one value a bin
     assert [one["code"] for one in data["logs"][0]["events"]] == [
-        one.code for one in sorted(run.events, key=lambda e: e.t_ns)
+        event.code for event in sorted(run.events, key=lambda e: e.t_ns)
     ]
     assert json.loads(result.stdout)["logs"][0]["blocks"] == 400
 
@@ -82,7 +84,7 @@ def test_a_page_loads_nothing_and_no_text_of_a_log_is_markup(tmp_path: Path, log
     assert len(page) < MOST_BYTES
 
 
-def test_two_logs_share_a_time_axis_and_differ_in_what_was_set(tmp_path: Path, log: Path) -> None:
+def test_two_logs_share_a_time_axis_and_list_differing_settings(tmp_path: Path, log: Path) -> None:
     def shorter(tables: Tables) -> None:
         for name, table in tables.items():
             tables[name] = table[table["t_ns"] <= 300_000_000]
@@ -93,7 +95,7 @@ def test_two_logs_share_a_time_axis_and_differ_in_what_was_set(tmp_path: Path, l
     result = call("review", log, other, "--out", out)
     assert result.exit_code == 0, result.output
     data = data_in(out)
-    assert [one["label"] for one in data["logs"]] == ["A", "B"]
+    assert [log["label"] for log in data["logs"]] == ["A", "B"]
     assert data["differences"] == []
     second = values(curve(data, "vibration_velocity_mps", 1)["mean"])
     assert np.isfinite(second).sum() == 300
@@ -118,7 +120,7 @@ def test_measured_data_of_another_program_have_a_page(tmp_path: Path) -> None:
     assert call("review", path).exit_code == 0
     data = data_in(tmp_path / "measured.html")
     assert len(data["logs"][0]["slips"]) == 4
-    assert data["logs"][0]["good"] is None  # there is no controller that could be judged
+    assert data["logs"][0]["good"] is None  # no controller to judge
     assert [panel["title"] for panel in data["panels"]] == ["Drive force"]
 
 
@@ -134,13 +136,13 @@ def test_a_log_without_a_block_and_a_third_log(tmp_path: Path, log: Path) -> Non
     assert f"{log}: is the third log: a page shows one or two; leave it out" in third.stderr
 
 
-def test_a_verdict_is_no_parameter(log: Path) -> None:
+def test_a_verdict_is_not_listed_as_a_parameter(log: Path) -> None:
     run = read_run(log)
     run.headers["verdict"] = {"good": "true"}
     assert not any(key.startswith("verdict") for key in parameters_of(run))
 
 
-def test_the_answer_says_why_a_run_without_a_slip_is_not_good(tmp_path: Path) -> None:
+def test_the_answer_explains_why_a_run_without_a_slip_is_not_good(tmp_path: Path) -> None:
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(short_log()[: len(short_log()) * 2 // 3])
     still = Phase(
@@ -155,4 +157,4 @@ def test_the_answer_says_why_a_run_without_a_slip_is_not_good(tmp_path: Path) ->
     )
     verdict = judge(cut)._replace(after=still, untested="", alone=None)
     assert headline(verdict) == "not judged: the log ends at 0.32 s, the run was to end at 0.40 s"
-    assert any("cut: has no end" in line for line in verdict.warnings)
+    assert any("cut: has no valid end" in line for line in verdict.warnings)

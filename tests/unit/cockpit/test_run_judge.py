@@ -1,4 +1,4 @@
-"""The streaming judge: windows change nothing, stalls and gaps change no status, and what is missing where it decides does."""
+"""The streaming judge: windows, stalls and gaps do not change the status; missing decisive data does."""
 
 import json
 from itertools import islice
@@ -142,7 +142,7 @@ def until(run: RunData, rows: int, text: str | None) -> RunData:
     return run._replace(**{name: table[:rows] for name, table in tables_of(run).items()}, events=events)
 
 
-def test_a_log_that_ends_early_and_does_not_say_why_is_not_judged(run: RunData) -> None:
+def test_a_log_that_ends_early_without_a_reason_is_not_judged(run: RunData) -> None:
     """It read "data whole" and "control ok"."""
     verdict = verdict_of(until(run, 5000, None))
     assert data_in_words(verdict) == "5.00 of 6.00 s; the rest is not in the log"
@@ -162,7 +162,7 @@ def test_who_had_the_blocks_after_the_end_of_a_log_is_not_known(run: RunData) ->
     )
 
 
-def test_the_headline_of_a_run_that_is_not_ok_says_so(run: RunData) -> None:
+def test_the_headline_of_a_run_that_is_not_ok_begins_with_the_status(run: RunData) -> None:
     """It read "stick-slip is gone: ...; PIEZO_WEAK"."""
     sound = verdict_of(run)
     weak = sound._replace(charge=sound.charge._replace(reasons_s={"PIEZO_WEAK": 2.0}))
@@ -260,7 +260,7 @@ def test_a_slip_in_a_stall_is_counted_apart(run: RunData, tmp_path: Path, table:
     verdict = judge(changed(run, tmp_path / "stalled.mcap", stalled))
     assert verdict.after is not None
     assert (verdict.after.slips, verdict.stalled_slips, verdict.control) == (0, 1, NOT_JUDGED)
-    assert "the time of a slip before" in verdict.reason  # the stall and its second leave 0.6 s
+    assert "between two slips before" in verdict.reason  # the stall and its second leave 0.6 s
 
 
 def test_a_rig_that_disarmed_itself_is_not_judged_and_named(run: RunData) -> None:
@@ -275,8 +275,8 @@ def test_a_rig_that_disarmed_itself_is_not_judged_and_named(run: RunData) -> Non
     assert "the rig disarmed itself at 5.50 s, as no fresh command reached it" in headline(verdict)
 
 
-def test_the_highest_set_point_is_named_beside_the_ratio(run: RunData) -> None:
-    """A ratio of "1.11 to 3.18 ... (ok)" did not say that the controller had raised its set point."""
+def test_the_highest_set_point_is_named_with_the_ratio(run: RunData) -> None:
+    """A ratio of "1.11 to 3.18 ... (ok)" alone hides that the controller raised its set point."""
     trace = tables_of(run)["trace"]
     trace["velocity_ratio"][(trace["mode"] == wire.EXCITE) & (trace["t_ns"] > 4.5e9)] = 2.25
     lines = in_words(verdict_of(run._replace(trace=trace)), verbose=True)
@@ -286,7 +286,7 @@ def test_the_highest_set_point_is_named_beside_the_ratio(run: RunData) -> None:
 
 @pytest.mark.parametrize(("at_s", "blamed"), [(4.4, True), (5.6, False)])
 def test_a_trip_after_lost_commands_names_the_link(run: RunData, at_s: float, blamed: bool) -> None:
-    """ "Is the base accelerometer loose?" stood in the headline of a run whose commands were cut for 0.1 s."""
+    """The headline asks about a loose base accelerometer only where no lost commands precede the trip."""
     applied = tables_of(run)["applied"]
     applied["fallback"][4200:4300] = 1
     trip = wire.Event(source="controller", code="OPEN_LOOP", text="far less v_a than commanded", t_ns=round(at_s * 1e9))
@@ -340,7 +340,7 @@ def test_a_run_that_a_fault_ends_is_judged_on_its_recorded_part(
     ("profile", "why"),
     [
         ("[[0.0, 0.0005], [2.9, 0.0005], [2.95, 0.0]]", "the drive did not move"),
-        ("[[0.0, 0.0005], [5.0, 0.0005], [5.1, 0.0]]", "the time of a slip before"),
+        ("[[0.0, 0.0005], [5.0, 0.0005], [5.1, 0.0]]", "between two slips before"),
     ],
 )
 def test_a_drive_that_rests_while_the_controller_is_in_charge_shows_nothing(
@@ -353,10 +353,10 @@ def test_a_drive_that_rests_while_the_controller_is_in_charge_shows_nothing(
     assert why in verdict.reason
 
 
-def test_a_run_with_faults_in_one_process_says_how_long_it_takes(
+def test_a_run_with_faults_in_one_process_prints_its_expected_speed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It ran 40 times slower than a run without faults, and no line said so."""
+    """Such a run is 40 times slower than a run without faults."""
     fault = "fault=[{kind='scaled', target='drive_force_N', value=0.5}]"
     run_scenario("from-the-start", ["duration_s=0.1", fault], False, True, tmp_path / "run.mcap")
     assert "with faults, message by message: 0.4 s per simulated second" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""`stickslip schema`: what the files and results are, what the schemas say they are, and what the project ships agree."""
+"""`stickslip schema`: files, results and shipped configurations agree with the schemas."""
 
 import json
 import math
@@ -42,12 +42,12 @@ def validator(name: str) -> Any:
 
 
 def fits(name: str, value: Any) -> bool:
-    """Whether a value is what a schema says."""
+    """Whether a value fits a schema."""
     return validator(name).is_valid(value)
 
 
 def check(name: str, value: Any) -> None:
-    """Raise where a value is not what a schema says."""
+    """Raise where a value does not fit a schema."""
     validator(name).validate(strict_json(value))
 
 
@@ -105,7 +105,7 @@ def test_a_shipped_file_names_its_schema_and_fits_it(path: Path) -> None:
         ("evidence-1", tomllib.loads(made_up.MANIFEST) | {"format": "evidence/2"}, False),
     ],
 )
-def test_a_schema_takes_what_the_program_takes(name: str, table: dict[str, Any], expected: bool) -> None:
+def test_a_schema_accepts_the_same_values_as_the_program(name: str, table: dict[str, Any], expected: bool) -> None:
     assert fits(name, table) is expected
 
 
@@ -200,7 +200,7 @@ def test_json_and_schema_follow_the_same_declarations() -> None:
 
 def test_without_a_name_they_are_listed_and_with_a_folder_written(tmp_path: Path) -> None:
     lines = call("schema").stdout.splitlines()
-    assert [line.split()[0] for line in lines] == [one.name for one in (*TOML, *JSON)]
+    assert [line.split()[0] for line in lines] == [name.name for name in (*TOML, *JSON)]
     assert call("schema", "--out", str(tmp_path / "all")).exit_code == 0
     assert {path.stem for path in (tmp_path / "all").iterdir()} == FORMATS.keys()
     written = call("schema", "rig", "--out", str(tmp_path / "one"))

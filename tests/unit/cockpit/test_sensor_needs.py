@@ -115,11 +115,11 @@ def test_a_sensor_that_sees_is_taken(settings: list[str]) -> None:
 def test_the_number_of_a_refusal_is_taken(scenario: str, settings: list[str]) -> None:
     given, refused = [*settings], set[str]()
     while line := _refusal(scenario, given):
-        found = _ADVICE.search(line)
-        assert found, line
-        assert found[1] not in refused, line
-        refused.add(found[1])
-        given.append(f"{found[1]}={found[2]}")
+        match = _ADVICE.search(line)
+        assert match, line
+        assert match[1] not in refused, line
+        refused.add(match[1])
+        given.append(f"{match[1]}={match[2]}")
     assert refused or scenario in EXCEPT.get(settings[0], ())
 
 

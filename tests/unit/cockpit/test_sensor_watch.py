@@ -1,4 +1,4 @@
-"""What a run's sensors say of themselves: sound logs stay without a finding, broken channels are found, three witnesses agree."""
+"""Sensor checks of a run: sound logs have no finding, broken channels are found, three witnesses agree."""
 
 import itertools
 import json
@@ -37,10 +37,10 @@ def golden(name: str) -> RunData:
 
 
 def watched(run: RunData) -> SensorVerdict:
-    """What the judge finds in a log that was read."""
-    found = verdict_of(run).sensors
-    assert found is not None
-    return found
+    """The judge's sensor verdict on a log."""
+    sensors = verdict_of(run).sensors
+    assert sensors is not None
+    return sensors
 
 
 def with_channels(run: RunData, change: Callable[[Any], None]) -> RunData:
@@ -53,7 +53,7 @@ def with_channels(run: RunData, change: Callable[[Any], None]) -> RunData:
 def test_a_sound_log_is_without_a_finding(name: str) -> None:
     seen = watched(golden(name))
     assert seen.findings == []
-    assert not any(found.decides for found in seen.findings)
+    assert not any(finding.decides for finding in seen.findings)
 
 
 def test_three_witnesses_count_the_same_slips() -> None:
@@ -68,12 +68,12 @@ def test_three_witnesses_count_the_same_slips() -> None:
     assert abs(verdict.by_trace - verdict.surges - verdict.by_force) <= 1
 
 
-def test_pieces_of_any_size_say_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pieces_of_any_size_give_the_same_findings(monkeypatch: pytest.MonkeyPatch) -> None:
     run = golden("slip-then-control")
-    found = watched(run)
+    findings = watched(run)
     for rows in (61, 997):
         monkeypatch.setattr(judged, "_PIECE_ROWS", rows)
-        assert watched(run) == found
+        assert watched(run) == findings
 
 
 def stops(name: str) -> Callable[[Any], None]:
@@ -108,7 +108,7 @@ BROKEN = {
 
 @pytest.mark.parametrize("change", BROKEN.values(), ids=BROKEN)
 def test_a_dead_clipped_or_missing_channel_is_not_judged(change: Callable[[Any], None]) -> None:
-    assert any(found.decides for found in watched(with_channels(golden("slip-then-control"), change)).findings)
+    assert any(finding.decides for finding in watched(with_channels(golden("slip-then-control"), change)).findings)
 
 
 SWAPPED = {
@@ -120,7 +120,7 @@ SWAPPED = {
 
 @pytest.mark.parametrize("change", SWAPPED.values(), ids=SWAPPED)
 def test_two_swapped_channels_are_not_judged(change: Callable[[Any], None]) -> None:
-    assert any(found.decides for found in watched(with_channels(golden("slip-then-control"), change)).findings)
+    assert any(finding.decides for finding in watched(with_channels(golden("slip-then-control"), change)).findings)
 
 
 @pytest.mark.parametrize("factor", [-1.0, 0.1, 0.2248, 4.448, 1000.0])
@@ -130,7 +130,7 @@ def test_a_channel_of_another_sign_or_scale_is_not_judged(name: str, factor: flo
         sensors[name] *= np.float32(factor)
 
     seen = watched(with_channels(golden("slip-then-control"), change))
-    assert any(found.decides for found in seen.findings)
+    assert any(finding.decides for finding in seen.findings)
     assert {finding.code for finding in seen.findings} & {
         "SENSOR_SCALE",
         "SENSOR_SWAPPED",
@@ -148,7 +148,7 @@ def test_a_force_that_shows_no_slip_disagrees_with_the_other_witnesses() -> None
 
     run = with_channels(golden("slip-then-control"), change)
     seen = watched(run)
-    assert any(found.decides for found in seen.findings)
+    assert any(finding.decides for finding in seen.findings)
     assert "SLIPS_DISAGREE" in {finding.code for finding in seen.findings}
 
 
@@ -160,17 +160,17 @@ def test_channels_that_do_not_decide_are_named_and_leave_the_verdict() -> None:
         controller["estimator"] |= {"use_force": name != FORCE}
         described = {**run.headers, "controller": {"configuration": json.dumps(controller)}}
         alone = {role: table for role, table in described.items() if role != "plant"}
-        found = [watched(run._replace(headers=headers)).findings for headers in (described, alone)]
-        assert ("SENSOR_DEAD", True) in [(one.code, one.decides) for one in found[0]]
-        assert [(one.code, one.decides) for one in found[1]] == [("SENSOR_DEAD", False)]
+        findings = [watched(run._replace(headers=headers)).findings for headers in (described, alone)]
+        assert ("SENSOR_DEAD", True) in [(one.code, one.decides) for one in findings[0]]
+        assert [(one.code, one.decides) for one in findings[1]] == [("SENSOR_DEAD", False)]
 
 
 def test_a_force_whose_noise_hides_a_slip_is_not_judged() -> None:
     def change(sensors: Any) -> None:
         sensors[FORCE] += 20.0 * np.random.default_rng(1).standard_normal(sensors[FORCE].shape).astype(np.float32)
 
-    found = watched(with_channels(golden("slip-then-control"), change)).findings
-    assert ("SENSOR_NOISE", True) in {(one.code, one.decides) for one in found}
+    findings = watched(with_channels(golden("slip-then-control"), change)).findings
+    assert ("SENSOR_NOISE", True) in {(one.code, one.decides) for one in findings}
 
 
 def test_accelerometers_that_are_swapped_for_the_controller_too_are_seen() -> None:
@@ -183,23 +183,23 @@ def test_accelerometers_that_are_swapped_for_the_controller_too_are_seen() -> No
     trace = run.trace.copy()  # the controller sees the slide's vibration as v_a
     at = np.searchsorted(run.sensors["sequence"], trace["block"])
     trace["vibration_velocity_mps"] *= run.sensors[SLIDE_MPS2][at].std(axis=1) / base_mps2[at].std(axis=1).clip(1e-9)
-    found = watched(with_channels(run._replace(trace=trace), swap)).findings
-    assert any(one.code == "SENSOR_SWAPPED" and "more than base_accel_mps2" in one.text for one in found)
+    findings = watched(with_channels(run._replace(trace=trace), swap)).findings
+    assert any(one.code == "SENSOR_SWAPPED" and "more than base_accel_mps2" in one.text for one in findings)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5])
 @pytest.mark.parametrize(("name", "other"), [(SLIDE, DRIVE), (DRIVE, SLIDE)])
 def test_positions_that_go_alike_while_the_force_varies_are_not_judged(name: str, other: str, share: float) -> None:
-    found = watched(with_channels(golden("slip-then-control"), of_edits(name, f"copy of {other}", share))).findings
-    assert ("SENSOR_SCALE", True) in {(one.code, one.decides) for one in found}
+    findings = watched(with_channels(golden("slip-then-control"), of_edits(name, f"copy of {other}", share))).findings
+    assert ("SENSOR_SCALE", True) in {(one.code, one.decides) for one in findings}
 
 
 @pytest.mark.parametrize(("name", "code"), [(BASE_MPS2, "SENSOR_SWAPPED"), (SLIDE_MPS2, "SENSOR_DEAD")])
 def test_an_accelerometer_that_shows_its_noise_in_the_last_second_is_not_judged(name: str, code: str) -> None:
     run = golden("slip-then-control")
     last_s = float(run.sensors["t_ns"][-1]) * 1e-9 - 1.0
-    found = watched(edited(run, edits_of(name, PAPER[name])["noise"], last_s)).findings
-    assert [(one.code, one.decides) for one in found] == [(code, True)]
+    findings = watched(edited(run, edits_of(name, PAPER[name])["noise"], last_s)).findings
+    assert [(one.code, one.decides) for one in findings] == [(code, True)]
 
 
 def test_a_slow_accelerometer_that_the_controller_corrects_is_sound() -> None:
@@ -216,8 +216,8 @@ def test_a_slow_accelerometer_that_the_controller_corrects_is_sound() -> None:
     controller["amplitude"]["accel_bandwidth_Hz"] = 900.0
     headers = {**run.headers, "controller": {"configuration": json.dumps(controller)}}
     for table, codes in ((run.headers, {"SENSOR_OTHER"}), (headers, set())):
-        found = watched(with_channels(run._replace(headers=table), slow)).findings
-        assert {finding.code for finding in found} == codes
+        findings = watched(with_channels(run._replace(headers=table), slow)).findings
+        assert {finding.code for finding in findings} == codes
 
 
 def codes_of(step_m: float = 0.0, **columns: Any) -> list[str]:

@@ -37,7 +37,7 @@ def sawtooth_m(t_s: np.ndarray) -> np.ndarray:
     return np.where(at < 0.036, at * SPEED_MPS, 3.6e-5 * (0.04 - at) / 0.004) + 2e-5
 
 
-def test_slips_count_on_both_ways_and_a_turn_is_none(tmp_path: Path) -> None:
+def test_slips_count_in_both_directions_and_a_reversal_does_not(tmp_path: Path) -> None:
     drive_m = SPEED_MPS * np.where(T_S < 0.2, T_S, 0.4 - T_S)
     behind_m = np.where(T_S < 0.2, 1.0, -1.0) * sawtooth_m(np.mod(T_S, 0.2))
     cycles = cycles_of(made_run(tmp_path, drive_m, behind_m))
@@ -47,7 +47,7 @@ def test_slips_count_on_both_ways_and_a_turn_is_none(tmp_path: Path) -> None:
     assert np.mod(cycles.breakaway_t_s, 0.04) == pytest.approx(0.036, abs=2e-3)
 
 
-def test_a_force_swings_inside_a_stroke_and_not_where_its_drive_turns_or_stands(tmp_path: Path) -> None:
+def test_the_force_swing_counts_inside_a_stroke_and_not_where_the_drive_turns_or_rests(tmp_path: Path) -> None:
     at_s = np.mod(T_S, 0.16)  # 50 ms forwards, 30 ms of a stop, in which the spring lets go, and the same backwards
     there_s, back_s = np.minimum(at_s, 0.05), np.clip(at_s - 0.08, 0.0, 0.05)
     stands = np.mod(T_S, 0.08) > 0.05

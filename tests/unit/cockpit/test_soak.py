@@ -1,4 +1,4 @@
-"""What a soak makes of its log and of the memory of its processes."""
+"""The report of a soak on its log and on the memory of its processes."""
 
 import math
 import os
@@ -45,10 +45,10 @@ def soaked(folder: Path, lost: int = 0, thin_out: bool = False) -> Soaked:
     return watch.result("belt", interrupted=False)
 
 
-def test_lost_blocks_latency_and_memory_are_told(tmp_path: Path) -> None:
+def test_lost_blocks_latency_and_memory_are_reported(tmp_path: Path) -> None:
     came = soaked(tmp_path, lost=3)
     assert (came.verdict.blocks, came.verdict.lost_blocks, came.good) == (1197, 3, False)
-    assert [(one.until_s, one.blocks, one.late) for one in came.periods] == [
+    assert [(period.until_s, period.blocks, period.late) for period in came.periods] == [
         (0.5, 500, 5),
         (1.0, 500, 5),
         (1.2, 200, 2),
@@ -63,7 +63,7 @@ def test_lost_blocks_latency_and_memory_are_told(tmp_path: Path) -> None:
     assert strict_json(came)["memory"][0]["role"] == "recorder"
 
 
-def test_what_ran_to_its_end_without_a_loss_is_good(tmp_path: Path) -> None:
+def test_a_complete_soak_without_a_loss_is_good(tmp_path: Path) -> None:
     came = soaked(tmp_path, thin_out=True)
     assert came.good
     assert not came._replace(interrupted=True).good
@@ -76,11 +76,11 @@ def test_a_soak_is_judged_as_its_log_is(tmp_path: Path) -> None:
     assert came.verdict._replace(checksums=whole.checksums) == whole
 
 
-def test_two_points_are_no_slope() -> None:
+def test_two_points_give_no_slope() -> None:
     assert math.isnan(soak._memory("plant", [(0.0, 1.0), (1.0, 2.0)]).slope_MB_per_h)
 
 
-def test_a_process_that_has_ended_tells_no_memory() -> None:
+def test_a_process_that_has_ended_has_no_memory_figure() -> None:
     """Its number stays until its parent looks, and its memory reads 0, which would bend the slope."""
     ended = subprocess.Popen([sys.executable, "-c", ""])
     os.waitid(os.P_PID, ended.pid, os.WEXITED | os.WNOWAIT)

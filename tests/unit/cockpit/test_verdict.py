@@ -1,4 +1,4 @@
-"""The verdict on a run: what counts, what is left out, and what was not tested."""
+"""The verdict on a run: counted, left out and untested parts."""
 
 import json
 from pathlib import Path
@@ -30,7 +30,7 @@ def test_a_log_that_begins_late_counts_from_its_first_block(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_a_force_that_is_no_number_is_counted_and_left_out(tmp_path: Path, value: float) -> None:
+def test_a_force_of_nan_is_counted_and_left_out(tmp_path: Path, value: float) -> None:
     def spoil(tables):
         tables["sensors"]["drive_force_N"][[100, 250], 3] = value
         tables["trace"]["drive_force_N"][[100, 250]] = value
@@ -49,7 +49,7 @@ def test_a_force_that_is_no_number_is_counted_and_left_out(tmp_path: Path, value
     assert outcome(spoilt).drive_work_J == pytest.approx(outcome(sound).drive_work_J, rel=0.02)
 
 
-def test_what_was_not_measured_is_no_velocity_ratio(tmp_path: Path) -> None:
+def test_unmeasured_blocks_give_no_velocity_ratio(tmp_path: Path) -> None:
     def spoil(tables):
         trace = tables["trace"]
         trace["mode"], trace["drive_velocity_mps"], trace["vibration_velocity_mps"] = wire.EXCITE, 5e-4, 6e-4
@@ -113,7 +113,7 @@ def test_a_drive_beyond_the_end_of_its_transducer_is_not_ok(tmp_path: Path) -> N
         ),
     ],
 )
-def test_where_nothing_was_tested_the_headline_says_so(tmp_path: Path, settings: list[str], expected: str) -> None:
+def test_the_headline_reports_that_nothing_was_tested(tmp_path: Path, settings: list[str], expected: str) -> None:
     log = tmp_path / "still.mcap"
     run_onboard(load_scenario("from-the-start", ["duration_s=0.5", *settings]), log, {})
     verdict = verdict_of(read_run(log))

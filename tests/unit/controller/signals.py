@@ -1,4 +1,4 @@
-"""Made signals of a slide and its drive, and what the controller's estimate says to them."""
+"""Made signals of a slide and its drive, and the controller's estimates from them."""
 
 from typing import Any
 
@@ -14,7 +14,7 @@ from controller.records import build
 SAMPLES = 20  # a block of 1 ms
 SAMPLE_S = 5e-5
 STIFFNESS_N_PER_M = 11700.0
-FORCE_NOISE_N, POSITION_NOISE_M = 0.02, 5e-7  # white, rms, of the paper's stand
+FORCE_NOISE_N, POSITION_NOISE_M = 0.02, 5e-7  # rms of the white noise of the paper's rig
 
 
 def time_s(seconds: float) -> Any:

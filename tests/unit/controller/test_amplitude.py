@@ -1,4 +1,4 @@
-"""The amplitude loop with an exciter of any gain behind any delay: what it learns, and that it never drives too far."""
+"""The amplitude loop with an exciter of any gain behind any delay: it learns the gain and never overdrives."""
 
 import math
 from collections.abc import Callable
@@ -110,7 +110,7 @@ def test_it_holds_with_short_and_long_blocks(block_s: float, delay: int) -> None
 @pytest.mark.parametrize(("block_s", "delay"), [(2.5e-4, 40), (1e-3, 10), (1e-3, 0), (10e-3, 5)])
 @pytest.mark.parametrize("silent", [1, 4, 12])
 def test_noise_teaches_no_delay_where_the_vibration_begins_early(block_s: float, delay: int, silent: int) -> None:
-    """Silence in blocks: what comes before the vibration arrives is noise as well."""
+    """Quiet blocks; blocks before the vibration arrives count as noise too."""
     _, s, true_mps = run(round(1.5 / block_s), delay, lambda _: 3.0, block_s, silent_s=silent * block_s)
     assert s.loop_delay_steps == pytest.approx(delay, abs=max(1, round(1e-3 / block_s)))
     assert true_mps.max() < 1.3 * WANTED_MPS
@@ -162,7 +162,7 @@ def test_a_delay_that_changes_while_v_a_does_teaches_no_gain(late: int, gain: fl
 @pytest.mark.parametrize("late", [0, 20, 48])
 @pytest.mark.parametrize("factor", [0.75, 1.25])
 def test_a_gain_that_changes_is_learnt_whatever_the_delay_became(late: int, factor: float) -> None:
-    """What no command of the last 65 ms explains halves within each of them."""
+    """A vibration that no command of the last 65 ms explains halves within each 65 ms."""
     jump = SILENT + 800
     _, s, true_mps = run(
         jump + 500, 0, lambda step: factor if step >= jump else 1.0, later=lambda step: late if step >= jump else 0
@@ -182,13 +182,13 @@ def test_a_late_block_teaches_nothing() -> None:
     assert (s.log_gain[s.candidate], s.noise_mps, s.loop_delay_steps) == before
 
 
-def test_an_exciter_that_is_not_heard_is_told_and_driven_no_further_than_the_model() -> None:
+def test_an_exciter_without_response_is_reported_and_driven_no_further_than_the_model() -> None:
     _, s, _ = run(SILENT + 1000, 0, lambda _: 0.0)
     assert s.reason == wire.PIEZO_WEAK
     assert s.wanted_m == pytest.approx(WANTED_MPS / (2.0 * math.pi * s.wanted_Hz))
 
 
-def test_an_accelerometer_that_is_lost_is_told() -> None:
+def test_a_lost_accelerometer_is_reported() -> None:
     _, s, _ = run(SILENT + 1000, 0, lambda step: 1.0 if step < SILENT + 500 else 0.0)
     assert s.reason == wire.PIEZO_WEAK
     assert math.exp(s.log_gain[s.candidate]) == pytest.approx(1.0, rel=0.05)  # as learnt before

@@ -1,4 +1,4 @@
-"""The known gain of the exciter, and what a loop check of the rig says of it."""
+"""The known gain of the exciter, and its correction by a loop check of the rig."""
 
 from typing import Any
 
@@ -25,7 +25,7 @@ def checked(gains: tuple[float, ...], **amplitude: float) -> tuple[Any, Any]:
     return p, s
 
 
-def test_a_check_of_a_stiff_mount_tells_the_gain_at_every_frequency() -> None:
+def test_a_check_of_a_stiff_mount_gives_the_gain_at_every_frequency() -> None:
     p, s = checked((0.8, 0.8, 0.8, 0.8, 0.8))
     assert s.known_gain[: p.candidates] == pytest.approx(0.8)
     assert (s.known_steps[: p.candidates] == p.known_steps).all()
@@ -43,7 +43,7 @@ def test_between_tones_that_differ_the_first_even_vibration_decides_within_them(
     assert s.known_gain[at] >= 1.0
 
 
-def test_a_configured_gain_that_the_check_contradicts_is_told_and_gives_way() -> None:
+def test_a_configured_gain_that_the_check_contradicts_is_reported_and_replaced() -> None:
     p, s = checked((0.5,) * 5, known_gain=1.0)
     assert s.gain_other_s > 0.0
     assert s.known_gain[: p.candidates] == pytest.approx(0.5)

@@ -26,14 +26,14 @@ def test_sticks_and_slips_are_found(estimator: dict[str, Any], way: float) -> No
     trace = listen(way * drive_m, way * slide_m, offset_N=way * 8.0, estimator=estimator)
     assert int(trace["slips"][-1]) == 6
     for slip in range(1, 6):
-        # from the force alone a slip is seen to end 70 ms late: only the longer windows tell its rate from noise
+        # from the force alone a slip ends 70 ms late: only the longer windows separate its rate from noise
         assert (trace["state"][1000 * slip + 110 : 1000 * slip + 950] == wire.STICK).all()
         assert (trace["state"][1000 * slip - 30 : 1000 * slip - 10] == wire.SLIP).all()
     assert trace["surges"][-1] == 0
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
-def test_smooth_sliding_is_no_stick_and_no_slip(estimator: dict[str, Any], way: float) -> None:
+def test_smooth_sliding_counts_as_neither_stick_nor_slip(estimator: dict[str, Any], way: float) -> None:
     drive_m = way * 5e-4 * time_s(20.0)
     trace = listen(drive_m, drive_m, offset_N=way * 12.0, estimator=estimator)
     assert trace["slips"][-1] == 0
@@ -50,7 +50,7 @@ def test_a_slide_that_swings_by_less_than_half_slips_not() -> None:
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
-def test_without_a_force_sensor_both_positions_tell_the_force_of_the_spring(way: float) -> None:
+def test_without_a_force_sensor_both_positions_give_the_spring_force(way: float) -> None:
     drive_m, slide_m = stick_slip(4.0, 5e-4, 0.96, 0.04)
     trace = listen(way * drive_m, way * slide_m, missing="drive_force_N", estimator={"use_force": False})
     force_N = way * STIFFNESS_N_PER_M * (drive_m - slide_m).reshape(-1, 20).mean(axis=1)
@@ -68,7 +68,7 @@ def test_the_spring_of_both_ways_is_relaxed_half_way() -> None:
 
 
 @pytest.mark.parametrize("factor", [10.0, 0.1])
-def test_the_stiffness_is_learnt_whatever_was_told(factor: float) -> None:
+def test_the_stiffness_is_learnt_whatever_is_configured(factor: float) -> None:
     drive_m, slide_m = stick_slip(3.0, 5e-4, 0.96, 0.04)
     trace = listen(drive_m, slide_m, offset_N=8.0, drive_stiffness_N_per_m=factor * STIFFNESS_N_PER_M)
     assert trace["drive_stiffness_N_per_m"][-1] == pytest.approx(STIFFNESS_N_PER_M, rel=0.05)
@@ -85,7 +85,7 @@ def test_breakaway_and_the_time_to_the_next_slip_are_learnt() -> None:
     assert trace["time_to_slip_s"][5500] == pytest.approx(0.46, abs=0.05)
 
 
-def test_a_slide_on_a_drive_that_stands_is_at_a_standstill_and_slips_not() -> None:
+def test_a_slide_on_a_resting_drive_is_at_a_standstill_and_does_not_slip() -> None:
     drive_m = 5e-4 * np.clip(time_s(5.0), 0.0, 2.0)
     trace = listen(drive_m, drive_m, offset_N=12.0)
     assert (trace["state"][2030:] == wire.STANDSTILL).all()
@@ -109,8 +109,8 @@ def test_slips_are_counted_where_they_last_longer_than_a_stick_and_nothing_shows
     sensors = sensor_block(SAMPLES).blank()
     force_N = 0.1 + np.where(phase < stick_s, drop_N * phase / stick_s, fall)
     for block in range(len(t_s) // SAMPLES):
-        own = slice(SAMPLES * block, SAMPLES * (block + 1))
+        rows = slice(SAMPLES * block, SAMPLES * (block + 1))
         sensors["sequence"], sensors["t_ns"] = block, 1_000_000 * (block + 1)
-        sensors["drive_force_N"], sensors["drive_position_m"] = force_N[own], speed_mps * t_s[own]
+        sensors["drive_force_N"], sensors["drive_position_m"] = force_N[rows], speed_mps * t_s[rows]
         node.block(sensors.tobytes())
     assert int(node._trace[0]["slips"]) == pytest.approx(3.0 / period_s, rel=0.05)

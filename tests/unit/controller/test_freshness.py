@@ -39,7 +39,7 @@ def test_blocks_count_as_back_once_twenty_in_a_row_are_in_time() -> None:
     assert blocks.missing(2.0)[1][0][0] == "STALE"
 
 
-def test_a_stall_of_the_controller_is_no_silence_of_the_rig_where_blocks_follow() -> None:
+def test_a_stall_of_the_controller_does_not_count_as_silence_of_the_rig_where_blocks_follow() -> None:
     blocks = fresh()
     blocks.stalled(0.5)
     blocks.stalled(0.3)

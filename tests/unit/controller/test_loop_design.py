@@ -20,16 +20,16 @@ def shares(block_s: float) -> tuple[float, float, float]:
 def test_a_delay_that_is_a_block_off_leaves_sixty_degrees(block_s: float, delay_s: float) -> None:
     learn, low_pass, block_s = shares(block_s)
     delay_blocks = round(delay_s / block_s)
-    found = margins(learn, low_pass, delay_blocks + 1, delay_blocks, block_s)
-    assert found.phase_margin_deg >= 60.0
-    assert found.gain_margin >= 1.8
+    designed = margins(learn, low_pass, delay_blocks + 1, delay_blocks, block_s)
+    assert designed.phase_margin_deg >= 60.0
+    assert designed.gain_margin >= 1.8
 
 
 def test_the_margins_shrink_with_the_error_of_the_delay() -> None:
     learn, low_pass, block_s = shares(1e-3)
-    found = [margins(learn, low_pass, 20 + off, 20, block_s).gain_margin for off in (1, 3, 10, 30)]
-    assert found == sorted(found, reverse=True)
-    assert found[2] > 1.0  # 10 ms, the time constant of learning
+    designed = [margins(learn, low_pass, 20 + off, 20, block_s).gain_margin for off in (1, 3, 10, 30)]
+    assert designed == sorted(designed, reverse=True)
+    assert designed[2] > 1.0  # 10 ms, the time constant of learning
 
 
 def test_a_known_delay_feeds_nothing_back() -> None:

@@ -1,4 +1,4 @@
-"""The drive's velocity, direction and standstill from positions with the noise of the paper's stand."""
+"""The drive's velocity, direction and standstill from positions with the noise of the paper's rig."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def test_velocity_and_direction_are_found(velocity_mps: float) -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_drive_that_stands_is_never_called_moving(seed: int) -> None:
+def test_a_resting_drive_never_counts_as_moving(seed: int) -> None:
     still = np.zeros(len(time_s(10.0)))
     trace = listen(still, still, seed=seed)
     assert not trace["drive_velocity_mps"].any()
@@ -32,13 +32,13 @@ def test_a_creep_feed_of_a_micrometre_a_second_is_motion() -> None:
 
 
 @pytest.mark.parametrize(("least_feed_mps", "state"), [(5e-7, wire.UNKNOWN), (1e-5, wire.STANDSTILL)])
-def test_a_feed_that_would_not_be_seen_within_a_second_is_no_standstill(least_feed_mps: float, state: int) -> None:
+def test_a_feed_too_slow_to_be_seen_within_a_second_gives_no_standstill(least_feed_mps: float, state: int) -> None:
     drive_m = 1e-7 * time_s(2.0)
     trace = listen(drive_m, drive_m, position_noise_m=5e-6, estimator={"least_feed_mps": least_feed_mps})
     assert set(trace["state"][200:]) == {state}
 
 
-def test_a_stop_is_seen_at_once_and_its_tail_is_no_motion() -> None:
+def test_a_stop_is_seen_at_once_and_its_tail_does_not_count_as_motion() -> None:
     drive_m = 5e-4 * np.clip(time_s(4.0), 0.0, 2.0)
     trace = listen(drive_m, drive_m)
     assert (trace["drive_velocity_mps"][1000:2000] > 0.0).all()
@@ -73,7 +73,7 @@ def test_a_drive_that_starts_is_not_lost_again(seed: int) -> None:
     assert v_mps[begins[0] + 1] < 1.5e-4
 
 
-def test_hum_on_both_positions_is_no_motion_before_its_noise_is_known() -> None:
+def test_hum_on_both_positions_does_not_count_as_motion_before_its_noise_is_known() -> None:
     hum_m = 1e-6 * np.sin(2.0 * np.pi * 50.0 * time_s(2.0))
     for seed in range(3):
         assert not listen(hum_m, hum_m, seed=seed)["drive_velocity_mps"].any()

@@ -1,4 +1,4 @@
-"""What is remembered of a speed and a direction, and how the ratio rises and falls."""
+"""The ratio remembered for a speed and a direction, and how it rises and falls."""
 
 from typing import Any
 
@@ -30,7 +30,7 @@ def _start(way: int = 1) -> tuple[Any, Any]:
     return params[0], s
 
 
-def test_what_is_needed_at_a_speed_is_needed_below_it() -> None:
+def test_a_ratio_needed_at_a_speed_is_needed_below_it() -> None:
     _, s = _start()
     assert not is_needed(s, 1e-4)
     note_needed(s, 1e-3)
@@ -39,7 +39,7 @@ def test_what_is_needed_at_a_speed_is_needed_below_it() -> None:
     assert not is_needed(s, 1.3e-3)
 
 
-def test_what_is_needless_at_a_speed_is_needless_above_it() -> None:
+def test_a_ratio_needless_at_a_speed_is_needless_above_it() -> None:
     _, s = _start()
     assert not is_needless(s, 1.0)
     note_needless(s, 1e-3)
@@ -102,7 +102,7 @@ def test_the_ratio_never_falls_onto_the_edge_until_that_is_forgotten() -> None:
 
 
 @pytest.mark.parametrize("swing", [0.05, 0.1, 0.2])
-def test_the_ratio_rises_to_what_holds_a_swing_of_friction_and_stays(swing: float) -> None:
+def test_the_ratio_rises_until_it_holds_a_swing_of_friction_and_stays(swing: float) -> None:
     """Friction that falls by the swing is still held: (1 - swing) is more than the mean friction, over that at v_a = v_s."""
     p, s = _start()
     s.swing, s.even_s = swing, 0.2
@@ -125,7 +125,7 @@ def test_the_ratio_is_bounded_and_changes_no_faster_than_the_spring_follows() ->
 
 
 @pytest.mark.parametrize("ratio", [1.05, 1.2, 1.5, 2.4])
-def test_mean_friction_grows_with_the_slide_as_the_mean_relative_speed_says(ratio: float) -> None:
+def test_mean_friction_grows_with_slide_speed_by_the_mean_relative_speed(ratio: float) -> None:
     def friction(v_s: float) -> float:
         return v_s / float(np.abs(v_s + ratio * np.cos(np.linspace(0.0, 2.0 * np.pi, 100_001)[:-1])).mean())
 
@@ -133,7 +133,7 @@ def test_mean_friction_grows_with_the_slide_as_the_mean_relative_speed_says(rati
     assert grows(ratio) == pytest.approx(by, rel=0.01)
 
 
-def test_another_direction_is_as_the_one_that_is_known_until_it_says_otherwise() -> None:
+def test_an_unknown_direction_starts_from_the_ratio_of_the_known_direction() -> None:
     _, s = _start()
     note_needless(s, 1e-3)
     s.direction = -1
@@ -156,11 +156,11 @@ def test_the_distance_from_the_edge_doubles_with_every_failure() -> None:
     assert distances == pytest.approx([0.02, 0.04, 0.08, 0.16])
 
 
-def test_a_slip_that_comes_again_after_more_was_asked_for_is_told() -> None:
+def test_a_slip_that_repeats_after_a_raised_ratio_is_reported() -> None:
     _, s = _start()
-    for told in (False, False, True):
+    for reported in (False, False, True):
         note_lesson(s)
-        assert (s.reason == wire.CANNOT_HELP) == told
+        assert (s.reason == wire.CANNOT_HELP) == reported
     for _ in range(31):
         forget_failures(s, 1.0)
     assert s.reason == wire.HELD

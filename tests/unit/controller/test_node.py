@@ -1,4 +1,4 @@
-"""What a block does to the memory of the controller, without a bus."""
+"""The effect of a block on the controller's state, without a bus."""
 
 import pytest
 
@@ -6,12 +6,12 @@ from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import BLOCK, LATE, sealed, sensor_block
 from controller.node import ControllerNode
-from tests.unit.controller.test_process import CONFIG, block
+from tests.unit.controller.test_process import CONFIG, MS, block
 
 
 @pytest.mark.parametrize("lockstep", [False, True])
 def test_a_pause_makes_a_block_late_only_where_the_rig_does_not_wait(lockstep: bool) -> None:
-    """A late block changes what trips see: in lockstep the same run would have other bytes on a busy computer."""
+    """Late blocks are inputs of the trips: in lockstep they must not depend on how busy the computer is."""
     node = ControllerNode(CONFIG, lockstep)
     events: list[int] = []
     for number, arrival_ms in enumerate([1.0, 2.0, 103.0, 103.1]):
@@ -50,3 +50,45 @@ def test_a_block_that_was_changed_on_its_way_is_refused_and_counts_as_lost() -> 
     assert node.last_block == 1
     node.rig_was_away()
     assert node.block(block(2)) is not None
+
+
+def test_a_restarted_rig_is_accepted_after_eight_blocks() -> None:
+    node = ControllerNode(CONFIG)
+    for number in range(1000, 1300):
+        assert node.block(block(number), number * MS) is not None
+    assert node.block(block(1299 - 255), 1300 * MS) is None
+    assert node.duplicates == 1
+    answered = [node.block(block(number), (1400 + number) * MS) is not None for number in range(20)]
+    assert answered == [False] * 7 + [True] * 13
+    assert (node.restarts, node.strays, node.last_block) == (1, 0, 19)
+    assert node._trace[0]["gap_blocks"] == 0
+    assert node.t_ns == 20 * MS
+
+
+def test_a_rig_that_was_away_is_accepted_at_its_first_block() -> None:
+    node = ControllerNode(CONFIG)
+    for number in range(100):
+        node.block(block(number), number * MS)
+    node.rig_was_away()
+    assert node.block(block(0), 100 * MS) is not None
+    assert node.restarts == 1
+
+
+def test_blocks_of_another_length_are_refused() -> None:
+    node = ControllerNode(CONFIG)
+    node.block(block(0, 2.0))
+    node.block(block(3, 2.0))  # the length is unknown across a gap
+    node.stale(20)
+    for number in (4, 5):  # one jump of the clock does not count as another length
+        node.block(block(number, 2.0))
+    with pytest.raises(Fault, match=r"CONFIG: sensors: blocks are 2 ms apart: must be block_s = 0.001 s; set"):
+        node.block(block(6, 2.0))
+
+
+@pytest.mark.parametrize("wrong_mps", [float("nan"), float("inf"), -1e300])
+def test_an_announcement_of_an_invalid_velocity_is_refused(wrong_mps: float) -> None:
+    node = ControllerNode(CONFIG)
+    announced = wire.Announce(holds_from_ns=5, drive_velocity_mps=wrong_mps)
+    with pytest.raises(Fault, match=r"BAD_MESSAGE: announce: drive_velocity_mps"):
+        node.announcement(announced.SerializeToString())
+    assert node._state[0]["announced_count"] == 0

@@ -1,4 +1,4 @@
-"""The controller's process on a bus of its own making: rigs that begin anew, silence, and words that must not be missed."""
+"""The controller's process on a fake bus: lost, returning and silent rigs, floods, and the operator's commands."""
 
 import itertools
 import threading
@@ -28,7 +28,7 @@ JOIN_S = 20.0  # shorter than the 30 s after which a controller ends by itself w
 
 
 class FakeBus:
-    """Hands over what the test says, and keeps what the process sends."""
+    """Delivers the messages of a test to the process and keeps its messages."""
 
     def __init__(self) -> None:
         self.receive: dict[str, Callable[[Received], None]] = {}
@@ -58,11 +58,11 @@ class FakeBus:
         return {} if self.rig_header is None else dict.fromkeys(roles, self.rig_header)
 
     def leave(self) -> None:
-        """The rig says END and leaves."""
-        self.say(PLANT_EVENT, END)
+        """Publish END of the rig and take it off the bus."""
+        self.publish(PLANT_EVENT, END)
         self.rig_left = True
 
-    def say(self, topic: Topic, payload: bytes, arrival_ns: int = 0) -> None:
+    def publish(self, topic: Topic, payload: bytes, arrival_ns: int = 0) -> None:
         self.receive[topic.name](Received(topic, payload, arrival_ns))
 
     def events(self) -> list[wire.Event]:
@@ -92,7 +92,7 @@ def process() -> tuple[Any, FakeBus]:
 
 @pytest.fixture(autouse=True)
 def never_stalled(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A stall of the test's computer is no stall of the controller; a test of stalls replaces this."""
+    """Hide stalls of the test's computer from the controller; a test of stalls replaces this."""
     monkeypatch.setattr(realtime, "was_paused", lambda *_: False)
 
 
@@ -101,56 +101,14 @@ END = wire.Event(source="plant", code="END").SerializeToString()
 STOP = wire.Operator(action=wire.Operator.STOP, who="test").SerializeToString()
 
 
-def test_a_rig_that_begins_anew_is_taken_up_again() -> None:
-    node = ControllerNode(CONFIG)
-    for number in range(1000, 1300):
-        assert node.block(block(number), number * MS) is not None
-    assert node.block(block(1299 - 255), 1300 * MS) is None
-    assert node.duplicates == 1
-    answered = [node.block(block(number), (1400 + number) * MS) is not None for number in range(20)]
-    assert answered == [False] * 7 + [True] * 13
-    assert (node.restarts, node.strays, node.last_block) == (1, 0, 19)
-    assert node._trace[0]["gap_blocks"] == 0
-    assert node.t_ns == 20 * MS
-
-
-def test_a_rig_that_came_back_is_taken_up_at_its_first_block() -> None:
-    node = ControllerNode(CONFIG)
-    for number in range(100):
-        node.block(block(number), number * MS)
-    node.rig_was_away()
-    assert node.block(block(0), 100 * MS) is not None
-    assert node.restarts == 1
-
-
-def test_blocks_of_another_length_are_refused() -> None:
-    node = ControllerNode(CONFIG)
-    node.block(block(0, 2.0))
-    node.block(block(3, 2.0))  # across a gap it cannot be told
-    node.stale(20)
-    for number in (4, 5):  # a clock that jumps once is no other length
-        node.block(block(number, 2.0))
-    with pytest.raises(Fault, match=r"CONFIG: sensors: blocks are 2 ms apart: must be block_s = 0.001 s; set"):
-        node.block(block(6, 2.0))
-
-
-@pytest.mark.parametrize("wrong_mps", [float("nan"), float("inf"), -1e300])
-def test_an_announcement_that_is_no_velocity_is_refused(wrong_mps: float) -> None:
-    node = ControllerNode(CONFIG)
-    said = wire.Announce(holds_from_ns=5, drive_velocity_mps=wrong_mps)
-    with pytest.raises(Fault, match=r"BAD_MESSAGE: announce: drive_velocity_mps"):
-        node.announcement(said.SerializeToString())
-    assert node._state[0]["announced_count"] == 0
-
-
 def test_a_repeated_block_is_not_fresh() -> None:
     controller, bus = process()
     stop = threading.Event()
     thread = threading.Thread(target=controller.loop, args=(stop, ""), daemon=True)
-    bus.say(SENSORS, block(0))
+    bus.publish(SENSORS, block(0))
     thread.start()
     wait_for(lambda: "STALE" in bus.codes())
-    bus.say(SENSORS, block(0))
+    bus.publish(SENSORS, block(0))
     wait_for(lambda: controller._node.duplicates == 1)
     bus.leave()
     thread.join(JOIN_S)
@@ -158,16 +116,16 @@ def test_a_repeated_block_is_not_fresh() -> None:
 
 
 def test_a_stall_until_the_end_of_the_run_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It was published with FRESH alone, which does not come where the rig has left."""
+    """No FRESH follows where the rig has left, so PAUSED may not wait for it."""
     controller, bus = process()
     monkeypatch.setattr(realtime, "was_paused", lambda *_: True)
-    bus.say(SENSORS, block(0))
+    bus.publish(SENSORS, block(0))
     bus.leave()
     controller.loop(threading.Event(), "")
     assert bus.codes() == ["START", "PAUSED", "END"]
 
 
-def test_a_slip_of_a_drive_that_seems_to_stand_is_an_event() -> None:
+def test_a_slip_at_a_drive_that_seems_at_rest_is_an_event() -> None:
     controller, bus = process()
     chance = np.random.default_rng(1)
     for number in range(220):
@@ -175,26 +133,26 @@ def test_a_slip_of_a_drive_that_seems_to_stand_is_an_event() -> None:
         slid_s = np.clip(1e-3 * (number - 200) + 5e-5 * np.arange(20), 0.0, None)
         sensors["mass_position_m"] = 0.02 * slid_s + chance.normal(0.0, 5e-7, 20)
         sensors["drive_force_N"] = 10.0 - 11700.0 * 0.02 * slid_s + chance.normal(0.0, 0.02, 20)
-        bus.say(SENSORS, sensors.tobytes())
+        bus.publish(SENSORS, sensors.tobytes())
     bus.leave()
     controller.loop(threading.Event(), "")
     assert bus.codes() == ["START", "DRIVE_UNSEEN", "END"]
 
 
-def wait_for(true: Callable[[], bool]) -> None:
+def wait_for(holds: Callable[[], bool]) -> None:
     until_s = time.monotonic() + PATIENCE_S
     while time.monotonic() < until_s:
-        if true():
+        if holds():
             return
         time.sleep(0.001)
     pytest.fail(f"did not come within {PATIENCE_S:g} s")
 
 
-def say_blocks_until(bus: FakeBus, code: str, first: int) -> None:
+def publish_blocks_until(bus: FakeBus, code: str, first: int) -> None:
     numbers = itertools.count(first)
 
     def came() -> bool:
-        bus.say(SENSORS, block(next(numbers)))
+        bus.publish(SENSORS, block(next(numbers)))
         return code in bus.codes()
 
     wait_for(came)
@@ -202,7 +160,7 @@ def say_blocks_until(bus: FakeBus, code: str, first: int) -> None:
 
 def test_without_blocks_the_command_ramps_at_the_slew_limit() -> None:
     controller, bus = process()
-    bus.say(SENSORS, block(0))
+    bus.publish(SENSORS, block(0))
     controller._node._state["allowed_m"] = 3e-8
     controller._node._state["allowed_Hz"] = 2600.0
     thread = threading.Thread(target=controller.loop, args=(threading.Event(), ""), daemon=True)
@@ -219,12 +177,12 @@ def test_without_blocks_the_command_ramps_at_the_slew_limit() -> None:
 def test_a_stop_is_taken_however_full_the_inbox_is() -> None:
     controller, bus = process()
     for number in range(WAITING + 44):
-        bus.say(SENSORS, block(number))
-    bus.say(OPERATOR, STOP)
+        bus.publish(SENSORS, block(number))
+    bus.publish(OPERATOR, STOP)
     bus.leave()
     stop = threading.Event()
     timer = threading.Timer(PATIENCE_S, stop.set)
-    timer.start()  # were the plant's END dropped, it would never come back
+    timer.start()  # ends the loop if the END of the plant is dropped
     controller.loop(stop, "")
     timer.cancel()
     assert controller._inbox.dropped == 44
@@ -236,10 +194,10 @@ def test_a_rig_that_repeats_its_last_block_is_stale() -> None:
     controller._node._state["allowed_m"] = 3e-8
     controller._node._state["allowed_Hz"] = 2600.0
     thread = threading.Thread(target=controller.loop, args=(threading.Event(), ""), daemon=True)
-    bus.say(SENSORS, block(0))
+    bus.publish(SENSORS, block(0))
     thread.start()
     for _ in range(2000):
-        bus.say(SENSORS, block(0))
+        bus.publish(SENSORS, block(0))
         if bus.sent[COMMAND.name] and commanded_m(bus)[-1] == 0.0:
             break
         time.sleep(0.001)
@@ -255,10 +213,10 @@ def commanded_m(bus: FakeBus) -> list[float]:
 
 
 @pytest.mark.parametrize("why", ["stop", "fault"])
-def test_who_leaves_takes_the_amplitude_down_first(why: str) -> None:
+def test_a_leaving_controller_ramps_the_amplitude_down_first(why: str) -> None:
     controller, bus = process()
     stop = threading.Event()
-    bus.say(SENSORS, block(1000))
+    bus.publish(SENSORS, block(1000))
     controller._node._state["allowed_m"] = 3e-8
     controller._node._state["allowed_Hz"] = 2600.0
     if why == "stop":
@@ -268,7 +226,7 @@ def test_who_leaves_takes_the_amplitude_down_first(why: str) -> None:
         timer.join()
     else:
         for number in (1001, 1002, 1003, 1004):
-            bus.say(SENSORS, block(number, 2.0))
+            bus.publish(SENSORS, block(number, 2.0))
         with pytest.raises(Fault, match="CONFIG: sensors: blocks are 2 ms apart"):
             controller.loop(stop, "")
     assert commanded_m(bus)[0] == pytest.approx(2.9e-8)
@@ -276,14 +234,14 @@ def test_who_leaves_takes_the_amplitude_down_first(why: str) -> None:
     assert max(abs(np.diff(commanded_m(bus)))) < 1.001e-9
 
 
-def test_samples_that_are_no_numbers_are_said_once() -> None:
+def test_samples_of_nan_are_reported_once() -> None:
     controller, bus = process()
     for number in range(30):
         made = sensor_block(20).blank()
         made["sequence"], made["t_ns"] = number, (number + 1) * 1_000_000
         if number in {2, 3}:
             made["base_accel_mps2"][0, 7] = np.nan
-        bus.say(SENSORS, made.tobytes())
+        bus.publish(SENSORS, made.tobytes())
     bus.leave()
     controller.loop(threading.Event(), "")
     assert bus.codes() == ["START", "NOT_FINITE", "FRESH", "END"]
@@ -294,39 +252,39 @@ def test_a_controller_in_lockstep_refuses_a_rig_that_does_not_wait() -> None:
     bus: Any = FakeBus()
     controller = ControllerProcess(CONFIG, ControllerNode(CONFIG), bus, lockstep=True)
     controller.prepare()
-    bus.say(PLANT_EVENT, wire.Event(source="plant", code="START", text="SCHED_FIFO 50").SerializeToString())
+    bus.publish(PLANT_EVENT, wire.Event(source="plant", code="START", text="SCHED_FIFO 50").SerializeToString())
     with pytest.raises(Fault, match=r"CONFIG: event/plant: START 'SCHED_FIFO 50': must be 'lockstep'"):
         controller.loop(threading.Event(), "")
 
 
-def test_what_cannot_be_read_is_dropped_and_told_once_a_second() -> None:
+def test_undecodable_messages_are_dropped_and_reported_once_a_second() -> None:
     controller, bus = process()
-    bus.say(SENSORS, block(0))
+    bus.publish(SENSORS, block(0))
     for number in range(1, 50):
-        bus.say(SENSORS, b"\xff" * 12)
-        bus.say(SENSORS, block(number))
-        bus.say(OPERATOR, b"\x08\x07")
-    bus.say(ANNOUNCE, b"\xff" * (1 << 17))
+        bus.publish(SENSORS, b"\xff" * 12)
+        bus.publish(SENSORS, block(number))
+        bus.publish(OPERATOR, b"\x08\x07")
+    bus.publish(ANNOUNCE, b"\xff" * (1 << 17))
     bus.leave()
     controller.loop(threading.Event(), "")
     assert len(bus.sent[COMMAND.name]) == 50
-    told = [(event.code, event.text) for event in bus.events()]
-    assert [code for code, _ in told] == ["START", *["BAD_MESSAGE"] * 5, "END"]
+    reported = [(event.code, event.text) for event in bus.events()]
+    assert [code for code, _ in reported] == ["START", *["BAD_MESSAGE"] * 5, "END"]
     assert (
-        told[1][1]
+        reported[1][1]
         == "sensors: 12 bytes cannot be decoded as SensorBlock; see bridge/wire/PROTOCOL.md for its fields: dropped"
     )
-    assert told[2][1] == "operator: action = 7: not known: dropped"
-    assert told[3][1].startswith("announce: a message of more than 65536 bytes: a Announce must be shorter")
-    assert told[4][1].endswith("(48 times, 49 in all)")
+    assert reported[2][1] == "operator: action = 7: not known: dropped"
+    assert reported[3][1].startswith("announce: a message of more than 65536 bytes: a Announce must be shorter")
+    assert reported[4][1].endswith("(48 times, 49 in all)")
 
 
-def test_strangers_blocks_are_dropped_and_told() -> None:
+def test_blocks_of_foreign_senders_are_dropped_and_reported() -> None:
     controller, bus = process()
     for number in range(60):
-        bus.say(SENSORS, block(number))
-        for strange in (2**62, number + 10**6, max(number - 1, 0)):
-            bus.say(SENSORS, block(strange))
+        bus.publish(SENSORS, block(number))
+        for foreign in (2**62, number + 10**6, max(number - 1, 0)):
+            bus.publish(SENSORS, block(foreign))
     bus.leave()
     controller.loop(threading.Event(), "")
     assert [commanded.block for commanded in bus.commands()] == list(range(60))
@@ -336,25 +294,25 @@ def test_strangers_blocks_are_dropped_and_told() -> None:
     assert {"FOREIGN", "REPEATED", "END"} <= set(codes)
 
 
-def test_an_end_of_a_rig_that_stays_ends_nobody() -> None:
+def test_an_end_does_not_end_the_controller_while_the_rig_stays() -> None:
     controller, bus = process()
     thread = threading.Thread(target=controller.loop, args=(threading.Event(), ""), daemon=True)
-    bus.say(SENSORS, block(0))
+    bus.publish(SENSORS, block(0))
     thread.start()
-    bus.say(PLANT_EVENT, END)
-    say_blocks_until(bus, "FOREIGN", 1)
+    bus.publish(PLANT_EVENT, END)
+    publish_blocks_until(bus, "FOREIGN", 1)
     assert thread.is_alive()
     bus.leave()
     thread.join(JOIN_S)
     assert not thread.is_alive()
 
 
-def test_a_rig_that_leaves_without_an_end_is_waited_for_and_told_rightly() -> None:
+def test_a_rig_that_leaves_without_an_end_is_reported_and_waited_for() -> None:
     controller, bus = process()
     stop = threading.Event()
     thread = threading.Thread(target=controller.loop, args=(stop, ""), daemon=True)
     for number in range(1000, 1003):
-        bus.say(SENSORS, block(number))
+        bus.publish(SENSORS, block(number))
     thread.start()
     wait_for(lambda: len(bus.sent[COMMAND.name]) > 2)
     bus.rig_left = True
@@ -362,7 +320,7 @@ def test_a_rig_that_leaves_without_an_end_is_waited_for_and_told_rightly() -> No
     lost = next(event for event in bus.events() if event.code == "RIG_LOST")
     assert lost.text == "the rig left the bus; last block at 1.003 s; waiting for it for 30 s"
     bus.rig_left, bus.times_came = False, 2
-    say_blocks_until(bus, "FRESH", 0)
+    publish_blocks_until(bus, "FRESH", 0)
     stop.set()
     thread.join(JOIN_S)
     codes = bus.codes()
@@ -374,47 +332,47 @@ def test_another_rig_in_the_place_of_the_first_is_refused() -> None:
     bus.rig_header = wire.Header(
         role="plant", schema_version=2, configuration='{"rig": {"solver": {"block_s": 0.001, "samples_per_block": 40}}}'
     )
-    found = list[Fault]()
+    faults = list[Fault]()
 
     def loop() -> None:
         try:
             controller.loop(threading.Event(), "")
         except Fault as fault:
-            found.append(fault)
+            faults.append(fault)
 
     thread = threading.Thread(target=loop, daemon=True)
     thread.start()
     for at_ms, number in enumerate([*range(1000, 1030), *range(30)]):
-        bus.say(SENSORS, block(number), (at_ms if number >= 1000 else 1000 + at_ms) * MS)
+        bus.publish(SENSORS, block(number), (at_ms if number >= 1000 else 1000 + at_ms) * MS)
     assert bus.asked.wait(PATIENCE_S)
     wait_for(lambda: bool(controller._rig_again._refusal))
-    bus.say(SENSORS, block(30), 2000 * MS)
+    bus.publish(SENSORS, block(30), 2000 * MS)
     thread.join(JOIN_S)
     assert (
-        str(found[0])
+        str(faults[0])
         == "CONFIG: header/plant: rig.solver.samples_per_block = 40: must be controller.samples_per_block = 20; "
         "set both to the same number"
     )
 
 
-def test_a_clock_that_jumps_is_told() -> None:
+def test_a_jump_of_the_clock_is_reported() -> None:
     controller, bus = process()
     for number in range(30):
         made = np.frombuffer(bytearray(block(number)), sensor_block(20).dtype)
         made["t_ns"] += 3_600_000 * MS if number >= 10 else 0
-        bus.say(SENSORS, made.tobytes())
+        bus.publish(SENSORS, made.tobytes())
     bus.leave()
     controller.loop(threading.Event(), "")
     assert bus.codes() == ["START", "CLOCK", "END"]
     assert "sensors: block 10: t_ns is 3.6e+06 ms off the block number" in bus.events()[1].text
 
 
-def test_a_flood_of_an_operators_words_is_obeyed_and_answered_sparsely() -> None:
+def test_a_flood_of_stops_is_applied_and_answered_sparsely() -> None:
     controller, bus = process()
-    bus.say(SENSORS, block(0))
+    bus.publish(SENSORS, block(0))
     for _ in range(1000):
-        bus.say(OPERATOR, STOP)
-    bus.say(SENSORS, block(1))
+        bus.publish(OPERATOR, STOP)
+    bus.publish(SENSORS, block(1))
     bus.leave()
     controller.loop(threading.Event(), "")
     assert bus.codes().count("OPERATOR") == 1

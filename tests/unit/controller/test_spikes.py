@@ -1,4 +1,4 @@
-"""A sample that stands alone says nothing; a step, a kink and noise are what they are."""
+"""A single outlier is replaced; a step, a kink and noise are kept."""
 
 import math
 from typing import Any
@@ -50,7 +50,7 @@ def ear() -> Ear:
 
 @pytest.mark.parametrize("at", [0, 1, 7, SAMPLES - 2, SAMPLES - 1])
 @pytest.mark.parametrize("off_N", [5.0, -5.0, 1e6, 3e38])
-def test_a_sample_that_stands_alone_is_replaced(ear: Ear, at: int, off_N: float) -> None:
+def test_a_single_outlier_is_replaced(ear: Ear, at: int, off_N: float) -> None:
     force_N = ear.quiet()
     without_N = force_N.sum()
     force_N[at] += off_N
@@ -79,7 +79,7 @@ def test_noise_has_no_spikes(ear: Ear) -> None:
 
 @pytest.mark.parametrize("at", [1, 2, 10, SAMPLES - 2])
 @pytest.mark.parametrize("shape", ["step", "kink", "two"])
-def test_what_stays_is_no_spike(ear: Ear, shape: str, at: int) -> None:
+def test_a_change_that_lasts_is_kept(ear: Ear, shape: str, at: int) -> None:
     n = np.arange(SAMPLES)
     more_N = {"step": 5.0 * (n >= at), "kink": 5.0 * np.maximum(n - at, 0), "two": 5.0 * ((n == at) | (n == at + 1))}[
         shape
@@ -91,7 +91,7 @@ def test_what_stays_is_no_spike(ear: Ear, shape: str, at: int) -> None:
     assert ear.s.spiked == 0 or shape == "two"
 
 
-def test_a_vibration_is_no_spike_and_becomes_what_is_known(ear: Ear) -> None:
+def test_a_vibration_is_kept_and_becomes_the_known_noise(ear: Ear) -> None:
     wave_N = 5.0 * np.sin(2.0 * math.pi * 0.2 * np.arange(SAMPLES))
     known = ear.s.bends[FORCE]
     for _ in range(6):

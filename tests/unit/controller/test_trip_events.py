@@ -1,4 +1,4 @@
-"""What a controller says of its trips, and that late blocks are seen."""
+"""Events of the controller's trips, and detection of late blocks."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,7 +18,7 @@ from tests.closed_loop.sensor_faults import suffer
 MS_NS = 1_000_000
 
 
-def told(reasons: Sequence[int], limits: Sequence[int]) -> list[tuple[str, str]]:
+def events_of(reasons: Sequence[int], limits: Sequence[int]) -> list[tuple[str, str]]:
     trace = TRACE.blank(len(reasons))
     trace["t_ns"] = np.arange(len(reasons)) * MS_NS
     trace["reason"], trace["limit"] = reasons, limits
@@ -26,17 +26,19 @@ def told(reasons: Sequence[int], limits: Sequence[int]) -> list[tuple[str, str]]
     return [event for row in changes(trace) for event in events.news(trace[row])]
 
 
-def test_a_trip_is_told_once_and_its_end_too() -> None:
-    said = told([wire.HELD] * 5 + [wire.OPEN_LOOP] * 300 + [wire.HELD] * 5, [wire.NO_LIMIT] * 310)
-    assert [code for code, _ in said] == ["OPEN_LOOP", "CLEARED"]
-    assert said[0][1].startswith("failure: far less v_a than commanded")
+def test_a_trip_and_its_end_are_reported_once() -> None:
+    reported = events_of([wire.HELD] * 5 + [wire.OPEN_LOOP] * 300 + [wire.HELD] * 5, [wire.NO_LIMIT] * 310)
+    assert [code for code, _ in reported] == ["OPEN_LOOP", "CLEARED"]
+    assert reported[0][1].startswith("failure: far less v_a than commanded")
 
 
-def test_a_limit_is_told_once_it_has_held_for_a_while() -> None:
+def test_a_limit_is_reported_once_it_has_held_for_a_while() -> None:
     short, long = [wire.GAIN_LIMIT] * 100, [wire.GAIN_LIMIT] * 250
-    assert told([wire.HELD] * 110, [*short, *[wire.NO_LIMIT] * 10]) == []
-    assert [code for code, _ in told([wire.HELD] * 250, long)] == ["GAIN_LIMIT"]
-    assert told([wire.HELD] * 250, [wire.RANGE] * 250)[0][1].startswith("amplitude limited by limits.amplitude_max_m")
+    assert events_of([wire.HELD] * 110, [*short, *[wire.NO_LIMIT] * 10]) == []
+    assert [code for code, _ in events_of([wire.HELD] * 250, long)] == ["GAIN_LIMIT"]
+    assert events_of([wire.HELD] * 250, [wire.RANGE] * 250)[0][1].startswith(
+        "amplitude limited by limits.amplitude_max_m"
+    )
 
 
 def test_every_trip_is_an_event_with_a_letter() -> None:

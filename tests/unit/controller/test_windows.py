@@ -1,4 +1,4 @@
-"""Slopes in windows of every length, and their noise as it is measured."""
+"""Slopes in windows of every length, and their measured noise."""
 
 import math
 from typing import Any
@@ -78,7 +78,7 @@ def test_hum_is_in_the_noise_of_the_windows_that_see_it() -> None:
     assert s.noise[FORCE, half_a_period] > 5.0 * _of_white(p, 0.02, half_a_period)
 
 
-def test_a_signal_that_stands_within_a_step_is_not_known_better_than_the_step() -> None:
+def test_a_constant_signal_is_known_no_better_than_its_resolution() -> None:
     p, s = _start()
     step_m = 1e-6
     note_steps(s, SLIDE, np.array([0.0, step_m, 3.0 * step_m], np.float32))
@@ -88,7 +88,7 @@ def test_a_signal_that_stands_within_a_step_is_not_known_better_than_the_step() 
         assert s.noise[SLIDE, level] == pytest.approx(0.29 * step_m / p.window_s[level], rel=1e-3)
 
 
-def test_the_noise_outlives_a_new_beginning_and_what_was_not_measured_does_not_count() -> None:
+def test_the_noise_survives_a_restart_and_missing_samples_do_not_count() -> None:
     p, s = _start()
     _push(p, s, np.random.default_rng(1).normal(0.0, 0.02, 10000))
     before = s.noise[FORCE, 2]
@@ -99,7 +99,7 @@ def test_the_noise_outlives_a_new_beginning_and_what_was_not_measured_does_not_c
 
 
 @pytest.mark.parametrize("known", [0, 1])
-def test_a_swing_of_the_slide_that_force_and_position_tell_alike_is_no_noise(known: int) -> None:
+def test_a_swing_of_the_slide_in_both_force_and_position_does_not_count_as_noise(known: int) -> None:
     """7 Hz of a fifth of 0.5 mm/s."""
     p, s = _start()
     s.stiffness_N_per_m, s.stiffness_learnt, s.allowed_m = 11700.0, known, 1e-8
@@ -115,14 +115,14 @@ def test_a_swing_of_the_slide_that_force_and_position_tell_alike_is_no_noise(kno
 
 
 def test_bins_added_together_are_as_bins_added_one_by_one() -> None:
-    p, one = _start()
+    p, single = _start()
     _, many = _start()
     chance = np.random.default_rng(4)
     for _ in range(300):
         count = int(chance.integers(1, MOST_FRESH + 1))
         bins = chance.normal(0.0, 1.0, (3, count))
-        _one_by_one(p, one, bins, True)
+        _one_by_one(p, single, bins, True)
         many.fresh[:, :count] = bins
         push(p, many, count, True)
         for name in ("bins", "slope", "slope_before", "pushed", "sigma"):
-            np.testing.assert_array_equal(many[name], one[name])
+            np.testing.assert_array_equal(many[name], single[name])

@@ -45,36 +45,36 @@ def _ask(follows: float, trend: float = 0.0, aside: float = 0.0, rounds: int = 1
         turn_rad = 2.0 * math.pi * s.wobble_s / s.wobble_period_s
         s.fast_mps = RATIO * SPEED_MPS * wobble_factor(s)
         late_rad = math.pi * (p.window_s[s.wobble_level] - p.block_s) / s.wobble_period_s
-        told = DEPTH * SMOOTHED * (follows * math.cos(turn_rad - late_rad) + aside * math.sin(turn_rad - late_rad))
-        s.slope[SLIDE, :] = SPEED_MPS * (1.0 + told) * (1.0 + trend * s.wobble_s / s.wobble_period_s)
+        expected = DEPTH * SMOOTHED * (follows * math.cos(turn_rad - late_rad) + aside * math.sin(turn_rad - late_rad))
+        s.slope[SLIDE, :] = SPEED_MPS * (1.0 + expected) * (1.0 + trend * s.wobble_s / s.wobble_period_s)
         answered += wobble(p, s, SPEED_MPS)
         blocks += 1
     assert blocks * p.block_s == pytest.approx(rounds * PERIODS * s.wobble_period_s, abs=2.0 * p.block_s)
     return s
 
 
-@pytest.mark.parametrize(("follows", "told"), [(0.7, EVEN), (0.98, EVEN), (1.06, FALLS), (1.2, FALLS)])
+@pytest.mark.parametrize(("follows", "expected"), [(0.7, EVEN), (0.98, EVEN), (1.06, FALLS), (1.2, FALLS)])
 @pytest.mark.parametrize("trend", [0.0, 0.01, -0.01])
-def test_a_slide_that_follows_by_more_than_its_share_tells_a_fall_of_friction(
-    follows: float, told: int, trend: float
+def test_a_slide_that_follows_by_more_than_its_share_shows_a_fall_of_friction(
+    follows: float, expected: int, trend: float
 ) -> None:
-    assert answer(_ask(follows, trend)) == told
+    assert answer(_ask(follows, trend)) == expected
 
 
 @pytest.mark.parametrize(("follows", "at_last"), [(1.013, EVEN), (1.03, FALLS)])
-def test_what_is_between_is_asked_on_and_then_judged(follows: float, at_last: int) -> None:
+def test_an_answer_between_both_limits_is_probed_further_and_then_judged(follows: float, at_last: int) -> None:
     assert answer(_ask(follows)) == UNSURE
     assert answer(_ask(follows, rounds=4)) == at_last
 
 
-@pytest.mark.parametrize(("share", "told"), [(0.98, EVEN), (1.06, FALLS)])
+@pytest.mark.parametrize(("share", "expected"), [(0.98, EVEN), (1.06, FALLS)])
 @pytest.mark.parametrize("late", [0.1, 0.2])
-def test_a_slide_that_its_mass_makes_late_follows_no_less(share: float, told: int, late: float) -> None:
+def test_a_slide_that_its_mass_makes_late_follows_no_less(share: float, expected: int, late: float) -> None:
     in_step = 1.0 / (1.0 + late * late)
-    assert answer(_ask(share * in_step, aside=share * late * in_step)) == told
+    assert answer(_ask(share * in_step, aside=share * late * in_step)) == expected
 
 
-def test_what_does_not_answer_in_step_is_no_answer() -> None:
+def test_a_response_out_of_step_does_not_count() -> None:
     assert answer(_ask(1.0, aside=0.5)) == FALLS
 
 

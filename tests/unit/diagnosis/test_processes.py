@@ -1,6 +1,6 @@
 """Linear algebra has one thread, or a diagnosis depends on how many cores there are."""
 
-import numpy as np  # noqa: F401  # what threadpoolctl finds is what is loaded
+import numpy as np  # noqa: F401  # threadpoolctl finds only loaded libraries
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 

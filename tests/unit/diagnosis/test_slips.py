@@ -1,4 +1,4 @@
-"""Counting slips: with noise, at a low rate, at low and high forces, and where there are none."""
+"""Counting slips: with noise, at a low rate, at low and high forces, and in records without slips."""
 
 import math
 
@@ -39,7 +39,7 @@ def test_every_slip_is_found_once_with_its_forces(rate_Hz, high_N, low_N, noise_
 
 @pytest.mark.parametrize("rate_Hz", [100, 20000])
 @pytest.mark.parametrize("level_N", [1.0, 15.0, 50.0])
-def test_noise_alone_is_no_slip(rate_Hz, level_N):
+def test_noise_alone_counts_as_no_slip(rate_Hz, level_N):
     for seed in range(5):
         noise_N = 0.02 * np.random.default_rng(seed).standard_normal(20 * rate_Hz)
         cycles = find_cycles(np.arange(20 * rate_Hz) / rate_Hz, level_N + noise_N)
@@ -51,14 +51,14 @@ def test_noise_alone_is_no_slip(rate_Hz, level_N):
         assert math.isnan(cycles.stick_s)
 
 
-def test_a_slow_fall_is_no_slip():
+def test_a_slow_fall_counts_as_no_slip():
     t_s = np.arange(20000) / 1000.0
     force_N = np.where(t_s < 3.0, 5.0 * t_s, 12.0 + 3.0 * np.exp(-(t_s - 3.0)))
     assert find_cycles(t_s, force_N).slips == 0
     assert find_cycles(t_s, force_N, slowest_fall_s=3.0).slips == 1
 
 
-def test_a_slow_fall_that_recovers_before_the_end_is_no_slip():
+def test_a_slow_fall_that_recovers_before_the_end_counts_as_no_slip():
     t_s = np.arange(9000) / 1000.0
     force_N = np.interp(t_s, [0.0, 3.0, 8.0, 9.0], [0.0, 10.0, 5.0, 9.6])
     assert find_cycles(t_s, force_N, minimum_drop_N=4.8).slips == 0

@@ -1,4 +1,4 @@
-"""The version of kept scores follows what an answer hangs on, and not the words around it."""
+"""The version of kept scores changes with code that changes answers, and not with comments and texts."""
 
 import pytest
 
@@ -55,12 +55,12 @@ def test_words_do_not_change_the_version(tmp_path, old, new):
     ("old", "new"),
     [("3.0", "3.1"), ("* LIMIT", "/ LIMIT"), ("chi2 = 0.0", "chi2 = 0"), ("-> float", "-> int"), ("0.1}", "0.2}")],
 )
-def test_what_is_computed_changes_the_version(tmp_path, old, new):
+def test_a_change_of_the_computation_changes_the_version(tmp_path, old, new):
     assert old in BEFORE
     assert digest(tmp_path / "a", fit=BEFORE) != digest(tmp_path / "b", fit=BEFORE.replace(old, new))
 
 
-def test_where_a_definition_stands_does_not_change_the_version(tmp_path):
+def test_the_place_of_a_definition_does_not_change_the_version(tmp_path):
     head, function = BEFORE.split("def slip")
     moved = digest(tmp_path / "b", fits__refit=head, fits__slips="def slip" + function)
     assert digest(tmp_path / "a", fit=BEFORE) == moved

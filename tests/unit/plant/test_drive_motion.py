@@ -50,7 +50,7 @@ def test_moves_against_their_closed_forms(distance_m: float, peak: float, second
 sizes = st.floats(1e-7, 1.0)
 moves = st.builds(
     Move,
-    st.one_of(sizes, sizes.map(lambda one: -one)),
+    st.one_of(sizes, sizes.map(lambda size: -size)),
     st.floats(1e-6, 1.0),
     st.floats(1e-4, 100.0),
     st.floats(1e-3, 1e5),
@@ -85,7 +85,7 @@ profiles = st.lists(st.tuples(st.floats(0.01, 2.0), st.floats(-0.1, 0.1)), min_s
 
 @settings(max_examples=100, deadline=None)
 @given(points=profiles, until_s=st.floats(0.0, 40.0), cycle=st.booleans())
-def test_the_reach_is_that_of_every_moment(points: list[tuple[float, float]], until_s: float, cycle: bool) -> None:
+def test_the_reach_covers_every_moment(points: list[tuple[float, float]], until_s: float, cycle: bool) -> None:
     motion = of_profile(points)
     if cycle:
         motion = again_and_again(motion, points[-1][0] + 0.5)
@@ -128,7 +128,7 @@ def test_a_day_of_cycles_ends_where_it_began_and_costs_no_memory() -> None:
     assert len(inputs.draw(64).velocity_mps) == 64
 
 
-def test_a_repeated_profile_begins_anew() -> None:
+def test_a_repeated_profile_restarts() -> None:
     stroke = "drive.profile=[[0.0, 0.0], [0.1, 0.002], [0.9, 0.002], [1.1, -0.002], [1.9, -0.002], [2.0, 0.0]]"
     config = load_rig("paper-c45-c45", [stroke, "drive.repeat_every_s=2.5"])
     held = drive_velocity_mps(config, np.arange(7500) * BLOCK_S).reshape(3, 2500)
@@ -174,7 +174,7 @@ def test_a_repeated_profile_begins_anew() -> None:
         (["rig.drive.moves=[{velocity_mps = 1.0, acceleration_mps2 = 1.0, jerk_mps3 = 1.0}]"], ["neither given"]),
     ],
 )
-def test_what_no_drive_or_sensor_does_is_told(given: list[str], parts: list[str]) -> None:
+def test_an_impossible_drive_or_sensor_setting_is_reported(given: list[str], parts: list[str]) -> None:
     with pytest.raises(Fault) as caught:
         load_scenario("from-the-start", given)
     assert all(part in caught.value.line for part in parts), caught.value.line

@@ -137,7 +137,7 @@ def test_a_bad_table_is_one_line_with_place_value_and_rule(text: str, words: lis
     assert "\n" not in caught.value.line
 
 
-def test_rigs_at_the_edge_of_what_can_be_stepped_are_taken(tmp_path: Path):
+def test_rigs_at_the_edge_of_stable_stepping_are_accepted(tmp_path: Path):
     assert loaded(tmp_path, "[slide]\nmass_kg = 0.0078\n").slide.mass_kg == 0.0078
     stiff = simulate(loaded(tmp_path, "[drive]\nstiffness_N_per_m = 1.48e9\n"), 0.3).drive_force_N
     # it swings about the Coulomb force, undamped, by v_d sqrt(k m) = 23.6 N at first

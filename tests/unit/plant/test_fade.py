@@ -16,7 +16,7 @@ from plant.node import PlantNode
 
 
 class Wire:
-    """Keeps what is sent."""
+    """Collects sent messages."""
 
     def __init__(self) -> None:
         self.sent: dict[str, list[bytes]] = {}
@@ -49,7 +49,7 @@ class Commanded(PlantNode):
 
 
 def left(node: Commanded, blocks: int, stop: threading.Event) -> Any:
-    """What was applied in each block, to the end of the process."""
+    """The applied amplitude of each block, to the end of the process."""
     bus: Any = Wire()
     process = PlantProcess(node, bus, None)
     if node.fails_at < blocks:
@@ -86,7 +86,7 @@ def test_a_stall_that_no_command_follows_is_reported_at_the_end() -> None:
     assert events[0].text.startswith("this rig stalled for 0.30 s")
 
 
-def test_a_controller_of_another_run_moves_nothing_and_is_told() -> None:
+def test_a_controller_of_another_run_moves_nothing_and_is_reported() -> None:
     node = Commanded(load_rig("paper-c45-c45", []), 1, arm=True)
     node.run_of_controller = 2
     bus: Any = Wire()

@@ -1,4 +1,4 @@
-"""A person's order to a running rig."""
+"""Fault orders of an operator to a running rig."""
 
 import json
 from typing import Any
@@ -30,14 +30,14 @@ def test_an_order_acts_from_its_block_on_and_is_taken_once() -> None:
     orders = Orders(made)
     for _ in range(3):
         orders.take(order(OFF, id="a"), 5)
-    told: list[str] = []
+    reported: list[str] = []
     for block in range(4, 9):
         made.begin_block(block)
-        told += [f"{block} {code}" for code, _ in made.news()]
-    assert told == ["5 INJECTED", "7 INJECTION_ENDED"]
+        reported += [f"{block} {code}" for code, _ in made.news()]
+    assert reported == ["5 INJECTED", "7 INJECTION_ENDED"]
 
 
-def test_clear_ends_what_acts_and_what_is_to_come() -> None:
+def test_clear_ends_present_and_future_faults() -> None:
     made = faults()
     orders = Orders(made)
     orders.take(order(OFF | {"for_s": 0.0}, id="a"), 1)
@@ -63,7 +63,7 @@ def test_clear_ends_what_acts_and_what_is_to_come() -> None:
         (order({"kind": "jump", "target": "clock", "value": -1e200}), "value = -1e.200: must be -1e.09 to 1e.09"),
     ],
 )
-def test_what_is_no_order_is_refused(payload: bytes, line: str) -> None:
+def test_an_invalid_order_is_refused(payload: bytes, line: str) -> None:
     made = faults()
     with pytest.raises(Fault, match=line):
         Orders(made).take(payload, 1)

@@ -1,4 +1,4 @@
-"""What each kind of fault does to samples, to the exciter's numbers, to times, and to messages on their way."""
+"""Effects of each kind of fault on samples, exciter numbers, times and messages in transit."""
 
 import math
 from typing import Any
@@ -75,7 +75,7 @@ def test_a_sensor_fails_from_its_block_on(kind: str, more: dict[str, Any], expec
     np.testing.assert_allclose(shown[80:], expected, rtol=1e-6)
 
 
-def test_what_was_delayed_comes_in_order() -> None:
+def test_delayed_messages_arrive_in_order() -> None:
     shown = blocks(faults(table("delayed", "drive_force_N", from_s=0.004, value=1.5e-3)), 8)
     np.testing.assert_array_equal(shown[110:], CLEAN[80:130])
     assert set(shown[80:110]) == {80.0}
@@ -116,11 +116,11 @@ def test_a_fault_of_all_sensors_takes_each_channel() -> None:
 
 def test_begin_and_end_are_news_once_and_the_rig_is_whole_again() -> None:
     made = faults(table("scaled", "drive_force_N", from_s=0.001, for_s=0.002, value=2.0, name="twice"))
-    told: list[tuple[str, str]] = []
+    reported: list[tuple[str, str]] = []
     for block in range(5):
         made.begin_block(block)
-        told += made.news()
-    assert told == [(BEGAN, "twice: drive_force_N scaled 2 for 0.002 s"), (ENDED, "twice: drive_force_N scaled 2")]
+        reported += made.news()
+    assert reported == [(BEGAN, "twice: drive_force_N scaled 2 for 0.002 s"), (ENDED, "twice: drive_force_N scaled 2")]
     assert not made.busy
 
 
@@ -180,7 +180,7 @@ def arrivals(kind: str, count: int = 6, **more: Any) -> list[list[bytes]]:
     for block in range(count):
         made.begin_block(block)
         sent = [Message(bytes([block]))] if block < 4 else []
-        arrived.append([one.payload for one in made.on_the_way("commands", sent, block)])
+        arrived.append([message.payload for message in made.on_the_way("commands", sent, block)])
     return arrived
 
 
@@ -223,7 +223,7 @@ def test_a_share_of_the_messages_is_lost_and_corrupted_bytes_are_others() -> Non
     assert all(one.payload != payload and 0 < len(one.payload) <= len(payload) for one in came)
 
 
-def test_forged_messages_are_those_of_nobody() -> None:
+def test_forged_messages_carry_another_run_and_a_far_sequence() -> None:
     made = faults(table("forged", "link"))
     made.begin_block(0)
     command = wire.Command(sequence=1, block=2, run=5, frequency_Hz=3.0).SerializeToString()
@@ -239,28 +239,28 @@ def test_forged_messages_are_those_of_nobody() -> None:
     ("given", "line"),
     [
         ({"kind": "off", "target": "motor"}, "target = motor: no such target; known: drive_force_N"),
-        ({"kind": "late", "target": "exciter"}, "kind = late: must fit target = exciter; known there: weak"),
+        ({"kind": "late", "target": "exciter"}, "kind = late: must fit target = exciter; known for it: weak"),
         ({"kind": "scaled", "target": "drive_force_N"}, "value: missing; add it for kind = scaled: factor"),
         ({"kind": "dead", "target": "exciter", "value": 1.0}, "value = 1: kind = dead has none; leave it out"),
         ({"kind": "nan", "target": "sensors", "value": 2.0}, "value = 2: must be 0 to 1 for kind = nan"),
-        ({"kind": "swapped", "target": "drive_force_N"}, "other = '': goes with kind = swapped alone"),
+        ({"kind": "swapped", "target": "drive_force_N"}, "other = '': needed for kind = swapped, and only there"),
         (
             {"kind": "swapped", "target": "drive_force_N", "other": "x"},
             "other = x: must be another channel than target",
         ),
-        ({"kind": "held", "target": "blocks"}, "for_s = 0: held messages must arrive some time; give for_s"),
-        ({"kind": "frozen", "target": "controller"}, "for_s = 0: a frozen process must continue some time"),
+        ({"kind": "held", "target": "blocks"}, "for_s = 0: held messages must arrive at some time; give for_s"),
+        ({"kind": "frozen", "target": "controller"}, "for_s = 0: a frozen process must continue at some time"),
     ],
 )
-def test_a_table_that_is_none_says_why(given: dict[str, Any], line: str) -> None:
-    with pytest.raises(Fault, match="CONFIG") as told:
+def test_an_invalid_table_is_refused_with_the_reason(given: dict[str, Any], line: str) -> None:
+    with pytest.raises(Fault, match="CONFIG") as reported:
         validate(FaultTable, given, "scenario.toml")
-    assert f"scenario.toml: {line}" in told.value.line
+    assert f"scenario.toml: {line}" in reported.value.line
 
 
 def test_every_kind_of_a_sensor_is_made() -> None:
-    for one in ALL:
-        if one.group == SENSORS:
-            more = {"other": "mass_accel_mps2"} if one.kind == "swapped" else {}
-            value = {"value": 0.5} if one.value else {}
-            blocks(faults(table(one.kind, "drive_force_N", **more, **value)), 2)
+    for kind in ALL:
+        if kind.group == SENSORS:
+            more = {"other": "mass_accel_mps2"} if kind.kind == "swapped" else {}
+            value = {"value": 0.5} if kind.value else {}
+            blocks(faults(table(kind.kind, "drive_force_N", **more, **value)), 2)

@@ -19,7 +19,7 @@ from plant.node import PlantNode
 
 
 def rig(*settings: str):
-    # The amplitude tells which command acts, and grows beyond all sense
+    # The amplitude identifies the command that acts; it grows beyond the exciter's range
     free = "guard.loud_ratio={alarm=1e9,abort=1e9}"
     slewing = ["piezo.amplitude_slew_m_per_s=0.0", "piezo.amplitude_max_m=0.001"]
     return load_rig("paper-c45-c45", [free, *slewing, *settings])
@@ -39,7 +39,7 @@ def acting(node: PlantNode, blocks: int) -> np.ndarray:
     for block in range(blocks):
         applied = APPLIED.read(node.advance(commands)[1].payload, "applied")[0]
         number = -1 if applied.command_block == NO_BLOCK else int(applied.command_block)
-        assert applied.amplitude_m == pytest.approx(1e-9 * (number + 1))  # what is told to act is what acts
+        assert applied.amplitude_m == pytest.approx(1e-9 * (number + 1))  # the named command acts
         assert not applied.fallback or number == -1
         result.append(number)
         commands = [command(block)]
@@ -87,7 +87,7 @@ def test_noise_and_jitter_are_the_same_however_they_are_drawn() -> None:
     assert np.array_equal(at_once, np.concatenate(parts))
 
 
-def test_a_rig_that_lets_go_forgets_what_is_on_its_way() -> None:
+def test_a_rig_that_lets_go_drops_commands_in_transit() -> None:
     node = PlantNode(rig("loop.delay_s=0.02"), 1, arm=True)
     acting(node, 10)
     node.let_go()
@@ -97,7 +97,7 @@ def test_a_rig_that_lets_go_forgets_what_is_on_its_way() -> None:
         assert applied.fallback == 1
 
 
-def test_the_line_holds_what_the_longest_delay_needs() -> None:
+def test_the_delay_line_holds_the_longest_delay() -> None:
     longest = rig(
         "loop.delay_s=0.2", "loop.jitter_s=0.1", "solver.block_s=0.00025", "solver.samples_per_block=5",
         "piezo.command_timeout_s=1.0",
@@ -108,7 +108,7 @@ def test_the_line_holds_what_the_longest_delay_needs() -> None:
     assert found[-1] > 3000 - LINE
 
 
-# Blocks of another number of samples than those of all other tests compile plant and controller once more, 27 s of CPU: that
+# Blocks of a number of samples that no other test uses compile plant and controller once more, 27 s of CPU: that
 # kernels are kept for two lengths of a block is tested in test_kernel.py, and the plant's alone with other lengths above.
 @pytest.mark.parametrize("samples", [20, pytest.param(10, marks=pytest.mark.nightly)])
 def test_delay_and_jitter_make_the_same_tables_in_one_process_and_block_by_block(tmp_path: Path, samples: int) -> None:
@@ -155,7 +155,7 @@ def test_delay_and_jitter_make_the_same_tables_in_one_process_and_block_by_block
         (["rig.solver.block_s=0.021"], ["rig.solver.block_s = 0.021", "less than or equal to 0.02"]),
     ],
 )
-def test_what_does_not_fit_is_told(settings: list[str], parts: list[str]) -> None:
+def test_incompatible_settings_are_reported(settings: list[str], parts: list[str]) -> None:
     with pytest.raises(Fault) as caught:
         load_scenario("from-the-start", settings)
     assert all(part in caught.value.line for part in parts), caught.value.line

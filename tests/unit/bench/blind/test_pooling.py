@@ -1,4 +1,4 @@
-"""Scores kept in a file are made again from it, alone or with those of other sets."""
+"""Scores kept in a file are computed again from it, alone or pooled with other sets."""
 
 import gzip
 import json
@@ -29,10 +29,10 @@ CHI2 = {
 
 
 def opened_set(number: int) -> OpenedSet:
-    damped, found = ["drive-damping"], {"drive-damping": 0.8}
+    damped, probabilities = ["drive-damping"], {"drive-damping": 0.8}
     seed = 10 * number
     cases = [
-        case("one-effect", damped, found, name=f"a{number}", seed=seed, cells=CELLS, where=WHERE, **CHI2),
+        case("one-effect", damped, probabilities, name=f"a{number}", seed=seed, cells=CELLS, where=WHERE, **CHI2),
         case("no-gap", [], {"none": 0.9}, name=f"b{number}", seed=seed + 1),
         case("outside", ["loose-screw"], {"unexplained": 0.6, "none": 0.4}, name=f"c{number}", seed=seed + 2),
     ]
@@ -41,9 +41,9 @@ def opened_set(number: int) -> OpenedSet:
 
 
 def kept(folder: Path, number: int, **other) -> Path:
-    found = opened_set(number)._replace(**other)
+    sealed_set = opened_set(number)._replace(**other)
     path = folder / f"{number}.json"
-    write_json(path, kept_scores(found, scored(found)))
+    write_json(path, kept_scores(sealed_set, scored(sealed_set)))
     return path
 
 
@@ -53,9 +53,9 @@ def pool(*files):
 
 @pytest.mark.slow
 def test_scores_are_the_same_again(tmp_path):
-    found = opened_set(1)
-    assert scored(pooled([kept(tmp_path, 1)])) == scored(found)
-    without = found._replace(oracle=None, trees=None)
+    sealed_set = opened_set(1)
+    assert scored(pooled([kept(tmp_path, 1)])) == scored(sealed_set)
+    without = sealed_set._replace(oracle=None, trees=None)
     assert scored(pooled([kept(tmp_path, 2, oracle=None, trees=None)])).keys() == scored(without).keys()
 
 
@@ -82,11 +82,11 @@ def test_one_opened_set_makes_all_development_data(tmp_path):
     assert "DEVELOPMENT DATA" in pool(*files).stdout
 
 
-def test_what_was_not_asked_of_every_set_is_asked_of_none(tmp_path):
+def test_a_score_that_one_set_lacks_is_left_out_of_the_pool(tmp_path):
     assert "oracle" not in scored(pooled([kept(tmp_path, 1), kept(tmp_path, 2, oracle=None, trees=None)]))
 
 
-def test_what_cannot_be_pooled_is_refused(tmp_path):
+def test_files_that_cannot_be_pooled_are_refused(tmp_path):
     one = kept(tmp_path, 1)
 
     def refused(*files: Path) -> str:
@@ -95,7 +95,7 @@ def test_what_cannot_be_pooled_is_refused(tmp_path):
         return result.stderr
 
     again = tmp_path / "again.json"
-    again.write_text(one.read_text().replace('"a1"', '"d1"'))  # the same rigs, made anew
+    again.write_text(one.read_text().replace('"a1"', '"d1"'))  # the same rigs under new case names
     assert f"{again}: case d1 is in {one} too: must be in one; leave one file out" in refused(one, again)
     assert "results of the versions 1 and 2: must be of one" in refused(one, kept(tmp_path, 2, tool="2"))
     assert "No such file" in refused(tmp_path / "nothing.json")
@@ -113,7 +113,7 @@ def test_what_cannot_be_pooled_is_refused(tmp_path):
     assert f"{bad}: cases: 'answer' is missing" in refused(bad)
 
 
-def test_what_is_read_is_not_written_over(tmp_path):
+def test_an_input_file_is_not_overwritten(tmp_path):
     one = kept(tmp_path, 1)
     before = one.read_bytes()
     result = pool(one, "--json", one)

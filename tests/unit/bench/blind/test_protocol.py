@@ -1,4 +1,4 @@
-"""The blind protocol with stand-ins for generator and diagnosis: sealed, diagnosed without the answers, opened once."""
+"""The blind protocol with fake generator and diagnosis: sealed, diagnosed without the answers, opened once."""
 
 import json
 import os
@@ -61,19 +61,19 @@ def done(made):
 
 
 def answers(folder: Path) -> dict:
-    return {name: one["answer"] for name, one in json.loads((folder / "key.json").read_text())["cases"].items()}
+    return {name: case["answer"] for name, case in json.loads((folder / "key.json").read_text())["cases"].items()}
 
 
 def score(folder: Path, *options):
     return blind("score", folder / "set", "--key", folder / "key.json", *options)
 
 
-def test_nothing_in_the_set_tells(made):
+def test_nothing_in_the_set_reveals_the_answers(made):
     files = sorted(path for path in (made / "set").rglob("*") if path.is_file())
     key = json.loads((made / "key.json").read_text())["cases"]
     everything = b"".join(path.read_bytes() for path in files)
     telling = ["drive-backlash", "force-sensor-gain", "loose-screw", "no-gap", "stratum", "20011", "bump", 'effect"']
-    telling += [one["nonce"] for one in key.values()]
+    telling += [case["nonce"] for case in key.values()]
     for word in telling:
         assert word.encode() not in everything, word
     assert len({path.stat().st_mtime for path in (made / "set").rglob("*")}) == 1
@@ -88,14 +88,14 @@ def test_nothing_in_the_set_tells(made):
 
 
 def test_the_key_holds_every_kind_of_case(made):
-    found = answers(made)
-    assert {one["stratum"] for one in found.values()} == set(strata.SHARES) - {"real-log"}
-    single = next(one for one in found.values() if one["stratum"] == "one-effect")
+    by_name = answers(made)
+    assert {case["stratum"] for case in by_name.values()} == set(strata.SHARES) - {"real-log"}
+    single = next(case for case in by_name.values() if case["stratum"] == "one-effect")
     [effect] = single["effects"]
     assert effect["detectability"] == pytest.approx(min(effect["target"], 4.0 * 1.5), rel=0.25)
     assert single["cells"][0] == ["drive_force_N", "slip", "run-01.csv", 3.0]
-    assert next(one for one in found.values() if one["stratum"] == "no-gap")["effects"] == []
-    outside = next(one for one in found.values() if one["stratum"] == "outside")
+    assert next(case for case in by_name.values() if case["stratum"] == "no-gap")["effects"] == []
+    outside = next(case for case in by_name.values() if case["stratum"] == "outside")
     assert (outside["verdict"], outside["effects"][0]["name"]) == ("unexplained", "loose-screw")
 
 
@@ -104,10 +104,10 @@ def test_the_same_seed_makes_the_same_evidence_under_other_names(made, tmp_path)
     assert make(tmp_path, out=tmp_path / "again", key=tmp_path / "again.json").exit_code == 0
     first, again = sealing.read_set(made / "set"), sealing.read_set(tmp_path / "again")
     assert not first.keys() & again.keys()
-    assert sorted(one.evidence_sha256 for one in first.values()) == sorted(
-        one.evidence_sha256 for one in again.values()
+    assert sorted(case.evidence_sha256 for case in first.values()) == sorted(
+        case.evidence_sha256 for case in again.values()
     )
-    assert {one.answer_sha256 for one in first.values()}.isdisjoint(one.answer_sha256 for one in again.values())
+    assert {case.answer_sha256 for case in first.values()}.isdisjoint(case.answer_sha256 for case in again.values())
 
 
 @pytest.mark.slow
@@ -167,7 +167,7 @@ def test_a_making_is_taken_up_again(made, tmp_path, monkeypatch):
     def no_space(*_arguments, **_options):
         raise OSError(28, "No space left on device")
 
-    # the last step fails: nothing that was made is lost, and there is no key without a set
+    # the last step fails: the made cases are kept, and no key exists without its set
     for step in ("write_set", "write_key", "write_sizes"):
         with monkeypatch.context() as broken:
             broken.setattr(making, step, no_space)
@@ -178,8 +178,8 @@ def test_a_making_is_taken_up_again(made, tmp_path, monkeypatch):
     assert not part.exists()
     first, second = (sealing.read_set(tmp_path / name) for name in ("set", "again"))
     assert second.keys() == kept | set(again)
-    assert sorted(one.evidence_sha256 for one in first.values()) == sorted(
-        one.evidence_sha256 for one in second.values()
+    assert sorted(case.evidence_sha256 for case in first.values()) == sorted(
+        case.evidence_sha256 for case in second.values()
     )
     assert sealing.opened_answers(tmp_path / "again", tmp_path / "again.json")
 
@@ -194,20 +194,20 @@ def test_known_sizes_make_the_same_set_without_sizing(made, tmp_path, monkeypatc
     result = make(tmp_path, out=tmp_path / "same", key=tmp_path / "same.json")
     assert result.exit_code == 0, result.output
     first, second = (sealing.read_set(folder) for folder in (made / "set", tmp_path / "same"))
-    assert sorted(one.evidence_sha256 for one in first.values()) == sorted(
-        one.evidence_sha256 for one in second.values()
+    assert sorted(case.evidence_sha256 for case in first.values()) == sorted(
+        case.evidence_sha256 for case in second.values()
     )
     assert (tmp_path / "same.sizes.toml").read_bytes() == (made / "key.sizes.toml").read_bytes()
-    # who has the sizes has the answers but for their names
+    # the sizes reveal the answers except for the names, so the scores are development data
     assert blind("run", tmp_path / "same", "--jobs", 1).exit_code == 0
     assert "DEVELOPMENT DATA" in blind("score", tmp_path / "same", "--key", tmp_path / "same.json").stdout
 
 
 def test_that_a_set_was_published_is_sealed_too(made, tmp_path):
-    said = json.loads((made / "key.json").read_text())
-    assert {secret["answer"]["published"] for secret in said["cases"].values()} == {False}
-    next(iter(said["cases"].values()))["answer"]["published"] = True
-    (tmp_path / "other.json").write_text(json.dumps(said))
+    key_table = json.loads((made / "key.json").read_text())
+    assert {secret["answer"]["published"] for secret in key_table["cases"].values()} == {False}
+    next(iter(key_table["cases"].values()))["answer"]["published"] = True
+    (tmp_path / "other.json").write_text(json.dumps(key_table))
     assert blind("score", made / "set", "--key", tmp_path / "other.json").exit_code == FAULTS["SEAL_BROKEN"].exit_status
 
 
@@ -232,7 +232,7 @@ def test_a_run_is_taken_up_again(made):
 
 
 @pytest.mark.slow
-def test_a_killed_run_keeps_what_is_done(made):
+def test_a_killed_run_keeps_finished_cases(made):
     """Killed politely after its first results: whole files only, and the rest is done later."""
     code = "from tests.unit.bench.blind.test_protocol import slow_run; slow_run()"
     child = subprocess.Popen([sys.executable, "-c", code, str(made / "set")], stderr=subprocess.DEVNULL)
@@ -242,13 +242,13 @@ def test_a_killed_run_keeps_what_is_done(made):
         time.sleep(0.05)
     child.send_signal(signal.SIGTERM)
     assert child.wait(timeout=PATIENCE_S) == FAULTS["INTERRUPTED"].exit_status
-    there = list(results.iterdir())
-    assert 0 < len(there) < CASES
-    assert all(json.loads(path.read_text())["verdict"] == "effect" for path in there)
-    before = {path: path.stat().st_mtime_ns for path in there}
+    existing = list(results.iterdir())
+    assert 0 < len(existing) < CASES
+    assert all(json.loads(path.read_text())["verdict"] == "effect" for path in existing)
+    before = {path: path.stat().st_mtime_ns for path in existing}
     assert blind("run", made / "set", "--jobs", 1).exit_code == 0
     assert len(list(results.iterdir())) == CASES
-    assert {path: path.stat().st_mtime_ns for path in there} == before
+    assert {path: path.stat().st_mtime_ns for path in existing} == before
 
 
 def slow_run() -> None:
@@ -287,10 +287,10 @@ def test_a_set_is_scored_once(done):
     assert result.stdout.startswith(f"{CASES} cases (sealed set, opened once)")
     scores = json.loads((done / "scores.json").read_text())
     assert scores["sealed"] is True
-    there = {name: [effect["name"] for effect in answer["effects"]] for name, answer in answers(done).items()}
-    assert {row["case"]: [effect["name"] for effect in row["effects"]] for row in scores["cases"]} == there
+    existing = {name: [effect["name"] for effect in answer["effects"]] for name, answer in answers(done).items()}
+    assert {row["case"]: [effect["name"] for effect in row["effects"]] for row in scores["cases"]} == existing
     right = [
-        row["first"][0]["effect"] == there[row["case"]][0] for row in scores["cases"] if row["kind"] == "one-effect"
+        row["first"][0]["effect"] == existing[row["case"]][0] for row in scores["cases"] if row["kind"] == "one-effect"
     ]
     assert sum(right) / len(right) == scores["methods"]["diagnosis"]["singles"]["top_1"]["value"]
     page = (done / "report.html").read_text()
@@ -310,7 +310,7 @@ def test_a_set_is_scored_once(done):
     assert json.loads((done / "set" / "opened.json").read_text()) == opened
 
 
-def test_a_damaged_result_is_told_before_opening(done):
+def test_a_damaged_result_is_reported_before_opening(done):
     name = sorted(answers(done))[3]
     path = done / "set" / "results" / f"{name}.json"
     path.write_text(path.read_text()[:50])
@@ -333,7 +333,7 @@ def test_missing_results_stay_sealed(done):
     assert "DEVELOPMENT DATA" in score(done).stdout
 
 
-def test_what_was_changed_is_caught(done):
+def test_changed_answers_and_evidence_are_refused(done):
     key, name = done / "key.json", sorted(answers(done))[0]
     whole = key.read_text()
 
@@ -363,7 +363,7 @@ def test_what_was_changed_is_caught(done):
 
 
 @pytest.mark.slow
-def test_what_cannot_be_written_is_known_before_opening(done):
+def test_an_output_that_cannot_be_written_is_refused_before_opening(done):
     for option in (f"--json={done}", f"--report={done}"):
         result = score(done, option)
         assert result.exit_code == 2

@@ -26,7 +26,7 @@ from tests.blind.strata import counts, draw
 
 
 @pytest.mark.parametrize(
-    ("verdict", "share", "told"),
+    ("verdict", "share", "outside"),
     [
         ("unexplained", None, True),
         ("partly", 0.3, True),
@@ -35,9 +35,12 @@ from tests.blind.strata import counts, draw
         ("effect", 0.3, False),
     ],
 )
-def test_partly_counts_as_outside_where_less_than_half_is_named(verdict, share, told):
-    said = {"verdict": verdict, "effects": ["drive-damping"], "gap": {"shrinkage": share}}
-    assert opened("a", {"effects": [], "verdict": "unexplained", "stratum": "outside"}, said).told_outside is told
+def test_partly_counts_as_outside_where_less_than_half_is_named(verdict, share, outside):
+    verdict_table = {"verdict": verdict, "effects": ["drive-damping"], "gap": {"shrinkage": share}}
+    assert (
+        opened("a", {"effects": [], "verdict": "unexplained", "stratum": "outside"}, verdict_table).told_outside
+        is outside
+    )
 
 
 def test_scores_by_hand():
@@ -88,7 +91,7 @@ def test_scores_by_hand():
     assert scores.faults == 1
     assert scores.seconds.value == 10.0
     assert ("coulomb-level", "drive-backlash", 1) in scores.confusions
-    text = table({"diagnosis": scores, "BIC": score([baselines.lowest_bic(one) for one in cases], {})}, sealed=True)
+    text = table({"diagnosis": scores, "BIC": score([baselines.lowest_bic(case) for case in cases], {})}, sealed=True)
     assert text.startswith("11 cases (sealed set, opened once): right effect first in 25 %")
     assert "coulomb-level -> drive-backlash" in text
     marked = [line.split("  ")[0] for line in text.splitlines() if "missed" in line]
@@ -116,13 +119,13 @@ def test_probabilities_are_judged():
     pairs = [(0.8, i < 8) for i in range(10)] + [(0.5, i < 1) for i in range(10)]
     # one bin is right, in the other 50 % means 10 %
     assert calibration_error(pairs).value == pytest.approx(0.2)
-    assert np.array([(one.probability, one.right.value) for one in reliability(pairs)]) == pytest.approx(
+    assert np.array([(bin_.probability, bin_.right.value) for bin_ in reliability(pairs)]) == pytest.approx(
         np.array([(0.5, 0.1), (0.8, 0.8)])
     )
-    # drawn anew these are off by more; the interval is not that of the draws
-    found = calibration_error([(0.9, i % 10 != 0) for i in range(100)])
-    assert (found.value, found.low) == (pytest.approx(0.0), 0.0)
-    assert found.value <= found.high < 0.01
+    # resampling adds chance error, so plain bootstrap quantiles would not contain the value; they are mirrored
+    estimate = calibration_error([(0.9, i % 10 != 0) for i in range(100)])
+    assert (estimate.value, estimate.low) == (pytest.approx(0.0), 0.0)
+    assert estimate.value <= estimate.high < 0.01
     assert calibration_error([]) is None
 
 
@@ -130,8 +133,8 @@ def test_equal_probabilities_are_binned_in_the_order_of_the_cases():
     assert calibration_error([(0.8, i % 5 != 0) for i in range(40)]).value == pytest.approx(0.0)
 
 
-def test_what_chance_alone_shows_is_told():
-    """Of 10 fair coins the number of heads is off by 1.23 in the mean; what is certain is never off."""
+def test_the_calibration_error_of_a_perfect_forecast_is_estimated():
+    """The number of heads of 10 fair coins deviates by 1.23 in the mean; a certain forecast never deviates."""
     assert error_of_perfect([(0.5, True)] * 10).value == pytest.approx(0.123, abs=0.01)
     assert error_of_perfect([(1.0, False)] * 10).value == 0.0
     assert error_of_perfect([]) is None
@@ -157,7 +160,7 @@ def test_places_are_compared_with_the_counterfactual():
 
 def test_baselines_answer_from_the_same_result():
     one = case("one-effect", ["drive-damping"], {"none": 1.0})
-    said = one.said | {
+    verdict_table = one.said | {
         "compared_features": 100,
         "candidates": [
             {"effect": "none", "probability": 1.0, "chi2": 60.0},
@@ -174,7 +177,7 @@ def test_baselines_answer_from_the_same_result():
             ],
         },
     }
-    one = one._replace(said=said)
+    one = one._replace(said=verdict_table)
     bic = baselines.lowest_bic(one)
     assert bic.named == {"drive-damping"}
     # 54.6 against 60 and 58.2
@@ -185,9 +188,9 @@ def test_baselines_answer_from_the_same_result():
     assert bic.said["gap"]["shrinkage"] == 0.7
     assert baselines.parameters_only(one).verdict == "unexplained"
     assert baselines.flexible_residual(one).said["gap"]["shrinkage"] == 0.9
-    told = baselines.told(one, 0.75)
-    assert (told.named, told.probability("drive-damping")) == ({"drive-damping"}, 1.0)
-    assert baselines.lowest_bic(one._replace(said=said | {"compared_features": 0})).verdict == "fault"
+    answer = baselines.told(one, 0.75)
+    assert (answer.named, answer.probability("drive-damping")) == ({"drive-damping"}, 1.0)
+    assert baselines.lowest_bic(one._replace(said=verdict_table | {"compared_features": 0})).verdict == "fault"
 
 
 def test_intervals():
@@ -196,9 +199,9 @@ def test_intervals():
     assert rate([True] * 8 + [False] * 2) == pytest.approx((0.8, 0.4902, 0.9433, 10), abs=1e-3)
     assert rate([]) is None
     values = np.random.default_rng(1).normal(5.0, 2.0, 200).tolist()
-    found = mean(values)
+    estimate = mean(values)
     spread = np.std(values) / math.sqrt(200)
-    assert (found.high - found.low) / (2 * 1.96 * spread) == pytest.approx(1.0, abs=0.1)
+    assert (estimate.high - estimate.low) / (2 * 1.96 * spread) == pytest.approx(1.0, abs=0.1)
     assert bootstrapped([], len) is None
     assert ratio([(1.0, 2.0), (1.0, 2.0)]).value == 0.5
     assert math.isnan(ratio([(1.0, 0.0)]).value)
@@ -211,26 +214,26 @@ def test_an_effect_is_made_as_strong_as_it_should_be_seen():
 
     for target in (2.0, 4.0, 8.0):
         tried: list[float] = []
-        found = size(seen, Bump("a"), target, 1.5)
-        assert found.detectability == pytest.approx(target, rel=0.25)
+        estimate = size(seen, Bump("a"), target, 1.5)
+        assert estimate.detectability == pytest.approx(target, rel=0.25)
         assert len(tried) <= 4
-    # what cannot be seen is as strong as it may be
+    # an effect that cannot be seen gets the largest allowed strength
     assert size(lambda _effect: 0.0, Bump("a"), 2.0, 1.5).strength <= 1.5
     assert size(lambda effect: effect.strength, Bump("a"), 8.0, 1.5).strength == 1.5
 
 
 def test_a_set_has_every_kind_and_every_effect():
-    found = counts(200, True, 12)
-    assert sum(found.values()) == 200
-    assert found == {
+    estimate = counts(200, True, 12)
+    assert sum(estimate.values()) == 200
+    assert estimate == {
         "no-gap": 30, "one-effect": 100, "two-effects": 24, "outside": 24, "indistinguishable": 16, "real-log": 6,
     }  # fmt: skip
     assert counts(200, False, 0)["one-effect"] == 130
     cases = draw(Plant(), 60, 1)
-    single = [one.effects[0].name for one in cases if one.stratum == "one-effect"]
+    single = [case.effects[0].name for case in cases if case.stratum == "one-effect"]
     assert set(single) == set(Plant.library)
-    assert {one.tolerances for one in cases if one.stratum == "no-gap"} == {1.0, 1.5}
-    stand_in = [one.backbone for one in draw(StandIn(), 300, 1) if one.stratum == "one-effect"]
+    assert {case.tolerances for case in cases if case.stratum == "no-gap"} == {1.0, 1.5}
+    stand_in = [case.backbone for case in draw(StandIn(), 300, 1) if case.stratum == "one-effect"]
     assert stand_in.count("other") / len(stand_in) == pytest.approx(1 / 3, abs=0.1)
 
 

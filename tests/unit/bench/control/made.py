@@ -1,4 +1,4 @@
-"""Made motions of slide and drive, and what the judge of the bench says about them."""
+"""Made motions of slide and drive, and the bench's judgement of them."""
 
 from typing import Any, NamedTuple
 
@@ -33,12 +33,12 @@ def times(duration_s: float) -> Floats:
 
 
 def at_speed(duration_s: float, mps: float = 5e-4) -> Floats:
-    """Places of what moves evenly."""
+    """Positions at constant velocity."""
     return times(duration_s) * mps
 
 
 def along(velocity_mps: Floats) -> Floats:
-    """Places of what has this velocity at each sample."""
+    """Positions from the velocity at each sample."""
     return np.cumsum(velocity_mps) * SAMPLE_S
 
 
@@ -70,6 +70,6 @@ def judged(
     events = np.empty((1000, record.EVENT_COLUMNS))
     rows = np.empty((blocks, len(record.BLOCK_ROWS)), np.float32)
     base = np.broadcast_to(np.asarray(v_a_mps, float), (blocks,)).copy()
-    found = watch(params, state, truth, base, np.full(blocks, 2600.0), np.full(blocks, gain), traces, events, rows)
-    kinds = [events[:found][events[:found, 0] == kind, 1:] for kind in range(4)]
+    counts = watch(params, state, truth, base, np.full(blocks, 2600.0), np.full(blocks, gain), traces, events, rows)
+    kinds = [events[:counts][events[:counts, 0] == kind, 1:] for kind in range(4)]
     return Said(*kinds, state[0])

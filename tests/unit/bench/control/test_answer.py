@@ -16,31 +16,31 @@ def states(blocks: int, begin: int, end: int) -> np.ndarray:
 
 
 def test_an_announced_stick() -> None:
-    said = judged(*stuck_from(0.5, 1.2), state=states(2000, 519, 1200))
-    assert said.sticks[0, 4] == pytest.approx(0.520)
-    assert said.state.first_s == pytest.approx(0.520)
-    assert len(said.claims) == 0
+    seen = judged(*stuck_from(0.5, 1.2), state=states(2000, 519, 1200))
+    assert seen.sticks[0, 4] == pytest.approx(0.520)
+    assert seen.state.first_s == pytest.approx(0.520)
+    assert len(seen.claims) == 0
 
 
 def test_a_stick_under_excitation_needs_no_announcement() -> None:
-    said = judged(*stuck_from(0.5, 1.2), v_a_mps=6e-4, mode=EXCITE, state=SMOOTH, reason=HELD)
-    assert said.sticks[0, 5] == 1.0
+    seen = judged(*stuck_from(0.5, 1.2), v_a_mps=6e-4, mode=EXCITE, state=SMOOTH, reason=HELD)
+    assert seen.sticks[0, 5] == 1.0
 
 
-def test_an_announcement_after_the_stick_is_none() -> None:
-    said = judged(*stuck_from(0.5, 1.2), state=states(2000, 1300, 1400))
-    assert said.sticks[0, 4] == -1.0
+def test_an_announcement_after_the_stick_does_not_count() -> None:
+    seen = judged(*stuck_from(0.5, 1.2), state=states(2000, 1300, 1400))
+    assert seen.sticks[0, 4] == -1.0
 
 
 @pytest.mark.parametrize("drive_mps", [5e-4, 0.0])
 def test_a_claim_in_smooth_motion_or_at_rest_is_false(drive_mps: float) -> None:
     place_m = at_speed(2.0, drive_mps)
-    said = judged(place_m, place_m, state=states(2000, 1000, 1010))
-    np.testing.assert_allclose(said.claims[:, 0], [1.001])
+    seen = judged(place_m, place_m, state=states(2000, 1000, 1010))
+    np.testing.assert_allclose(seen.claims[:, 0], [1.001])
 
 
 def test_a_claim_at_a_drive_that_creeps_to_its_turn_is_not_false() -> None:
-    """A hundredth of the slowest feed is no motion in the sums, but its slide sticks all the same."""
+    """A hundredth of the slowest feed counts as rest in the sums, but its slide may stick."""
     drive_m = along(np.where(times(2.0) < 1.0, 5e-4, 5e-6))
     slide_m = along(np.where(times(2.0) < 1.0, 5e-4, 0.0))
     assert len(judged(slide_m, drive_m, state=states(2000, 1200, 1210)).claims) == 0
@@ -53,7 +53,7 @@ def test_a_claim_while_vibrating_or_probing_is_not_counted() -> None:
     assert len(judged(place_m, place_m, state=claim, mode=WATCH).claims) == 1
 
 
-def test_exciting_for_a_stick_that_is_none_is_a_false_claim() -> None:
+def test_exciting_for_a_stick_without_a_stick_is_a_false_claim() -> None:
     mode = np.where(np.arange(2000) >= 1000, EXCITE, WATCH)
     v_a = np.where(np.arange(2000) >= 1002, 6e-4, 0.0)
     place_m = at_speed(2.0)
@@ -90,15 +90,15 @@ def test_v_a_above_the_wanted_is_timed_as_the_slew_lets_it_fall() -> None:
 
 def test_energies_are_sums_over_the_moving_time() -> None:
     drive_m = np.concatenate([at_speed(12.0), np.full(len(times(4.0)), 6e-3)])
-    said = judged(drive_m, drive_m, v_a_mps=6e-4, mode=EXCITE, state=SMOOTH)
-    assert said.state.energy == pytest.approx(12.0 * 6e-4**2, rel=2e-3)
-    assert said.state.drive_energy == pytest.approx(12.0 * 5e-4**2, rel=2e-3)
-    assert said.state.settled_s == pytest.approx(2.0, abs=0.03)  # from 10 s after the first announcement
-    assert said.state.excited_s == pytest.approx(12.0, abs=0.03)
+    seen = judged(drive_m, drive_m, v_a_mps=6e-4, mode=EXCITE, state=SMOOTH)
+    assert seen.state.energy == pytest.approx(12.0 * 6e-4**2, rel=2e-3)
+    assert seen.state.drive_energy == pytest.approx(12.0 * 5e-4**2, rel=2e-3)
+    assert seen.state.settled_s == pytest.approx(2.0, abs=0.03)  # from 10 s after the first announcement
+    assert seen.state.excited_s == pytest.approx(12.0, abs=0.03)
 
 
 def test_quadrant_error_and_stick_at_a_change_of_sign() -> None:
-    """The drive turns at 2 s; the slide stands for 0.3 s more, overshoots to 40 um behind it, and follows 30 um behind."""
+    """The drive turns at 2 s; the slide rests for another 0.3 s, catches up to 40 um and then follows 30 um behind."""
     t_s = times(4.0)
     drive_m = np.where(t_s < 2.0, t_s, 4.0 - t_s) * 1e-3
     behind_m = np.where(t_s < 2.0, 3e-5, -3e-5)
@@ -106,16 +106,16 @@ def test_quadrant_error_and_stick_at_a_change_of_sign() -> None:
     # from 0.27 to 0.04 mm behind within 20 ms, then in 100 ms to 0.03 mm
     behind_m = np.where(t_s >= 2.3, -np.interp(t_s, [2.3, 2.32, 2.42], [2.7e-4, 4e-5, 3e-5]), behind_m)
     slide_m = np.where(stands, 2e-3 - 3e-5, drive_m - behind_m)
-    said = judged(slide_m, drive_m, slowest_mps=1e-3)
-    end_stroke(said.state)
-    assert said.state.turns == 1
-    assert said.state.turn_stick_s == pytest.approx(0.3, abs=3e-3)
+    seen = judged(slide_m, drive_m, slowest_mps=1e-3)
+    end_stroke(seen.state)
+    assert seen.state.turns == 1
+    assert seen.state.turn_stick_s == pytest.approx(0.3, abs=3e-3)
     # the mean from the end of the stick on: 20 ms of 155 um, 100 ms of 35 um, 1.58 s of 30 um
     mean_m = (0.02 * 1.55e-4 + 0.1 * 3.5e-5 + 1.58 * 3e-5) / 1.7
-    assert said.state.quadrant_m == pytest.approx(2.7e-4 - mean_m, rel=0.02)
+    assert seen.state.quadrant_m == pytest.approx(2.7e-4 - mean_m, rel=0.02)
 
 
 def test_a_drive_that_never_turns_has_no_quadrant_error() -> None:
-    said = judged(at_speed(1.0), at_speed(1.0))
-    end_stroke(said.state)
-    assert (said.state.turns, said.state.quadrant_m, said.state.turn_stick_s) == (0.0, 0.0, 0.0)
+    seen = judged(at_speed(1.0), at_speed(1.0))
+    end_stroke(seen.state)
+    assert (seen.state.turns, seen.state.quadrant_m, seen.state.turn_stick_s) == (0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""The picture of stiffness and feed: its formulas by hand, and where the runs stand."""
+"""The picture of stiffness and feed: its formulas computed by hand, and the panels of the runs."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from bench.control.axes_map import Noise, draw, needed_window_s, points, reduce_
 from bench.control.figures import Figures, refused
 from tests.bank import BANK
 
-NAMED = {one.name: one for one in BANK}
+NAMED = {entry.name: entry for entry in BANK}
 
 
 def run(name: str, **values: object) -> Figures:
@@ -40,9 +40,9 @@ def test_a_stick_winds_up_twice_the_drop() -> None:
     assert stick_s(11700.0 / 2.89, 5e-4) == pytest.approx(2.0 * 2.89 / 11700.0 / 5e-4)
 
 
-def test_each_run_stands_in_the_panel_of_its_noise() -> None:
+def test_each_run_is_drawn_in_the_panel_of_its_noise() -> None:
     came = {"slips": 1}
-    found = points(
+    drawn_points = points(
         BANK,
         [
             run("pair-c45-0.5"),
@@ -51,13 +51,13 @@ def test_each_run_stands_in_the_panel_of_its_noise() -> None:
             run("no-drop-stiff"),  # never sticks: no point
         ],
     )
-    assert [(one.name, one.panel, one.came) for one in found] == [
+    assert [(point.name, point.panel, point.came) for point in drawn_points] == [
         ("pair-c45-0.5", 0, "clean"),
         ("noise-both", 1, "slips or surges"),
         ("blind-screw", 2, "says BLIND"),
     ]
-    assert found[0].slowest_mps == found[0].fastest_mps == 5e-4
-    assert found[0].stiffness_per_m == pytest.approx(11700.0 / 2.89, rel=2e-3)
+    assert drawn_points[0].slowest_mps == drawn_points[0].fastest_mps == 5e-4
+    assert drawn_points[0].stiffness_per_m == pytest.approx(11700.0 / 2.89, rel=2e-3)
 
 
 @pytest.mark.slow

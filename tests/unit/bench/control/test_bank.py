@@ -20,34 +20,34 @@ from tests.bank import BANK
 OWN = rules.NAMES[rules.CONTROLLER]
 
 
-def test_the_bank_is_what_was_asked_for() -> None:
+def test_the_bank_has_the_required_number_and_length_of_scenarios() -> None:
     assert len(BANK) >= 100
-    assert len({one.name for one in BANK}) == len(BANK)
-    false = [one for one in BANK if one.family == "false"]
-    assert sum(one.duration_s for one in false) >= 10 * 3600
-    assert all(one.duration_s >= 0.8 * 3600 for one in false)
-    assert all(one.description for one in BANK)
-    needless = [one for one in BANK if one.family == "not-needed"]
-    assert all(one.duration_s >= 170 for one in needless)
-    assert sum(one.duration_s >= 60 and one.bank.expect == "helped" for one in BANK) >= 12
+    assert len({entry.name for entry in BANK}) == len(BANK)
+    false = [entry for entry in BANK if entry.family == "false"]
+    assert sum(entry.duration_s for entry in false) >= 10 * 3600
+    assert all(entry.duration_s >= 0.8 * 3600 for entry in false)
+    assert all(entry.description for entry in BANK)
+    needless = [entry for entry in BANK if entry.family == "not-needed"]
+    assert all(entry.duration_s >= 170 for entry in needless)
+    assert sum(entry.duration_s >= 60 and entry.bank.expect == "helped" for entry in BANK) >= 12
 
 
-def test_the_controller_is_told_what_the_rig_is_or_what_the_scenario_says() -> None:
-    by_name = {one.name: one.table["controller"]["drive_stiffness_N_per_m"] for one in BANK}
+def test_the_controller_gets_the_stiffness_of_the_rig_or_of_the_scenario() -> None:
+    by_name = {entry.name: entry.table["controller"]["drive_stiffness_N_per_m"] for entry in BANK}
     assert by_name["pair-c45-0.5"] == pytest.approx(11700.0)
     assert by_name["told-10"] == pytest.approx(117000.0)
     assert by_name["told-0.1-belt"] == pytest.approx(1e5)
 
 
 def test_only_takes_a_family_or_the_begin_of_a_name() -> None:
-    assert {one.family for one in chosen(BANK, ["late"], small=False)} == {"late"}
-    assert [one.name for one in chosen(BANK, ["pair-c45-1"], small=False)][:1] == ["pair-c45-1"]
-    assert all(one.bank.small for one in chosen(BANK, [], small=True))
+    assert {entry.family for entry in chosen(BANK, ["late"], small=False)} == {"late"}
+    assert [entry.name for entry in chosen(BANK, ["pair-c45-1"], small=False)][:1] == ["pair-c45-1"]
+    assert all(entry.bank.small for entry in chosen(BANK, [], small=True))
     with pytest.raises(Fault, match="no such family"):
         chosen(BANK, ["ghost"], small=False)
 
 
-def test_a_file_without_scenarios_and_a_misspelt_key_are_told(tmp_path: Path) -> None:
+def test_a_file_without_scenarios_and_a_misspelt_key_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "one.toml"
     path.write_text('description = "x"\n')
     with pytest.raises(Fault, match="scenario"):
@@ -64,8 +64,8 @@ def made(subject: str, scenario: str = "a", **values: object) -> Figures:
     return empty._replace(scenario=scenario, expect="helped", failures=[], **values)
 
 
-def holds(name: str, *found: Figures, least: dict[str, Least] | None = None, cost: float = 0.05) -> bool | None:
-    return next(bar.holds for bar in bars(found, least or {}, cost, OWN) if bar.name.startswith(name))
+def holds(name: str, *measured: Figures, least: dict[str, Least] | None = None, cost: float = 0.05) -> bool | None:
+    return next(bar.holds for bar in bars(measured, least or {}, cost, OWN) if bar.name.startswith(name))
 
 
 @pytest.mark.parametrize(
@@ -88,7 +88,7 @@ def test_a_bar_holds_up_to_its_limit(name: str, good: dict[str, object], bad: di
     assert holds(name, one._replace(**({"delays_s": bad.get("late_ratios", [])} | bad))) is False  # pyright: ignore[reportArgumentType]
 
 
-def test_the_energy_is_compared_with_that_of_the_least_constant_ratio() -> None:
+def test_the_energy_is_compared_with_the_energy_of_the_least_constant_ratio() -> None:
     least = {"a": Least(1.0, 0.5)}
     assert holds("energy over", made(OWN, settled_ratio=1.15), least=least) is True
     assert holds("energy over", made(OWN, settled_ratio=1.16), least=least) is False
@@ -96,7 +96,7 @@ def test_the_energy_is_compared_with_that_of_the_least_constant_ratio() -> None:
     assert holds("energy over", made(OWN)) is None
 
 
-def test_the_cost_of_a_step_is_told() -> None:
+def test_the_cost_of_a_step_is_reported() -> None:
     assert holds("cost", made(OWN), cost=0.5) is None
 
 
@@ -119,20 +119,24 @@ def test_bench_control_writes_table_page_and_json(tmp_path: Path, only: tuple[st
     words = ["control", *which, "--jobs", "1", "--report", str(page), "--json", str(table)]
     result = CliRunner().invoke(app, words)
     assert result.exit_code in {0, 3}
-    told = json.loads(table.read_text())
-    assert (result.exit_code == 0) == told["passed"]
-    jsonschema.validate(told, FORMATS["bench-control-result"].schema(), jsonschema.Draft202012Validator)
-    runs = {(one["scenario"], one["subject"]): one for one in told["runs"]}
+    report = json.loads(table.read_text())
+    assert (result.exit_code == 0) == report["passed"]
+    jsonschema.validate(report, FORMATS["bench-control-result"].schema(), jsonschema.Draft202012Validator)
+    runs = {(run["scenario"], run["subject"]): run for run in report["runs"]}
     assert len(runs) == 6 * len({name for name, _ in runs})
     none, moving = (
         [one for (_, subject), one in runs.items() if subject == rules.NAMES[rule] and one["expect"] == "helped"]
         for rule in (rules.NONE, rules.MOVING)
     )
-    assert len(none) == len(moving) == sum(one.bank.expect == "helped" for one in chosen(BANK, list(only), small=small))
-    assert all(one["slips"] > 5 for one in none)
-    assert all(one["slips"] + one["surges"] == 0 for one in moving)
+    assert (
+        len(none)
+        == len(moving)
+        == sum(entry.bank.expect == "helped" for entry in chosen(BANK, list(only), small=small))
+    )
+    assert all(entry["slips"] > 5 for entry in none)
+    assert all(entry["slips"] + entry["surges"] == 0 for entry in moving)
     text = page.read_text()
     assert text.index("asked for") < text.index("Failures and their causes")
-    for one in told["runs"]:
-        assert one["scenario"] in text
+    for run in report["runs"]:
+        assert run["scenario"] in text
     assert "scenarios" in result.stdout.splitlines()[-2]

@@ -1,4 +1,4 @@
-"""Sticks, slips and surges of made motions: what is one, and what only looks like one."""
+"""Sticks, slips and surges of made motions, and motions that only look like them."""
 
 import numpy as np
 import pytest
@@ -9,13 +9,13 @@ from tests.unit.bench.control.made import PAPER, SAMPLE_S, along, at_speed, judg
 
 
 def test_even_motion_has_no_event() -> None:
-    said = judged(at_speed(2.0), at_speed(2.0))
-    assert [len(one) for one in said[:4]] == [0, 0, 0, 0]
-    assert said.state.moving_s == pytest.approx(2.0, abs=2e-3)
+    seen = judged(at_speed(2.0), at_speed(2.0))
+    assert [len(events) for events in seen[:4]] == [0, 0, 0, 0]
+    assert seen.state.moving_s == pytest.approx(2.0, abs=2e-3)
 
 
 def stuck_from(begin_s: float, end_s: float, duration_s: float = 2.0, slip_mps: float = 0.01):
-    """A slide that follows the drive, stands, and catches up fast."""
+    """A slide that follows the drive, rests, and catches up fast."""
     drive_m, t_s = at_speed(duration_s), times(duration_s)
     velocity = np.full(len(t_s), 5e-4)
     velocity[(t_s > begin_s) & (t_s <= end_s)] = 0.0
@@ -25,10 +25,10 @@ def stuck_from(begin_s: float, end_s: float, duration_s: float = 2.0, slip_mps: 
 
 
 def test_a_stick_and_its_slip() -> None:
-    said = judged(*stuck_from(0.5, 1.2))
-    assert len(said.sticks) == len(said.slips) == 1
-    assert len(said.surges) == 0
-    begin_s, end_s, speed_mps, needs_s, announced_s, under_excite = said.sticks[0]
+    seen = judged(*stuck_from(0.5, 1.2))
+    assert len(seen.sticks) == len(seen.slips) == 1
+    assert len(seen.surges) == 0
+    begin_s, end_s, speed_mps, needs_s, announced_s, under_excite = seen.sticks[0]
     assert begin_s == pytest.approx(0.5, abs=2e-3)
     assert end_s == pytest.approx(1.2, abs=2e-3)
     assert speed_mps == pytest.approx(5e-4, rel=1e-3)
@@ -37,24 +37,24 @@ def test_a_stick_and_its_slip() -> None:
     noise_m = np.hypot(PAPER.sensors.position_noise_m, PAPER.sensors.position_resolution_m / np.sqrt(12))
     closed_s = (300.0 * 2.0 * noise_m**2 * SAMPLE_S / 5e-4**2) ** (1 / 3)
     assert needs_s == pytest.approx(closed_s + 2e-3, abs=2e-4)
-    assert said.slips[0, 0] == pytest.approx(1.2, abs=2e-3)
-    assert said.slips[0, 2] == pytest.approx(20.0, rel=0.01)
-    assert said.slips[0, 5] == pytest.approx(0.01, rel=0.01)
+    assert seen.slips[0, 0] == pytest.approx(1.2, abs=2e-3)
+    assert seen.slips[0, 2] == pytest.approx(20.0, rel=0.01)
+    assert seen.slips[0, 5] == pytest.approx(0.01, rel=0.01)
 
 
-def test_the_same_backwards() -> None:
+def test_the_judgement_is_the_same_backwards() -> None:
     slide_m, drive_m = stuck_from(0.5, 1.2)
     forth, back = judged(slide_m, drive_m), judged(-slide_m, -drive_m)
     np.testing.assert_allclose(forth.sticks, back.sticks)
     np.testing.assert_allclose(forth.slips, back.slips)
 
 
-def test_what_is_fast_without_a_stick_is_a_surge() -> None:
+def test_fast_motion_without_a_stick_is_a_surge() -> None:
     velocity = np.full(len(times(2.0)), 5e-4)
     velocity[20000:20400] = 1e-3
-    said = judged(along(velocity), at_speed(2.0))
-    assert (len(said.slips), len(said.surges)) == (0, 1)
-    assert said.surges[0, 2] == pytest.approx(2.0, rel=0.01)
+    seen = judged(along(velocity), at_speed(2.0))
+    assert (len(seen.slips), len(seen.surges)) == (0, 1)
+    assert seen.surges[0, 2] == pytest.approx(2.0, rel=0.01)
 
 
 def test_a_slide_that_swings_after_an_event_makes_no_second_one() -> None:
@@ -68,8 +68,8 @@ def test_a_drive_that_slows_down_makes_no_surge() -> None:
     t_s = times(2.0)
     drive = np.where(t_s < 1.0, 2e-3, 2e-4)
     slide = np.where(t_s < 1.0, 2e-3, 2e-4 + 1.8e-3 * np.exp(-(t_s - 1.0) / 0.02))
-    said = judged(along(slide), along(drive), slowest_mps=2e-4)
-    assert (len(said.slips), len(said.surges)) == (0, 0)
+    seen = judged(along(slide), along(drive), slowest_mps=2e-4)
+    assert (len(seen.slips), len(seen.surges)) == (0, 0)
     # late for longer than a natural period, 71 ms, as a strong vibration makes it
     late = np.where(t_s < 1.0, 2e-3, 2e-4 + 1.8e-3 * np.exp(-(t_s - 1.0) / 0.1))
     assert len(judged(along(late), along(drive), slowest_mps=2e-4).surges) == 0
@@ -81,10 +81,10 @@ def test_a_reversal_is_a_stick_and_no_slip() -> None:
     t_s = times(3.0)
     drive = np.interp(t_s, [0, 1, 1.1, 3], [5e-4, 5e-4, -5e-4, -5e-4])
     slide = np.where((t_s > 1.05) & (t_s < 1.5), 0.0, drive)
-    said = judged(along(slide), along(drive))
-    assert (len(said.slips), len(said.surges)) == (0, 0)
-    assert len(said.sticks) == 1
-    assert said.sticks[0, 0] == pytest.approx(1.05, abs=5e-3)
+    seen = judged(along(slide), along(drive))
+    assert (len(seen.slips), len(seen.surges)) == (0, 0)
+    assert len(seen.sticks) == 1
+    assert seen.sticks[0, 0] == pytest.approx(1.05, abs=5e-3)
 
 
 def test_a_stick_that_goes_on_through_a_reversal_is_two() -> None:
@@ -95,11 +95,11 @@ def test_a_stick_that_goes_on_through_a_reversal_is_two() -> None:
     np.testing.assert_allclose(begins_s, [0.5, 1.05], atol=5e-3)
 
 
-def test_a_ripple_of_the_exciter_is_no_motion() -> None:
+def test_a_ripple_of_the_exciter_does_not_count_as_motion() -> None:
     t_s = times(2.0)
     shaken_m = at_speed(2.0) + 2e-7 * np.sin(2 * np.pi * 2600.0 * t_s)
-    assert [len(one) for one in judged(shaken_m, at_speed(2.0), v_a_mps=6e-4)[:4]] == [0, 0, 0, 0]
-    assert len(judged(shaken_m, at_speed(2.0)).surges) > 0  # what a window without whole periods shows
+    assert [len(events) for events in judged(shaken_m, at_speed(2.0), v_a_mps=6e-4)[:4]] == [0, 0, 0, 0]
+    assert len(judged(shaken_m, at_speed(2.0)).surges) > 0  # without v_a the window holds a broken period
 
 
 def test_a_pair_without_a_drop_may_overshoot_to_twice_the_drive() -> None:
@@ -112,9 +112,9 @@ def test_a_pair_without_a_drop_may_overshoot_to_twice_the_drive() -> None:
 
 
 def test_standstill_has_no_event() -> None:
-    said = judged(np.zeros(20000), np.zeros(20000))
-    assert [len(one) for one in said[:4]] == [0, 0, 0, 0]
-    assert said.state.standing_s == pytest.approx(1.0)
+    seen = judged(np.zeros(20000), np.zeros(20000))
+    assert [len(events) for events in seen[:4]] == [0, 0, 0, 0]
+    assert seen.state.standing_s == pytest.approx(1.0)
 
 
 def test_a_sticks_begin_at_a_ramp_needs_longer_than_at_full_speed() -> None:

@@ -1,4 +1,4 @@
-"""What the oracle says of a run that slips."""
+"""The oracle's verdict on a run that slips."""
 
 import math
 
@@ -10,11 +10,11 @@ from cockpit.run.scenario_file import merged
 from plant.config import RigConfig
 from tests.bank import BANK
 
-PAPER = next(one for one in BANK if one.name == "pair-c45-0.5")
+PAPER = next(entry for entry in BANK if entry.name == "pair-c45-0.5")
 
 
 @pytest.mark.parametrize(
-    ("own", "at_once", "beforehand", "said"),
+    ("own", "at_once", "beforehand", "expected"),
     [
         (3, 0, 0, MISSED),
         (3, 2, 0, TOO_LATE),
@@ -25,14 +25,14 @@ PAPER = next(one for one in BANK if one.name == "pair-c45-0.5")
         (17, 16, 15, IN_PART),
     ],
 )
-def test_the_counts_decide(own: int, at_once: int, beforehand: int, said: str) -> None:
-    assert verdict(own, at_once, beforehand) == said
+def test_the_counts_decide(own: int, at_once: int, beforehand: int, expected: str) -> None:
+    assert verdict(own, at_once, beforehand) == expected
 
 
 def test_in_words_it_gives_the_counts() -> None:
-    told = Oracle(LIMIT, 3, 3, math.inf).in_words(4)
+    words = Oracle(LIMIT, 3, 3, math.inf).in_words(4)
     assert (
-        told
+        words
         == f"{LIMIT} (4 here, 3 for an oracle vibrating at once, 3 if it knows v_d early; best at the whole stroke)"
     )
     assert (

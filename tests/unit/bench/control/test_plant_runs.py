@@ -11,7 +11,7 @@ from bench.control.scenario import BankScenario
 from tests.bank import BANK
 
 pytestmark = pytest.mark.slow  # together, not each
-NAMED = {one.name: one for one in BANK}
+NAMED = {entry.name: entry for entry in BANK}
 PAPER = NAMED["pair-c45-0.5"]
 
 
@@ -62,7 +62,7 @@ def test_a_wave_along_the_track_surges_at_1_2_v_d_and_not_at_2_4() -> None:
     assert is_clean(wave, 2.4, 1.0)
 
 
-def test_the_true_v_a_is_that_of_mount_and_exciter() -> None:
+def test_the_true_v_a_follows_from_mount_and_exciter() -> None:
     # the rule takes a gain of 1; at the resonance with zeta 0.05 it is 10
     judged = run(shortened(NAMED["mount-2600-gain-10"], 4.0), rules.MOVING)
     assert judged.sums["energy"] / judged.sums["drive_energy"] == pytest.approx(144.0, rel=0.05)
@@ -114,7 +114,7 @@ def test_who_leaves_an_axis_alone_without_a_word_is_found() -> None:
     assert not any(line.startswith(SILENT) for line in lines)
 
 
-def test_who_cannot_see_says_so_or_vibrates_while_it_moves() -> None:
+def test_a_blind_controller_reports_it_or_vibrates_while_it_moves() -> None:
     def lines(name: str, rule: int) -> list[str]:
         scenario = NAMED[name]
         return [line for line in figures(scenario, "made", run(scenario, rule), ours=True).failures if "BLIND" in line]

@@ -1,4 +1,4 @@
-"""A guard and what it sees, for tests: blocks of 1 ms with 20 samples, an exciter of 100 nm and 0.5 to 5 kHz."""
+"""A guard and its inputs, for tests: blocks of 1 ms with 20 samples, an exciter of 100 nm and 0.5 to 5 kHz."""
 
 import math
 from typing import Any
@@ -17,7 +17,7 @@ NANO = 1e-9
 
 
 class Rig:
-    """A rig whose drive moves evenly and whose base does what the guard allows, `gain` times."""
+    """A rig whose drive moves evenly and whose base vibrates with `gain` times the amplitude that the guard allows."""
 
     def __init__(self, config: GuardConfig | None = None, arm: bool = True, exciter: ExciterLimits = EXCITER) -> None:
         self.params, self.state = build(config or GuardConfig(), exciter, RUN, arm)

@@ -10,7 +10,7 @@ from bridge.guard.config import GuardConfig, wider
 
 
 @pytest.mark.parametrize(
-    ("table", "said"),
+    ("table", "message"),
     [
         ({"stroke_m": {"alarm": 2e-7, "abort": 1e-7}}, "abort = 1e-07: must not be below alarm = 2e-07"),
         ({"forbidden_Hz": [[3000.0, 2000.0]]}, "forbidden_Hz: [3000, 2000]: the second must be above the first"),
@@ -20,13 +20,13 @@ from bridge.guard.config import GuardConfig, wider
         ({"duty_window_s": -1.0}, "duty_window_s = -1.0"),
     ],
 )
-def test_nonsense_is_refused(table: dict[str, Any], said: str) -> None:
+def test_nonsense_is_refused(table: dict[str, Any], message: str) -> None:
     with pytest.raises(Fault) as error:
         validate(GuardConfig, table, "rig.toml")
-    assert said in error.value.line
+    assert message in error.value.line
 
 
-def test_equal_levels_are_no_nonsense() -> None:
+def test_equal_alarm_and_abort_levels_are_accepted() -> None:
     assert validate(GuardConfig, {"loud_ratio": {"alarm": 3.0, "abort": 3.0}}, "rig.toml").loud_ratio.abort == 3.0
 
 

@@ -1,4 +1,4 @@
-"""The guard: which commands count, and what becomes of a vibration when they stop."""
+"""The guard: which commands it accepts, and how the vibration fades when commands stop."""
 
 import math
 
@@ -65,14 +65,14 @@ def test_only_commands_of_this_run_count_that_are_newer_and_answer_a_block_that_
     ("name", "value"),
     [("amplitude_m", math.nan), ("amplitude_m", math.inf), ("amplitude_m", -1.0), ("frequency_Hz", math.nan)],
 )
-def test_a_command_that_is_no_sense_is_refused(name: str, value: float) -> None:
+def test_a_command_of_a_negative_or_not_finite_value_is_refused(name: str, value: float) -> None:
     rig = Rig()
     rig.run(10)
     assert not rig.command(**{name: value})
     assert rig.s.refused == 1
 
 
-def test_a_controller_that_begins_anew_is_heard_once_the_old_one_is_silent() -> None:
+def test_a_restarted_controller_is_accepted_once_the_old_one_is_silent() -> None:
     rig = Rig()
     rig.run(10)
     assert rig.command(sequence=1000)
@@ -121,15 +121,15 @@ def test_an_exciter_without_a_slew_follows_at_once() -> None:
     assert rig.s.amplitude_m == pytest.approx(30 * NANO)
 
 
-def test_after_a_check_each_block_tells_one_of_its_gains() -> None:
+def test_after_a_check_each_block_publishes_one_of_its_gains() -> None:
     rig = Rig(GuardConfig(check_Hz=[1000.0, 2000.0, 4000.0]))
     rig.s.gain[:3] = 1.0, 2.0, 6.0
     block = sensor_block(20).blank()
     write_gain(rig.p, rig.s, block[0])
     assert (block[0]["check_Hz"], block[0]["check_gain"]) == (0.0, 0.0)
     rig.s.verified = 1
-    told = []
+    published = []
     for rig.s.block in range(3):
         write_gain(rig.p, rig.s, block[0])
-        told.append((float(block[0]["check_Hz"]), float(block[0]["check_gain"])))
-    assert told == [(1000.0, 1.0), (2000.0, 2.0), (4000.0, 6.0)]
+        published.append((float(block[0]["check_Hz"]), float(block[0]["check_gain"])))
+    assert published == [(1000.0, 1.0), (2000.0, 2.0), (4000.0, 6.0)]

@@ -1,4 +1,4 @@
-"""What a rig says of its guard: each change of state once, missing commands, limits not too often."""
+"""Events of the guard: each change of state once, missing commands, each limit at most once a second."""
 
 from typing import Any
 
@@ -17,42 +17,49 @@ def applied(*rows: dict[str, Any]) -> Any:
     return table
 
 
-def told(*rows: dict[str, Any]) -> list[list[str]]:
-    """Codes of every row; all news are in the rows that `changes` finds."""
+def codes_of(*rows: dict[str, Any]) -> list[list[str]]:
+    """Codes of the events of every row. Rows that `changes` leaves out have none."""
     table, events, other = applied(*rows), GuardEvents(), GuardEvents()
-    found = [[code for code, _ in events.news(row)] for row in table]
+    by_row = [[code for code, _ in events.news(row)] for row in table]
     picked = changes(table)
-    assert [[code for code, _ in other.news(table[row])] for row in picked] == [found[row] for row in picked]
-    assert all(not found[row] for row in set(range(len(table))) - set(picked.tolist()))
-    return found
+    assert [[code for code, _ in other.news(table[row])] for row in picked] == [by_row[row] for row in picked]
+    assert all(not by_row[row] for row in set(range(len(table))) - set(picked.tolist()))
+    return by_row
 
 
 ARMED: dict[str, Any] = {"guard_state": wire.ARMED, "fallback": 1}
 ACTIVE: dict[str, Any] = {"guard_state": wire.ACTIVE}
 
 
-def test_every_change_of_state_is_told_once_with_its_reason() -> None:
+def test_every_change_of_state_is_reported_once_with_its_reason() -> None:
     fault = {"guard_state": wire.FAULT, "cause": wire.LOUD}
-    assert told(ARMED, ARMED, ACTIVE, ACTIVE, fault, fault) == [["GUARD"], [], ["GUARD"], [], ["FAULT"], []]
+    assert codes_of(ARMED, ARMED, ACTIVE, ACTIVE, fault, fault) == [["GUARD"], [], ["GUARD"], [], ["FAULT"], []]
     events = GuardEvents()
     events.news(applied(ACTIVE)[0])
     assert events.news(applied(fault)[0])[0][1].startswith("ACTIVE -> FAULT: LOUD: failure: measured v_a above")
 
 
-def test_another_gain_is_an_event_of_its_own() -> None:
+def test_a_changed_gain_is_a_separate_event() -> None:
     ready: dict[str, Any] = {"guard_state": wire.READY, "cause": wire.GAIN_CHANGED}
-    assert told(ARMED, ready, ready) == [["GUARD"], ["GUARD", "GAIN_CHANGED"], []]
-    assert told(ARMED, ready | {"cause": wire.CHECK_PASSED}) == [["GUARD"], ["GUARD"]]
+    assert codes_of(ARMED, ready, ready) == [["GUARD"], ["GUARD", "GAIN_CHANGED"], []]
+    assert codes_of(ARMED, ready | {"cause": wire.CHECK_PASSED}) == [["GUARD"], ["GUARD"]]
 
 
-def test_missing_commands_are_told_when_they_stop_and_when_they_come_back_but_not_before_the_first() -> None:
+def test_missing_commands_are_reported_when_they_stop_and_when_they_return_but_not_before_the_first() -> None:
     lost = ACTIVE | {"fallback": 1}
-    assert told(ARMED, ACTIVE, lost, lost, ACTIVE, ACTIVE) == [["GUARD"], ["GUARD"], ["FALLBACK"], [], ["FRESH"], []]
+    assert codes_of(ARMED, ACTIVE, lost, lost, ACTIVE, ACTIVE) == [
+        ["GUARD"],
+        ["GUARD"],
+        ["FALLBACK"],
+        [],
+        ["FRESH"],
+        [],
+    ]
 
 
-def test_the_same_limit_is_told_once_a_second() -> None:
+def test_the_same_limit_is_reported_once_a_second() -> None:
     band = ACTIVE | {"guard_limit": BAND}
     rows = [ACTIVE, *[band, ACTIVE] * 8]
-    assert [row for row, codes in enumerate(told(*rows)) if "HELD_BACK" in codes] == [1, 11]
+    assert [row for row, codes in enumerate(codes_of(*rows)) if "HELD_BACK" in codes] == [1, 11]
     heat, slew = ACTIVE | {"guard_limit": HEAT}, ACTIVE | {"guard_limit": SLEW_RATE}
-    assert told(ACTIVE, band, heat, band, slew) == [["GUARD"], ["HELD_BACK"], ["HELD_BACK"], [], []]
+    assert codes_of(ACTIVE, band, heat, band, slew) == [["GUARD"], ["HELD_BACK"], ["HELD_BACK"], [], []]

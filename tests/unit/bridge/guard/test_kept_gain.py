@@ -35,7 +35,7 @@ def test_a_gain_is_kept_for_its_rig_and_its_tones() -> None:
         "[" * 40000,
     ],
 )
-def test_a_damaged_file_is_no_gain(text: str) -> None:
+def test_a_damaged_file_yields_no_gain(text: str) -> None:
     KeptGain("lathe", TONES_HZ).save([0.9, 1.1])
     KeptGain("lathe", TONES_HZ).path.write_text(text)
     assert KeptGain("lathe", TONES_HZ).load() == []

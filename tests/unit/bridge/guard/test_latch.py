@@ -1,4 +1,4 @@
-"""A person's stop outlasts the rig's process, for each rig by itself."""
+"""A stop by the operator outlasts the rig's process, for each rig separately."""
 
 import os
 import stat
@@ -38,14 +38,14 @@ def test_the_folder_is_the_users_own(folder: Path) -> None:
     assert stat.S_IMODE(os.stat(folder).st_mode) == 0o700
 
 
-def test_a_folder_that_cannot_be_made_is_told(folder: Path) -> None:
+def test_a_folder_that_cannot_be_made_is_reported(folder: Path) -> None:
     folder.parent.write_text("a file in the way")
     assert str(folder) in StopLatch("lathe").can_be_set()
     with pytest.raises(NotADirectoryError):
         StopLatch("lathe").set("Ada")
 
 
-def test_a_file_that_is_no_stop_of_ours_holds_too(folder: Path) -> None:
+def test_any_file_in_place_of_the_latch_counts_as_a_stop(folder: Path) -> None:
     latch = StopLatch("lathe")
     folder.mkdir(parents=True)
     latch.path.symlink_to("nowhere")

@@ -44,7 +44,7 @@ def test_the_stroke_is_held_at_its_alarm_and_trips_beyond_its_abort() -> None:
     assert (rig.s.state, rig.s.amplitude_m) == (FAULT, 0.0)
 
 
-def test_what_passes_an_abort_level_now_and_then_does_not_trip() -> None:
+def test_a_level_exceeded_now_and_then_does_not_trip() -> None:
     rig = Rig(GuardConfig(loud_ratio=FREE))
     for _ in range(10):
         rig.run(199, amplitude_m=200 * NANO)
@@ -72,14 +72,14 @@ def test_the_commanded_velocity_is_held() -> None:
     assert (rig.s.state, rig.s.cause) == (FAULT, DRIVE_MAX)
 
 
-def test_without_a_level_of_its_own_the_velocity_is_bounded_by_the_stroke_alone() -> None:
+def test_without_a_velocity_level_the_stroke_alone_bounds_the_velocity() -> None:
     rig = Rig(GuardConfig(loud_ratio=FREE))
     settled(rig, 1e-7, 5000.0)
     assert (rig.s.limit, rig.s.amplitude_m) == (NO_CAUSE, pytest.approx(100 * NANO))
 
 
 @pytest.mark.parametrize("gain", [1.0, 0.5])
-def test_a_checked_gain_bounds_the_velocity_over_that_of_the_drive(gain: float) -> None:
+def test_a_checked_gain_bounds_the_ratio_of_vibration_to_drive_velocity(gain: float) -> None:
     rig = Rig(GuardConfig(loud_ratio=FREE))
     rig.s.verified, rig.s.gain[:] = 1, gain
     rig.v_d_mps = 2.5e-4
@@ -92,7 +92,7 @@ def test_a_checked_gain_bounds_the_velocity_over_that_of_the_drive(gain: float) 
     rig.block(int(rig.s.block) - 1, 4000.0, 0.0)
     rig.command(4000.0, amplitude_m)
     rig.block(int(rig.s.block) - 1, 4000.0, amplitude_m)
-    assert rig.s.limit != DRIVE_RATIO  # held, and not told, for as long as a start of the drive is not seen
+    assert rig.s.limit != DRIVE_RATIO  # the limit holds without a report until the drive is seen to start
     rig.v_d_mps = 1.75e-4  # the ratio of the same command is 5 when the old velocity is forgotten
     rig.run(1500, 4000.0, amplitude_m)
     assert (rig.s.state, rig.s.cause) == (FAULT, DRIVE_RATIO)
@@ -101,11 +101,11 @@ def test_a_checked_gain_bounds_the_velocity_over_that_of_the_drive(gain: float) 
 def test_the_gain_between_tones_lies_on_a_straight_line() -> None:
     rig = Rig(GuardConfig(check_Hz=[1000.0, 2000.0, 4000.0]))
     rig.s.gain[:3] = 1.0, 2.0, 6.0
-    found = [exciter_gain(rig.p, rig.s, hertz) for hertz in (500.0, 1000.0, 1500.0, 2000.0, 3000.0, 4000.0, 5000.0)]
-    assert found == pytest.approx([1.0, 1.0, 1.5, 2.0, 4.0, 6.0, 6.0])
+    gains = [exciter_gain(rig.p, rig.s, hertz) for hertz in (500.0, 1000.0, 1500.0, 2000.0, 3000.0, 4000.0, 5000.0)]
+    assert gains == pytest.approx([1.0, 1.0, 1.5, 2.0, 4.0, 6.0, 6.0])
 
 
-def test_a_mount_that_resonates_trips_by_what_is_measured() -> None:
+def test_a_resonating_mount_trips_by_the_measured_velocity() -> None:
     rig = Rig()
     rig.gain = 5.0
     rig.run(90)
@@ -114,7 +114,7 @@ def test_a_mount_that_resonates_trips_by_what_is_measured() -> None:
     assert (rig.s.state, rig.s.cause) == (FAULT, LOUD)
 
 
-def test_a_vibration_of_a_drive_that_stands_is_loud() -> None:
+def test_a_vibration_at_a_resting_drive_is_loud() -> None:
     rig = Rig()
     rig.v_d_mps = 0.0
     rig.run(150)
@@ -190,7 +190,7 @@ def test_a_vibration_within_its_ratio_is_not_held() -> None:
     assert (rig.s.state, rig.s.limit, rig.s.amplitude_m) == (ACTIVE, NO_CAUSE, pytest.approx(30 * NANO))
 
 
-def test_a_drive_position_that_is_no_number_leaves_the_velocity_to_be_forgotten() -> None:
+def test_a_drive_position_of_nan_lets_the_velocity_expire() -> None:
     rig = Rig()
     rig.run(100)
     before_mps = float(rig.s.drive_mps)
@@ -218,7 +218,7 @@ def test_a_velocity_that_the_drive_is_going_to_have_counts_before_it_moves() -> 
     assert rig.s.drive_mps == pytest.approx(5e-4, rel=0.01)
 
 
-def test_a_drive_position_that_jumps_leaves_the_velocity_as_it_was() -> None:
+def test_a_jump_of_the_drive_position_does_not_change_the_velocity() -> None:
     rig = Rig()
     rig.run(100)
     rig.v_d_mps = 1.0
@@ -228,7 +228,7 @@ def test_a_drive_position_that_jumps_leaves_the_velocity_as_it_was() -> None:
     assert rig.s.drive_mps == pytest.approx(5e-4, rel=0.05)
 
 
-def test_a_shake_that_is_over_soon_is_not_told_as_loud() -> None:
+def test_a_short_shake_is_not_reported_as_loud() -> None:
     rig = Rig()
     rig.run(90)
     rig.gain = 6.0
@@ -238,13 +238,13 @@ def test_a_shake_that_is_over_soon_is_not_told_as_loud() -> None:
     assert rig.s.limit == LOUD
 
 
-def test_a_loud_vibration_is_told_after_a_tenth_of_the_time_in_which_it_trips() -> None:
+def test_a_loud_vibration_is_reported_after_a_tenth_of_its_trip_time() -> None:
     rig = Rig()
     rig.run(90)
     tenth = int(rig.p.hold_blocks[LOUD - FIRST]) // 10
-    told: list[int] = []
+    limits: list[int] = []
     for _ in range(tenth + 1):
         rig.s.limit, rig.s.vibration_mps = NO_CAUSE, 1.0
         watch(rig.p, rig.s)
-        told.append(int(rig.s.limit))
-    assert told == [NO_CAUSE] * tenth + [LOUD]
+        limits.append(int(rig.s.limit))
+    assert limits == [NO_CAUSE] * tenth + [LOUD]

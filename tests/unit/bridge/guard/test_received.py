@@ -1,4 +1,4 @@
-"""Commands that mean nothing are dropped one by one, counted and told; those of the controller pass."""
+"""Invalid commands are dropped, counted and reported; the controller's commands pass."""
 
 import math
 
@@ -12,8 +12,8 @@ from bridge.wire.topics import COMMAND
 
 
 def commands() -> tuple[CommandQueue, list[str]]:
-    told: list[str] = []
-    return CommandQueue(Complaints(lambda code, text: told.append(f"{code} {text}"))), told
+    complaints: list[str] = []
+    return CommandQueue(Complaints(lambda code, text: complaints.append(f"{code} {text}"))), complaints
 
 
 def command(block: int, amplitude_m: float = 3e-8, frequency_Hz: float = 2600.0) -> Received:
@@ -21,13 +21,13 @@ def command(block: int, amplitude_m: float = 3e-8, frequency_Hz: float = 2600.0)
     return Received(COMMAND, payload, 0)
 
 
-def test_what_answers_a_block_that_was_passes() -> None:
-    made, told = commands()
+def test_an_answer_to_a_past_block_passes() -> None:
+    made, complaints = commands()
     for block in (5, 6, 6, 9):
         made.push(command(block))
     assert [answered for _, answered in made.take(10)] == [5, 6, 6, 9]
     assert made.take(11) == []
-    assert told == []
+    assert complaints == []
 
 
 @pytest.mark.parametrize(
@@ -42,41 +42,41 @@ def test_what_answers_a_block_that_was_passes() -> None:
         (1e-8, -1.0),
     ],
 )
-def test_what_is_no_vibration_is_dropped(amplitude_m: float, frequency_Hz: float) -> None:
-    made, told = commands()
+def test_an_invalid_amplitude_or_frequency_is_dropped(amplitude_m: float, frequency_Hz: float) -> None:
+    made, complaints = commands()
     for _ in range(100):
         made.push(command(9, amplitude_m, frequency_Hz))
     made.push(command(9))
     assert [answered for _, answered in made.take(10)] == [9]
-    assert len(told) == 1
-    assert told[0].startswith("BAD_MESSAGE command amplitude: ")
+    assert len(complaints) == 1
+    assert complaints[0].startswith("BAD_MESSAGE command amplitude: ")
 
 
 def test_blocks_to_come_and_blocks_long_past_are_dropped() -> None:
-    made, told = commands()
+    made, complaints = commands()
     for block in (9, 10, 2**63, 2**64 - 1, 3, 8):
         made.push(command(block))
     assert [answered for _, answered in made.take(10)] == [9]
-    assert told == [
+    assert complaints == [
         "FOREIGN command ahead: answers block 10, which is still to come after block 9: dropped",
-        "FOREIGN command behind: answers block 3, while block 9 was answered: dropped",
+        "FOREIGN command behind: answers block 3, after block 9 was answered: dropped",
     ]
 
 
 def test_rubbish_is_dropped() -> None:
-    made, told = commands()
+    made, complaints = commands()
     made.push(Received(COMMAND, b"\xff" * 12, 0))
     made.push(Received(COMMAND, b"\xff" * 100_000, 0))
     assert made.take(10) == []
-    assert told[0].startswith("BAD_MESSAGE command: 12 bytes cannot be decoded as Command")
+    assert complaints[0].startswith("BAD_MESSAGE command: 12 bytes cannot be decoded as Command")
 
 
-def test_of_a_flood_the_newest_are_read_and_the_rest_is_told() -> None:
-    made, told = commands()
+def test_the_newest_commands_of_a_flood_are_read_and_the_dropped_ones_reported() -> None:
+    made, complaints = commands()
     for _ in range(WAITING + 744):
         made.push(command(3))
     made.push(command(9))
     assert [answered for _, answered in made.take(10)][-1] == 9
-    assert told == ["FLOOD command: too many for one block: the oldest were dropped (745 times)"]
+    assert complaints == ["FLOOD command: too many for one block: the oldest were dropped (745 times)"]
     assert made.take(11) == []
-    assert len(told) == 1
+    assert len(complaints) == 1

@@ -1,4 +1,4 @@
-"""The states of a rig, and the loop check that stands before ARMED."""
+"""The states of a rig, and the loop check that precedes ARMED."""
 
 import math
 from typing import Any
@@ -92,7 +92,7 @@ def test_a_stop_is_taken_in_fault_too_and_the_first_cause_of_a_fault_stays_other
     assert rig.s.cause == STOP_BY_PERSON
 
 
-def test_another_state_begins_anew_what_is_counted_in_it_and_the_same_one_does_not() -> None:
+def test_a_new_state_resets_the_counters_of_the_state_and_the_same_state_does_not() -> None:
     rig = Rig()
     for state, left in ((ARMED, 3), (DISARMED, 0)):
         rig.s.lost_blocks = rig.s.check_blocks = rig.s.heard = 3
@@ -121,7 +121,7 @@ def test_the_check_measures_the_gain_and_arms() -> None:
         rig.block(NO_COMMAND)
     rig.block(NO_COMMAND)
     assert (rig.s.state, rig.s.cause, rig.s.verified) == (ARMED, FIRST_CHECK, 1)
-    assert rig.s.vibration_mps < 1e-6  # its own tones do not make what follows loud
+    assert rig.s.vibration_mps < 1e-6  # the tones of the check do not count as vibration after it
     assert rig.s.amplitude_m == 0.0
     assert rig.s.gain[:5] == pytest.approx([0.7] * 5, rel=0.03)
     assert rig.p.tone_Hz[:5] == pytest.approx([1250.0, 2000.0, 2750.0, 3500.0, 4250.0])
@@ -136,10 +136,10 @@ def after_a_check(rig: Rig, gain: float, word: int = ARM) -> tuple[int, int]:
     return int(rig.s.state), int(rig.s.cause)
 
 
-def test_a_check_that_finds_another_gain_asks_for_a_persons_word() -> None:
+def test_a_check_that_finds_a_changed_gain_asks_the_operator() -> None:
     rig = Rig(arm=False)
     assert after_a_check(rig, 1.0) == (ARMED, FIRST_CHECK)
-    for gain in (1.1, 1.2, 0.85):  # small changes are compared with what was accepted, and do not add up
+    for gain in (1.1, 1.2, 0.85):  # each is compared with the accepted gain, so small changes do not add up
         apply_order(rig.s, DISARM)
         assert after_a_check(rig, gain) == (ARMED, CHECK_PASSED)
     assert rig.s.accepted[:5] == pytest.approx([1.0] * 5, rel=0.03)
@@ -175,17 +175,17 @@ def after_the_quiet_time(broken: str, channel: str) -> tuple[int, int]:
 
 
 @pytest.mark.parametrize("channel", NOISY)
-def test_a_channel_that_stands_fails_the_check(channel: str) -> None:
+def test_a_frozen_channel_fails_the_check(channel: str) -> None:
     assert after_the_quiet_time("frozen", channel) == (FAULT, SENSOR_FROZEN)
 
 
 @pytest.mark.parametrize("channel", PLACES)
-def test_an_encoder_without_noise_may_stand(channel: str) -> None:
+def test_a_frozen_encoder_without_noise_passes_the_check(channel: str) -> None:
     assert after_the_quiet_time("frozen", channel)[0] == CHECKING
 
 
 @pytest.mark.parametrize("channel", [*NOISY, *PLACES])
-def test_a_channel_that_is_no_number_fails_the_check(channel: str) -> None:
+def test_a_channel_of_nan_fails_the_check(channel: str) -> None:
     assert after_the_quiet_time("nan", channel) == (FAULT, SENSOR_NOT_FINITE)
 
 
@@ -212,7 +212,7 @@ def test_an_exciter_that_is_wild_at_the_last_tone_alone_is_not_verified() -> Non
     assert (rig.s.state, rig.s.cause) == (FAULT, EXCITER_WILD)
 
 
-def test_a_channel_may_stand_for_part_of_the_quiet_time() -> None:
+def test_a_channel_may_freeze_for_part_of_the_quiet_time() -> None:
     """A converter of few bits shows the same number for a while."""
     rig = Rig(arm=False)
     apply_order(rig.s, ARM)
@@ -222,7 +222,7 @@ def test_a_channel_may_stand_for_part_of_the_quiet_time() -> None:
     assert rig.s.state == CHECKING
 
 
-def test_the_gain_is_that_of_the_second_half_of_a_tone() -> None:
+def test_the_gain_is_measured_in_the_second_half_of_a_tone() -> None:
     """In the first half the exciter starts, and the base swings in."""
     rig = Rig(arm=False)
     block: Any = sensor_block(20).blank()[0]
@@ -235,7 +235,7 @@ def test_the_gain_is_that_of_the_second_half_of_a_tone() -> None:
     assert rig.s.gain[:5] * omega**2 * rig.p.check_m == pytest.approx([2.0] * 5)
 
 
-def test_a_rig_that_a_person_armed_without_a_controller_is_disarmed_again() -> None:
+def test_a_rig_that_is_armed_without_a_controller_is_disarmed_again() -> None:
     rig = Rig(arm=False)
     apply_order(rig.s, ARM)
     for _ in range(500 + 5 * 200 + 10):

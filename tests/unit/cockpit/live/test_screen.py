@@ -1,4 +1,4 @@
-"""The screen of a terminal: all of the state in words, and dashes for what is not known."""
+"""The screen of a terminal: the whole state in words, and dashes for unknown values."""
 
 import collections
 
@@ -24,7 +24,7 @@ def rig() -> Rig:
     return Rig()
 
 
-def test_a_live_rig_is_told_in_words(rig: Rig) -> None:
+def test_a_live_rig_is_described_in_words(rig: Rig) -> None:
     view = View(rig, "tcp/127.0.0.1:7447", rig.clock)
     for number in range(30):
         rig.block(number, 12.5)
@@ -67,7 +67,7 @@ def test_a_fault_names_the_next_commands(rig: Rig) -> None:
     assert frame_lines(view.now(), [])[-1] == "next     no vibration until `stickslip reset`, then `stickslip arm`"
 
 
-def test_of_a_rig_that_is_silent_there_are_no_figures(rig: Rig) -> None:
+def test_a_silent_rig_has_no_figures(rig: Rig) -> None:
     view = View(rig, "tcp/127.0.0.1:7447", rig.clock)
     rig.blocks(range(30))
     view.step()

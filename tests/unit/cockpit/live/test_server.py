@@ -1,4 +1,4 @@
-"""The server's door: who is let in, how many, how much they may send, and what a person may say."""
+"""Access to the server: allowed clients and their number, message sizes, and commands of an operator."""
 
 import asyncio
 import socket
@@ -27,12 +27,12 @@ TOKEN = "the token"  # noqa: S105
 
 
 def door(path: str = "/stream", host: str = "127.0.0.1:8447", origin: str = "http://127.0.0.1:8447") -> int:
-    found = refusal(path, [host], [origin], 8447, upgrades=True)
-    return found.status if found is not None else 200
+    refused = refusal(path, [host], [origin], 8447, upgrades=True)
+    return refused.status if refused is not None else 200
 
 
 @pytest.mark.parametrize(
-    ("said", "status"),
+    ("headers", "status"),
     [
         ({}, 200),
         ({"host": "localhost:8447", "origin": "http://localhost:8447"}, 200),
@@ -51,11 +51,11 @@ def door(path: str = "/stream", host: str = "127.0.0.1:8447", origin: str = "htt
         ({"path": "/%2e%2e/"}, 404),
     ],
 )
-def test_only_the_page_of_this_server_is_answered(said: dict[str, str], status: int) -> None:
-    assert door(**said) == status
+def test_only_the_page_of_this_server_is_answered(headers: dict[str, str], status: int) -> None:
+    assert door(**headers) == status
 
 
-def test_a_header_that_comes_twice_or_never_is_none() -> None:
+def test_a_header_that_is_repeated_or_missing_is_refused() -> None:
     assert refusal("/", ["127.0.0.1:1", "evil:1"], [], 1, upgrades=False) is not None
     assert refusal("/", [], [], 1, upgrades=False) is not None
     assert refusal("/stream", ["127.0.0.1:1"], ["http://127.0.0.1:1", "http://x"], 1, upgrades=True) is not None
@@ -85,13 +85,13 @@ def page_of(port: int) -> Any:
 
 
 def raw(port: int, request: bytes, timeout_s: float = PATIENCE_S) -> bytes:
-    """What the server sends until it closes."""
+    """The bytes that the server sends until it closes."""
     with socket.create_connection(("127.0.0.1", port), timeout=timeout_s) as sock:
         sock.sendall(request)
-        found = b""
+        received = b""
         while chunk := sock.recv(1 << 16):
-            found += chunk
-        return found
+            received += chunk
+        return received
 
 
 async def next_of(socket: Any, kind: str) -> dict[str, Any]:
@@ -101,7 +101,7 @@ async def next_of(socket: Any, kind: str) -> dict[str, Any]:
             return table
 
 
-def test_a_page_loads_nothing_and_sees_that_there_is_no_rig(port: int) -> None:
+def test_a_page_loads_nothing_and_shows_that_no_rig_is_connected(port: int) -> None:
     head, _, body = raw(port, f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode()).partition(b"\r\n\r\n")
     assert head.startswith(b"HTTP/1.1 200")
     assert b"default-src 'none'" in head
@@ -118,12 +118,12 @@ def test_a_page_loads_nothing_and_sees_that_there_is_no_rig(port: int) -> None:
             assert "drive_force_N.least" in (await next_of(page, "hello"))["columns"]
             first, second = await next_of(page, "now"), await next_of(page, "now")
             assert first["phase"] == "waiting"
-            assert second["sent_s"] > first["sent_s"]  # from which the page computes the age of what it shows
+            assert second["sent_s"] > first["sent_s"]  # the page computes the age of its data from it
 
     asyncio.run(look())
 
 
-def test_strangers_are_refused_by_the_running_server(port: int) -> None:
+def test_clients_of_another_origin_are_refused_by_the_running_server(port: int) -> None:
     async def look() -> None:
         url = f"ws://127.0.0.1:{port}/stream"
         for origin in ("http://evil.example", None):
@@ -173,9 +173,7 @@ def test_a_thirteenth_page_sees_nothing_and_may_stop(port: int, monkeypatch: pyt
     assert words == ["STOP"]
 
 
-def test_connections_that_say_nothing_keep_no_page_out(
-    monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
-) -> None:
+def test_silent_connections_keep_no_page_out(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
     monkeypatch.setattr(server, "_OPEN_S", 2.0 * PATIENCE_S)  # none of them is closed before the page has come
     port = request.getfixturevalue("port")
     words = f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode()
@@ -185,8 +183,8 @@ def test_connections_that_say_nothing_keep_no_page_out(
     try:
         assert b" 200 " in raw(port, words)
     finally:
-        for one in half_open:
-            one.close()
+        for connection in half_open:
+            connection.close()
 
 
 def test_where_all_connections_are_pages_the_next_is_closed_at_once(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -203,13 +201,15 @@ def test_where_all_connections_are_pages_the_next_is_closed_at_once(port: int, m
     asyncio.run(look())
 
 
-def test_arming_needs_the_token_and_stop_waits_for_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_arming_needs_the_token_and_stop_does_not_wait_for_a_command_in_progress(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(operator_link, "_WRONG_S", 0.2)
-    said: list[str] = []
+    commands: list[str] = []
     armed = threading.Event()
 
     def apply_order(_bus: BusConfig, word: str) -> CommandOutcome:
-        said.append(word)
+        commands.append(word)
         if word == "ARM":
             armed.wait(PATIENCE_S)
         if word == "RESET":
@@ -223,7 +223,7 @@ def test_arming_needs_the_token_and_stop_waits_for_nobody(monkeypatch: pytest.Mo
         for token in ("guess", "", "\ud800"):  # the last is half of a pair, as JSON may hold it
             wrong = await words.deliver(operator_link.Wish("ARM", token))
             assert "wrong token" in wrong["lines"][0]
-        assert said == []
+        assert commands == []
         arming = asyncio.create_task(words.deliver(operator_link.Wish("ARM", TOKEN)))
         await asyncio.sleep(0.05)
         assert "in progress" in (await words.deliver(operator_link.Wish("DISARM", TOKEN)))["lines"][0]
@@ -234,7 +234,7 @@ def test_arming_needs_the_token_and_stop_waits_for_nobody(monkeypatch: pytest.Mo
         assert failed["lines"] == ["nobody there\\x1b[2J"]
 
     asyncio.run(look())
-    assert said == ["ARM", "STOP", "RESET"]
+    assert commands == ["ARM", "STOP", "RESET"]
 
 
 def test_a_stop_that_reaches_no_rig_is_sent_again(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -312,7 +312,7 @@ def test_the_token_is_in_a_file_of_this_user_alone(tmp_path: Any, monkeypatch: p
     assert not path.exists()
 
 
-def test_a_port_that_is_taken_is_told() -> None:
+def test_a_taken_port_is_reported() -> None:
     with listening(0) as sock, pytest.raises(Fault, match="choose another --port") as raised:
         listening(int(sock.getsockname()[1]))
     assert raised.value.kind.code == "ENDPOINT_BUSY"

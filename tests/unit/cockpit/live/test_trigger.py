@@ -22,21 +22,21 @@ def view(rig: Rig) -> View:
 
 def go_on(rig: Rig, view: View, blocks: range, slips_from: dict[int, int], force=lambda number: 1.0 * number):
     """Blocks in steps of 50, as a server takes them; every capture on the way."""
-    found, slips = [], 0
+    slips_caught, slips = [], 0
     for number in blocks:
         slips = slips_from.get(number, slips)
         rig.block(number, force(number))
         rig.answer(number, slips)
         if number % 50 == 49:
             capture = view.step().capture
-            found += [capture] if capture is not None else []
-    return found
+            slips_caught += [capture] if capture is not None else []
+    return slips_caught
 
 
-def test_a_slip_is_caught_with_what_was_before_and_after(rig: Rig, view: View) -> None:
-    found = go_on(rig, view, range(1000), {400: 1})
-    assert len(found) == 1
-    capture = found[0]
+def test_a_slip_is_caught_with_the_time_before_and_after(rig: Rig, view: View) -> None:
+    slips_caught = go_on(rig, view, range(1000), {400: 1})
+    assert len(slips_caught) == 1
+    capture = slips_caught[0]
     assert (capture.cause, capture.number, capture.missing) == (BY_SLIP, 1, 0)
     assert capture.t_s == pytest.approx(0.401)
     assert capture.samples.shape == (5, BLOCKS * SAMPLES)
@@ -47,25 +47,25 @@ def test_a_slip_is_caught_with_what_was_before_and_after(rig: Rig, view: View) -
 
 
 def test_slips_that_follow_at_once_are_one_capture(rig: Rig, view: View) -> None:
-    found = go_on(rig, view, range(2000), {400: 1, 450: 2, 700: 3, 1300: 4})
-    assert [round(one.t_s, 3) for one in found] == [0.401, 1.301]
+    slips_caught = go_on(rig, view, range(2000), {400: 1, 450: 2, 700: 3, 1300: 4})
+    assert [round(one.t_s, 3) for one in slips_caught] == [0.401, 1.301]
 
 
-def test_slips_of_before_this_server_listened_are_no_trigger(rig: Rig, view: View) -> None:
+def test_slips_before_the_server_listened_do_not_trigger(rig: Rig, view: View) -> None:
     assert go_on(rig, view, range(600), {0: 7}) == []
 
 
-def test_a_person_may_take_one(rig: Rig, view: View) -> None:
+def test_an_operator_may_trigger_by_hand(rig: Rig, view: View) -> None:
     go_on(rig, view, range(300), {})
     view.take_now()
-    found = go_on(rig, view, range(300, 600), {})
-    assert [(one.cause, round(one.t_s, 3)) for one in found] == [(BY_HAND, 0.3)]
+    slips_caught = go_on(rig, view, range(300, 600), {})
+    assert [(one.cause, round(one.t_s, 3)) for one in slips_caught] == [(BY_HAND, 0.3)]
 
 
 def test_a_lost_block_is_a_hole_in_it(rig: Rig, view: View) -> None:
     go_on(rig, view, range(390), {})
-    found = go_on(rig, view, range(395, 1000), {400: 1})
-    assert found[0].missing == 5
-    force = found[0].samples[0].reshape(BLOCKS, SAMPLES)[:, 0]
+    slips_caught = go_on(rig, view, range(395, 1000), {400: 1})
+    assert slips_caught[0].missing == 5
+    force = slips_caught[0].samples[0].reshape(BLOCKS, SAMPLES)[:, 0]
     assert np.isnan(force[89:94]).all()
     assert np.isfinite(np.delete(force, slice(89, 94))).all()

@@ -1,4 +1,4 @@
-"""What a person is shown: buckets that hold every slip, holes where blocks are lost, and nothing old as if it were of now."""
+"""The live view: buckets that hold every slip, holes where blocks are lost, and no old value shown as present."""
 
 import json
 
@@ -32,13 +32,13 @@ def test_a_bucket_has_the_smallest_mean_and_largest_sample(rig: Rig, view: View)
         rig.applied(number, amplitude_m=1e-9 * number)
     buckets = view.step().buckets
     assert buckets is not None
-    assert (buckets.first, buckets.end) == (0, 5)  # the last three wait for what answers them
+    assert (buckets.first, buckets.end) == (0, 5)  # the last three wait for their commands
     least = column(buckets.values, COLUMNS, "drive_force_N.least")
     assert least[2] == 3.0
     assert least[[0, 1, 3, 4]].tolist() == [10.0] * 4
     assert column(buckets.values, COLUMNS, "drive_force_N.most").tolist() == [10.0] * 5
     assert column(buckets.values, COLUMNS, "drive_force_N.mean")[2] == pytest.approx(10.0 - 7.0 / 100)
-    # of what holds from block to block the last of the bucket
+    # values that hold from block to block: the last of the bucket
     assert column(buckets.values, COLUMNS, "amplitude_m") == pytest.approx(1e-9 * np.array([4, 9, 14, 19, 24]))
     assert np.isnan(column(buckets.values, COLUMNS, "time_to_slip_s")).all()  # -1: not known
 
@@ -82,7 +82,7 @@ def test_steps_join_without_a_seam(rig: Rig, view: View) -> None:
         rig.blocks(range(start, min(start + 13, 103)))
         buckets = view.step().buckets
         made += [buckets] if buckets is not None else []
-    assert [one.first for one in made[1:]] == [one.end for one in made[:-1]]
+    assert [bucket.first for bucket in made[1:]] == [bucket.end for bucket in made[:-1]]
     assert view.run is not None
     kept = view.run.buckets.kept()
     assert kept is not None
@@ -90,7 +90,7 @@ def test_steps_join_without_a_seam(rig: Rig, view: View) -> None:
     assert not np.isnan(column(kept.values, COLUMNS, "mode")).any()
 
 
-def test_what_is_old_is_not_shown_as_what_is(rig: Rig, view: View) -> None:
+def test_old_values_are_not_shown_as_present(rig: Rig, view: View) -> None:
     assert view.now()["answer"]["text"] == "waiting: a rig is connected but has sent no block yet"
     rig.blocks(range(30))
     view.step()
@@ -122,7 +122,7 @@ def test_a_controller_that_is_silent_decides_nothing(rig: Rig, view: View) -> No
     assert now["answer"]["text"].startswith("no controller")
 
 
-def test_an_end_is_an_end_and_another_run_begins_anew(rig: Rig, view: View) -> None:
+def test_an_end_is_shown_and_another_run_restarts_the_view(rig: Rig, view: View) -> None:
     rig.blocks(range(400))
     rig.event("END", "blocks=400")
     assert view.step().new_run
@@ -153,7 +153,7 @@ def test_a_rig_of_other_blocks_is_another_run(rig: Rig, view: View) -> None:
     assert set(column(step.buckets.values, COLUMNS, "drive_force_N.mean").tolist()) == {7.0}
 
 
-def test_a_fault_is_told_first_and_with_what_to_do(rig: Rig, view: View) -> None:
+def test_a_fault_is_shown_first_with_its_remedy(rig: Rig, view: View) -> None:
     for number in range(20):
         rig.block(number)
         rig.answer(number, mode=wire.WATCH)

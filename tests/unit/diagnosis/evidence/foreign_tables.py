@@ -29,8 +29,8 @@ class Kind(NamedTuple):
     content: str | bytes | Callable[[Path], Any]
     columns: tuple[str, str, str]
     rows: slice = slice(0, 1000)
-    force_too: float = 1.0  # SI over what the file says
-    says: str = ""  # in a finding
+    force_too: float = 1.0  # factor from the force in the file to N
+    says: str = ""  # expected part of a finding
 
 
 def rows(*columns: Any, sep: str = ",", end: str = "\n", form: str = "{:.6f}") -> str:
@@ -149,7 +149,7 @@ KINDS = (
     Kind("kilo-row.csv", "Time;Force\n[ms];[kN]\n" + rows(1e3 * T, 1e-3 * FORCE, sep=";", form="{:.8f}"), ("Time", "Force", ""), says="is in kN: times 1000"),
     Kind("units-in-names.dat", "Zeit / ms\tKraft (mN)\tWeg [mm]\n" + rows(1e3 * T, 1e3 * FORCE, 1e3 * POSITION, sep="\t"), ("Zeit", "Kraft", "Weg")),
     Kind("stroke.dat", "Zeit/ms\tKraft/mN\ts/mm\n" + german(rows(1e3 * T, 1e3 * FORCE, 1e3 * POSITION, sep="\t")), ("Zeit", "Kraft", "s")),
-    Kind("days.csv", "Timestamp,F\n" + "".join(f"{46082.75 + s / 86400:.11f},{f:.5f}\n" for s, f in zip(T, FORCE, strict=True)), ("Timestamp", "F", ""), says="calendar in steps of 86400 s"),
+    Kind("days.csv", "Timestamp,F\n" + "".join(f"{46082.75 + s / 86400:.11f},{f:.5f}\n" for s, f in zip(T, FORCE, strict=True)), ("Timestamp", "F", ""), says="calendar time in steps of 86400 s"),
     Kind("names-twice.csv", "Time,Force,Time,Position\n" + rows(T, FORCE, T, POSITION), ("Time", "Force", "")),
     Kind("iso-time.csv", "timestamp,F\n" + rows(_STAMPS, FORCE), ("timestamp", "F", ""), says="counted in seconds from the first row"),
     Kind("clock.csv", "Zeit;F\n" + german(rows([s[11:] for s in _STAMPS], FORCE, sep=";")), ("Zeit", "F", "")),
@@ -177,7 +177,7 @@ KINDS = (
     Kind("UPPER.CSV", "t,F\n" + rows(T, FORCE), ("t", "F", "")),
     Kind("labview.lvm", _LVM + "X_Value\tKraft\tWeg\tComment\r\n" + german(rows(T, FORCE, POSITION, sep="\t", end="\r\n")), ("X_Value", "Kraft", "")),
     Kind("plotjuggler.csv", "__time,/ft/force,/axis/position\n" + "".join(f"{1.7e9 + s:.6f},{f:.5f},\n" if i % 2 == 0 else f"{1.7e9 + s:.6f},,{p:.8f}\n" for i, (s, f, p) in enumerate(zip(T, FORCE, POSITION, strict=True))), ("__time", "/ft/force", "/axis/position"), slice(2, 1000, 2), says="has its own clock"),
-    Kind("rosbag.csv", "%time,field.wrench.force.x\n" + "".join(f"{1_700_000_000_000_000_000 + round(s * 1e9)},{f:.5f}\n" for s, f in zip(T, FORCE, strict=True)), ("%time", "field.wrench.force.x", ""), says="time of the calendar"),
+    Kind("rosbag.csv", "%time,field.wrench.force.x\n" + "".join(f"{1_700_000_000_000_000_000 + round(s * 1e9)},{f:.5f}\n" for s, f in zip(T, FORCE, strict=True)), ("%time", "field.wrench.force.x", ""), says="calendar time"),
     Kind("sec-nanosec.csv", "header.stamp.sec,header.stamp.nanosec,F\n" + "".join(f"{1_700_000_000 + int(s)},{round(s % 1 * 1e9)},{f:.5f}\n" for s, f in zip(T, FORCE, strict=True)), ("header.stamp.sec", "F", ""), says="both are one time"),
     Kind("minutes.csv", "Elapsed,F\n" + rows([f"{(3599 + s) % 3600 // 60:02.0f}:{(59 + s) % 60:06.3f}" for s in T], FORCE), ("Elapsed", "F", "")),
     Kind("unit-in-cells.csv", "t,F\n" + "".join(f"{s:.6f},{f'{f:.5f} N' if i % 3 else f'{1e3 * f:.2f} mN'}\n" for i, (s, f) in enumerate(zip(T, FORCE, strict=True))), ("t", "F", ""), says="has the unit N in its cells"),

@@ -1,4 +1,4 @@
-"""Doubts about an evidence folder: every one is a finding, and what is doubtful is not used."""
+"""Doubtful data in an evidence folder: each gives a finding and is not used."""
 
 import math
 import shutil
@@ -89,7 +89,7 @@ def slow_accelerometer(data: Columns) -> None:
     ("change", "kind", "text", "unused", "rows"),
     [
         (spike_of_nan, "not-finite", "mass_accel_mps2: 2 samples are no finite number, first row 8", "", 3998),
-        (repeated_time, "time", "t_s: 1 row is not later than the one before, first row 101", "", 3999),
+        (repeated_time, "time", "t_s: 1 row is not later than the row before, first row 101", "", 3999),
         (dead_sensor, "constant", "mass_accel_mps2: is 0 in every row; not used", "mass_accel_mps2", 4000),
         (accel_in_other_unit, "units", "mass_accel_mps2: reaches", "mass_accel_mps2", 4000),
         (clipped_force, "clipped", "drive_force_N: ", "", 4000),
@@ -107,10 +107,16 @@ def slow_accelerometer(data: Columns) -> None:
         (no_value, "outlier", "2 outliers, first row 501 = -9999: no measurement; left out", "", 3998),
         (wild, "wild", "mass_accel_mps2: 2 samples are beyond 100000, first row 501: -200000; not used", "", 3998),
         (negative_vibration, "sign", "vibration_amplitude_m: 4000 samples are negative", "", 4000),
-        (slow_accelerometer, "rate", "mass_accel_mps2: 2000 Hz, below 8000 Hz: how strongly it vibrates", "", 4000),
+        (
+            slow_accelerometer,
+            "rate",
+            "mass_accel_mps2: 2000 Hz, below 8000 Hz: the strength of its vibration",
+            "",
+            4000,
+        ),
     ],
 )
-def test_doubts_are_told_and_not_used(
+def test_doubtful_columns_are_reported_and_not_used(
     tmp_path: Path, change: Callable[[Columns], None], kind: str, text: str, unused: str, rows: int
 ) -> None:
     data = columns()
@@ -126,7 +132,7 @@ def test_doubts_are_told_and_not_used(
 
 
 def test_only_the_end_that_a_sensor_reached_limits_the_model(tmp_path: Path) -> None:
-    """Rows that are left out before count: the file's own row is told."""
+    """The finding names the row of the file: earlier rows that were left out count."""
     data = columns()
     repeated_time(data)
     clipped_force(data)
@@ -138,19 +144,19 @@ def test_only_the_end_that_a_sensor_reached_limits_the_model(tmp_path: Path) -> 
 
 
 def test_a_drive_that_goes_back_may_unload_its_spring(tmp_path: Path) -> None:
-    """0.1 mm of a spring that is loaded by 1.3 mm: the force stays as it was, forward."""
+    """The drive returns by 0.1 mm and its spring is extended by 1.3 mm: the force stays positive."""
     data = columns()
     data["drive_position_m"] *= -0.1
     manifest = MANIFEST.replace("drive_velocity_mps = 0.0005", "")
     assert kinds(load_evidence(folder(tmp_path, data, manifest))) == {}
 
 
-def test_half_a_vibration_is_none_and_told(tmp_path: Path) -> None:
+def test_an_amplitude_without_a_frequency_is_reported_and_not_used(tmp_path: Path) -> None:
     data = columns()
     half_a_vibration(data)
     findings = load_evidence(folder(tmp_path, data)).findings
-    (told,) = [one for one in findings if "vibration" in one.where]
-    assert told.in_words().split()[:3] == ["missing", "run-01.parquet:", "vibration_frequency_Hz:"]
+    (finding,) = [item for item in findings if "vibration" in item.where]
+    assert finding.in_words().split()[:3] == ["missing", "run-01.parquet:", "vibration_frequency_Hz:"]
 
 
 def test_a_speed_without_a_drive_position_may_be_in_mm(tmp_path: Path) -> None:
@@ -164,18 +170,18 @@ def test_a_speed_without_a_drive_position_may_be_in_mm(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("stated", [True, False])
-def test_a_drive_that_stands_still_is_told(tmp_path: Path, stated: bool) -> None:
-    """Such a run says `no-gap` of nearly every rig."""
+def test_a_drive_that_rests_in_the_whole_run_is_reported(tmp_path: Path, stated: bool) -> None:
+    """The verdict on such a run is `no-gap` for nearly every rig."""
     data = columns()
     data["drive_position_m"][:] = 0.01 + np.random.default_rng(2).normal(0, 1e-7, 4000)
     if stated:
         del data["drive_position_m"]
     speed = "drive_velocity_mps = 0.0" if stated else ""
-    found = kinds(load_evidence(folder(tmp_path, data, MANIFEST.replace("drive_velocity_mps = 0.0005", speed))))
-    assert "the drive rests in the whole run: friction and drive are not tested" in found["still"]
+    reported = kinds(load_evidence(folder(tmp_path, data, MANIFEST.replace("drive_velocity_mps = 0.0005", speed))))
+    assert "the drive rests during the run: friction and drive are not tested" in reported["still"]
 
 
-def test_a_clock_with_too_few_digits_is_told_as_one(tmp_path: Path) -> None:
+def test_a_clock_with_too_few_digits_is_refused(tmp_path: Path) -> None:
     data = columns()
     data["t_s"] = np.round(data["t_s"], 3)
     with pytest.raises(
@@ -194,7 +200,7 @@ def test_time_in_ms_is_refused(tmp_path: Path) -> None:
         load_evidence(folder(tmp_path, data))
 
 
-def test_a_tolerance_of_nothing_is_told(tmp_path: Path) -> None:
+def test_a_relative_tolerance_of_zero_is_reported(tmp_path: Path) -> None:
     manifest = MANIFEST.replace("mass_kg = 0.005", "drive_damping_Ns_per_m = 0.1")
     assert (
         "rig.tolerance.drive_damping_Ns_per_m: is relative"
@@ -202,7 +208,7 @@ def test_a_tolerance_of_nothing_is_told(tmp_path: Path) -> None:
     )
 
 
-def test_what_a_cut_log_has_lost_is_told(tmp_path: Path) -> None:
+def test_the_loss_of_a_cut_log_is_reported(tmp_path: Path) -> None:
     (tmp_path / "run.mcap").write_bytes(short_log()[: len(short_log()) * 2 // 3])
     columns, (cut,) = read_columns(tmp_path / "run.mcap", {})
     assert 3000 < len(columns["t_s"]) < 7000
@@ -213,12 +219,16 @@ def test_what_a_cut_log_has_lost_is_told(tmp_path: Path) -> None:
 def test_a_misspelt_column_is_named(tmp_path: Path) -> None:
     data = columns()
     misspelt(data)
-    said = [one.text for one in load_evidence(folder(tmp_path, data)).findings if "mass_accel_mps2" in one.where]
-    assert said[0] == 'not there, but mass_Accel_mps2 is: set channels.mass_accel_mps2.column = "mass_Accel_mps2"'
+    message = [
+        finding.text for finding in load_evidence(folder(tmp_path, data)).findings if "mass_accel_mps2" in finding.where
+    ]
+    assert (
+        message[0] == 'missing, but mass_Accel_mps2 is present: set channels.mass_accel_mps2.column = "mass_Accel_mps2"'
+    )
 
 
 @pytest.mark.parametrize("rows", [slice(0, 300), slice(-300, None)])
-def test_a_force_that_is_cut_off_where_a_run_begins_or_ends_is_told(tmp_path: Path, rows: slice) -> None:
+def test_a_force_that_is_clipped_at_the_begin_or_end_of_a_run_is_reported(tmp_path: Path, rows: slice) -> None:
     data = columns()
     data["drive_force_N"][rows] = 20.0
     evidence = load_evidence(folder(tmp_path, data))
@@ -227,7 +237,7 @@ def test_a_force_that_is_cut_off_where_a_run_begins_or_ends_is_told(tmp_path: Pa
 
 
 def test_a_drive_that_rests_before_it_starts_is_not_cut_off(tmp_path: Path) -> None:
-    """Commanded, without noise: its step from rest is ten times that of the slow stretch at its end."""
+    """A commanded position without noise: its first step from rest is ten times the steps of the slow last stretch."""
     data = columns()
     velocity_mps = np.repeat([0.0, 0.001, 0.0001], [1000, 500, 2500])
     data["drive_position_m"] = 0.01 + np.cumsum(velocity_mps) / 2000
@@ -236,7 +246,7 @@ def test_a_drive_that_rests_before_it_starts_is_not_cut_off(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(
-    ("spoil", "said"),
+    ("spoil", "message"),
     [
         (
             lambda values: np.where(np.arange(4000) < 2500, np.nan, values),
@@ -251,32 +261,32 @@ def test_a_drive_that_rests_before_it_starts_is_not_cut_off(tmp_path: Path) -> N
     ids=["blank where it is off", "one", "in um"],
 )
 def test_a_vibration_that_cannot_be_read_is_not_left_out(
-    tmp_path: Path, spoil: Callable[[np.ndarray], np.ndarray], said: str
+    tmp_path: Path, spoil: Callable[[np.ndarray], np.ndarray], message: str
 ) -> None:
-    """The model would run without it beside a run with it."""
+    """Otherwise the model would omit the vibration of this run and predict it in the other runs."""
     data = columns()
     slow_accelerometer(data)
     data["vibration_amplitude_m"] = spoil(data["vibration_amplitude_m"])
-    with pytest.raises(Fault, match=f"BAD_EVIDENCE: run-01.parquet: vibration_amplitude_m: {said}"):
+    with pytest.raises(Fault, match=f"BAD_EVIDENCE: run-01.parquet: vibration_amplitude_m: {message}"):
         load_evidence(folder(tmp_path, data))
 
 
-def test_positions_in_mm_are_told_where_the_drive_goes_to_and_fro(tmp_path: Path) -> None:
-    """Net it goes nowhere, and no velocity is stated."""
+def test_positions_in_mm_are_reported_where_the_drive_goes_to_and_fro(tmp_path: Path) -> None:
+    """The drive returns to its start, and no velocity is stated."""
     data = columns()
     to_and_fro_m = 2e-3 * (1.0 - np.abs(np.linspace(-1.0, 1.0, 4000)))
     for scale, kind in ((1.0, None), (1000.0, "units")):
         data["drive_position_m"] = scale * to_and_fro_m
         manifest = MANIFEST.replace("drive_velocity_mps = 0.0005", "")
-        found = kinds(load_evidence(folder(tmp_path, data, manifest)))
-        assert list(found) == ([kind] if kind else [])
-    assert "drive_position_m: 2 m/s, 4e+03 times rig.stribeck_velocity_mps: is it in mm?" in found["units"]
+        reported = kinds(load_evidence(folder(tmp_path, data, manifest)))
+        assert list(reported) == ([kind] if kind else [])
+    assert "drive_position_m: 2 m/s, 4e+03 times rig.stribeck_velocity_mps: is it in mm?" in reported["units"]
     data["drive_position_m"], data["mass_position_m"] = to_and_fro_m, 1000.0 * to_and_fro_m
-    found = kinds(load_evidence(folder(tmp_path, data, manifest)))
-    assert "mass_position_m: travels 2: the drive moves by 0.002 m" in found["units"]
+    reported = kinds(load_evidence(folder(tmp_path, data, manifest)))
+    assert "mass_position_m: travels 2: the drive moves by 0.002 m" in reported["units"]
 
 
-def test_a_mapped_column_that_one_run_lacks_is_told_and_one_that_all_lack_is_refused(tmp_path: Path) -> None:
+def test_a_mapped_column_that_one_run_lacks_is_reported_and_one_that_all_lack_is_refused(tmp_path: Path) -> None:
     data = columns()
     channels = '[channels]\nmass_accel_mps2 = { column = "acc" }\n[[run]]'
     manifest = MANIFEST.replace("[[run]]", channels) + '[[run]]\nfile = "run-02.parquet"\ndrive_velocity_mps = 0.0005\n'
@@ -303,13 +313,13 @@ def measured() -> Path:
 @pytest.mark.parametrize(
     ("key", "value", "kind", "expected"),
     [
-        ("channels.mass_accel_mps2.scale", -1.0, "sign", "mass_accel_mps2: points backwards: the mass accelerates as"),
-        ("channels.mass_accel_mps2.scale", 0.10197, "units", "a spring of 1.1e+05 N/m makes it"),
+        ("channels.mass_accel_mps2.scale", -1.0, "sign", "mass_accel_mps2: has the wrong sign: the mass seems"),
+        ("channels.mass_accel_mps2.scale", 0.10197, "units", "shows a drive stiffness of 1.1e+05 N/m"),
         ("rig.drive_stiffness_N_per_m", 11.7, "units", "but rig.drive_stiffness_N_per_m = 11.7: check the units"),
         ("rig.drive_stiffness_N_per_m", 6000.0, "", ""),
     ],
 )
-def test_a_force_that_bends_otherwise_tells_a_sign_and_a_unit(
+def test_a_force_that_contradicts_the_acceleration_reveals_a_wrong_sign_or_unit(
     measured: Path, tmp_path: Path, key: str, value: float, kind: str, expected: str
 ) -> None:
     for path in measured.glob("*.parquet"):
@@ -326,14 +336,14 @@ def test_a_force_that_bends_otherwise_tells_a_sign_and_a_unit(
         lines += ["[channels]", f'{name} = {{ column = "{name}", scale = {value} }}']
     lines += ["[[run]]", *(f"{key} = {value!r}".replace("'", '"') for key, value in first.items() if key != "holdout")]
     (tmp_path / "manifest.toml").write_text("\n".join(lines))
-    found = load_evidence(tmp_path)
-    told = {finding.kind: f"{finding.where}: {finding.text}" for finding in found.findings}
-    assert expected in told.get(kind, "")
-    assert {"sign", "units"} & told.keys() == ({kind} if kind else set())
-    assert ("mass_accel_mps2" in found.runs[0].columns) == (kind != "sign")
+    evidence = load_evidence(tmp_path)
+    by_kind = {finding.kind: f"{finding.where}: {finding.text}" for finding in evidence.findings}
+    assert expected in by_kind.get(kind, "")
+    assert {"sign", "units"} & by_kind.keys() == ({kind} if kind else set())
+    assert ("mass_accel_mps2" in evidence.runs[0].columns) == (kind != "sign")
 
 
-def test_numbers_without_a_tolerance_are_told(tmp_path: Path) -> None:
+def test_numbers_without_a_tolerance_are_reported(tmp_path: Path) -> None:
     manifest = MANIFEST.replace("static_force_N = 0.03\nstribeck_velocity_mps = 0.1\n", "")
-    told = kinds(load_evidence(folder(tmp_path, columns(), manifest)))["tolerance"]
-    assert "rig.tolerance: none for static_force_N, stribeck_velocity_mps: known exactly, so" in told
+    text = kinds(load_evidence(folder(tmp_path, columns(), manifest)))["tolerance"]
+    assert "rig.tolerance: missing for static_force_N, stribeck_velocity_mps: counts as known exactly, so" in text

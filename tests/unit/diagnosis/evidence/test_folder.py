@@ -1,4 +1,4 @@
-"""The evidence folder: what is read of it, and an error for what cannot be, which names its place."""
+"""The evidence folder: its content is read, and each error names its place."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -170,7 +170,7 @@ def in_micronewton(data: Columns) -> None:
         (words, "run-01.parquet: column drive_force_N: row 1 = 'overload': must be a number"),
         (
             starts_again,
-            "run-01.parquet: t_s: 2000 rows are not later than the one before, first row 2001: 0 s after 0.9995 s",
+            "run-01.parquet: t_s: 2000 rows are not later than the row before, first row 2001: 0 s after 0.9995 s",
         ),
         (half_is_nan, "run-01.parquet: t_s: 1334 samples are no finite number, first row 1"),
         (half_a_second, "run-01.parquet: t_s: 0.5 s long: must be 1 s at least; give a longer run"),
@@ -259,7 +259,7 @@ def test_a_run_log_is_a_run(tmp_path: Path) -> None:
     assert {"drive_force_N", "base_accel_mps2", "vibration_frequency_Hz"} <= columns.keys()
 
 
-def test_the_command_in_force_is_the_one_that_the_rig_had(tmp_path: Path) -> None:
+def test_the_command_in_force_is_the_applied_command(tmp_path: Path) -> None:
     def change(tables: dict[str, Any]) -> None:
         tables["command"]["amplitude_m"] = 1e-9 * (tables["command"]["block"] + 1)
 
@@ -270,7 +270,7 @@ def test_the_command_in_force_is_the_one_that_the_rig_had(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("name", ["run-01.parquet", "run.csv", "run.mat", "run.mcap"])
-def test_a_file_that_is_not_what_its_name_says(tmp_path: Path, name: str) -> None:
+def test_a_file_whose_content_does_not_fit_its_suffix_is_refused(tmp_path: Path, name: str) -> None:
     (tmp_path / "manifest.toml").write_text(MANIFEST.replace("run-01.parquet", name))
     (tmp_path / name).write_bytes(b"\x00\x01nothing of the kind\xff" * 20)
     with pytest.raises(Fault) as caught:
@@ -279,7 +279,7 @@ def test_a_file_that_is_not_what_its_name_says(tmp_path: Path, name: str) -> Non
     assert name in caught.value.line
 
 
-def test_a_manifest_of_notepad_is_read_and_one_of_another_encoding_told(tmp_path: Path) -> None:
+def test_a_manifest_with_a_byte_order_mark_is_read_and_another_encoding_refused(tmp_path: Path) -> None:
     folder(tmp_path, columns())
     (tmp_path / "manifest.toml").write_text(MANIFEST, encoding="utf-8-sig")
     assert load_evidence(tmp_path).rig.mass_kg == 1.5

@@ -47,9 +47,9 @@ def test_a_foreign_table_comes_in(tmp_path: Path, kind: Kind) -> None:
     t_s = table["t_s"].to_numpy()
     assert t_s - t_s[0] == pytest.approx(T[kind.rows] - T[kind.rows][0], abs=2e-6)
     got = table["drive_force_N"].to_numpy()
-    there = np.isfinite(got)
-    assert (~there).sum() <= 1
-    assert got[there] == pytest.approx(FORCE[kind.rows][there], abs=2e-5)
+    finite = np.isfinite(got)
+    assert (~finite).sum() <= 1
+    assert got[finite] == pytest.approx(FORCE[kind.rows][finite], abs=2e-5)
     if position:
         late = 0.05 if kind.file == "start-offset.tdms" else 0.0
         assert table["drive_position_m"].to_numpy() == pytest.approx(POSITION[kind.rows] - 1e-3 * late, abs=2e-8)
@@ -60,7 +60,7 @@ def test_a_unit_of_another_quantity_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("t [s],Temp [°C],M [Nm]\n" + "".join(f"{t},20.5,{2 + t}\n" for t in T))
     with pytest.raises(Fault, match=r"column Temp: is in °C, a temperature: must be a force, as drive_force_N"):
         import_file(tmp_path / "a.csv", channel_map(tmp_path, t_s="t", drive_force_N="Temp"), tmp_path / "out")
-    with pytest.raises(Fault, match=r'is in Nm, a torque, and the rig slides; a rig that turns has drive = "torsion"'):
+    with pytest.raises(Fault, match=r'is in Nm, a torque, and the rig slides; a rotary rig has drive = "torsion"'):
         import_file(tmp_path / "a.csv", channel_map(tmp_path, t_s="t", drive_force_N="M"), tmp_path / "out")
 
 
@@ -95,7 +95,7 @@ def test_a_packed_file_is_named_as_one(tmp_path: Path) -> None:
         *((name, "") for name in ("U/min", "kN/s", "N/mm", "counts/s", "log/t", "/imu/g", "plant/axis/s", "Kraft/Weg")),
     ],
 )  # fmt: skip
-def test_a_unit_behind_a_stroke_is_no_path_and_no_rate(name: str, unit: str) -> None:
+def test_a_unit_after_a_slash_is_distinguished_from_paths_and_rates(name: str, unit: str) -> None:
     assert unit_in_name(name) == unit
 
 

@@ -32,7 +32,7 @@ from tests.unit.diagnosis.evidence.measured_tables import CSV, GERMAN, MAP, SOUR
     ],
     ids=["text", "delimiter", "encoding", "ragged", "footer", "names further down", "a cell"],
 )
-def test_a_csv_file_of_another_kind_is_read_and_says_so(tmp_path: Path, text: str, channel_map: str, expected: str):
+def test_an_unusual_csv_file_is_read_with_a_finding(tmp_path: Path, text: str, channel_map: str, expected: str):
     (tmp_path / "a.csv").write_text(text, encoding="latin-1")
     (tmp_path / "map.toml").write_text(channel_map)
     done = import_file(tmp_path / "a.csv", tmp_path / "map.toml", tmp_path / "out.mcap")
@@ -40,7 +40,7 @@ def test_a_csv_file_of_another_kind_is_read_and_says_so(tmp_path: Path, text: st
     assert done.rows >= 3980
 
 
-def test_what_a_map_says_and_the_file_is_not_names_the_place(tmp_path: Path) -> None:
+def test_a_map_that_contradicts_its_file_is_refused_with_the_place(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(CSV.replace("F", "F/µm", 1), encoding="latin-1")
     with pytest.raises(Fault, match=r"a.csv: line 1: is not utf-8: .*leave source.encoding out"):
         read_table(tmp_path / "a.csv", Dialect(";", ",", encoding="utf-8"))
@@ -74,14 +74,14 @@ def test_a_csv_file_in_another_encoding(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("start", ["\ufeff", "\ufeffLog of the rig\n"])
 @pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
-def test_a_csv_file_of_windows_says_itself_that_it_is_utf_16(tmp_path: Path, start: str, encoding: str) -> None:
+def test_a_csv_file_with_a_utf_16_byte_order_mark_is_read(tmp_path: Path, start: str, encoding: str) -> None:
     (tmp_path / "a.csv").write_bytes((start + CSV).encode(encoding))
     table = read_table(tmp_path / "a.csv", Dialect(";", ",", start.count("\n")))
     assert list(table.columns) == ["Zeit", "F"]
     assert table.column("F")[:2].tolist() == [9.5, 9.51]
 
 
-def test_a_csv_file_in_a_wide_encoding_that_does_not_say_so(tmp_path: Path) -> None:
+def test_a_csv_file_in_utf_16_without_a_byte_order_mark_is_read(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_bytes(CSV.encode("utf-16-le"))
     assert len(read_table(tmp_path / "a.csv").column("F")) == 4000
     assert len(read_table(tmp_path / "a.csv", Dialect(";", ",", encoding="utf-16-le")).column("F")) == 4000

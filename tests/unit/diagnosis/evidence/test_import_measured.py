@@ -1,4 +1,4 @@
-"""Import of data that nobody on this project made: two public sets, beside the project and never inside it."""
+"""Import of two public data sets, stored next to the project and never inside it."""
 
 from pathlib import Path
 

@@ -38,7 +38,7 @@ def test_a_file_becomes_evidence(tmp_path: Path, suffix: str) -> None:
     assert run.drive_velocity_mps == 0.0005
     assumed_too = {"contact_stiffness_N_per_m": 0.3, "contact_damping_Ns_per_m": 0.3}
     assert evidence.rig.tolerance == {"mass_kg": 0.005} | assumed_too
-    # presliding of 0.22 um, critically damped: what the paper's own pair has, 77.5 N/um and 2.15e4 N s/m
+    # presliding of 0.22 um, critically damped: values of the paper's pair, 77.5 N/um and 2.15e4 N s/m
     assert evidence.rig.contact_stiffness_N_per_m == pytest.approx(17.38 / 0.22e-6)
     assert evidence.rig.contact_damping_Ns_per_m == pytest.approx(2.15e4, rel=0.02)
     assumed = [finding.where for finding in done.findings if finding.kind == "assumed"]
@@ -85,8 +85,8 @@ def test_a_second_run_is_added_to_its_rig_only(tmp_path: Path) -> None:
     assert sorted(path.name for path in out.iterdir()) == ["manifest.toml", "measured.parquet", "second.parquet"]
 
 
-def test_the_first_run_of_a_folder_is_none_that_is_kept_aside(tmp_path: Path) -> None:
-    """Such a folder could not be diagnosed, nor a run be added to it."""
+def test_the_first_run_of_a_folder_cannot_be_held_out(tmp_path: Path) -> None:
+    """Such a folder could neither be diagnosed nor be extended by a run."""
     source, channel_map = setup(tmp_path, ".csv", MAP + "holdout = true\n")
     with pytest.raises(
         Fault, match=r"map.toml: run.holdout = true: must be false for the first run .* import .* first"
@@ -110,7 +110,7 @@ def test_a_file_becomes_a_log(tmp_path: Path, suffix: str) -> None:
     assert check_log(tmp_path / "made.mcap").findings == []
 
 
-def test_a_log_of_uneven_time_is_interpolated_and_says_so(tmp_path: Path) -> None:
+def test_a_log_of_uneven_time_is_interpolated_with_a_finding(tmp_path: Path) -> None:
     source, channel_map = setup(tmp_path, ".csv")
     data = raw()
     data["time"] += np.random.default_rng(1).uniform(-0.1, 0.1, ROWS)
@@ -126,7 +126,8 @@ def test_over_a_gap_nothing_is_interpolated(tmp_path: Path) -> None:
     write_raw(source, data)
     done = import_file(source, channel_map, tmp_path / "made.mcap")
     assert (
-        "1 gap in time, first at 0.9995 s, the longest 2 s" in {one.kind: one.text for one in done.findings}["time-gap"]
+        "1 gap in time, first at 0.9995 s, the longest 2 s"
+        in {finding.kind: finding.text for finding in done.findings}["time-gap"]
     )
     run = read_run(tmp_path / "made.mcap")
     assert np.diff(run.sensors["t_ns"]).max() == pytest.approx(2.01e9, rel=0.01)
@@ -139,7 +140,7 @@ def test_time_from_the_rate(tmp_path: Path) -> None:
     source, channel_map = setup(tmp_path, ".csv", text + "[source]\nsample_rate_Hz = 2000.0\n")
     import_file(source, channel_map, tmp_path / "evidence")
     assert load_evidence(tmp_path / "evidence").runs[0].t_s == pytest.approx(raw()["time"] * 1e-3)
-    source, channel_map = setup(tmp_path, ".tdms", text)  # says its rate itself
+    source, channel_map = setup(tmp_path, ".tdms", text)  # holds its sample rate
     import_file(source, channel_map, tmp_path / "other")
     assert load_evidence(tmp_path / "other").runs[0].t_s == pytest.approx(raw()["time"] * 1e-3)
 
@@ -153,7 +154,7 @@ def test_a_csv_file_of_another_country(tmp_path: Path) -> None:
     assert load_evidence(tmp_path / "evidence").runs[0].columns["drive_force_N"] == pytest.approx(0.5 * data["F"] + 1)
 
 
-def test_what_was_exported_can_be_imported(tmp_path: Path) -> None:
+def test_an_exported_log_can_be_imported(tmp_path: Path) -> None:
     log, channel_map = tmp_path / "run.mcap", tmp_path / "map.toml"
     log.write_bytes(short_log())
     export(log, tmp_path / "run.mat", ["sensors", "trace"])
@@ -230,7 +231,7 @@ def test_findings_of_an_import_name_the_file_that_was_measured(tmp_path: Path) -
     assert named == {"measured.csv", "manifest.toml"}
 
 
-def test_an_imported_log_says_that_it_has_no_controller_and_what_reads_it(tmp_path: Path) -> None:
+def test_an_imported_log_states_that_it_has_no_controller_and_names_its_commands(tmp_path: Path) -> None:
     source, channel_map = setup(tmp_path, ".csv")
     import_file(source, channel_map, tmp_path / "made.mcap")
     with pytest.raises(Fault) as caught:
@@ -247,17 +248,17 @@ def test_a_row_without_a_time_is_left_out_of_a_log(tmp_path: Path) -> None:
     data["time"][-1] = np.inf
     write_raw(source, data)
     done = import_file(source, channel_map, tmp_path / "made.mcap")
-    assert f"1 row without a time left out, first row {ROWS}" in [one.text for one in done.findings]
+    assert f"1 row without a time left out, first row {ROWS}" in [finding.text for finding in done.findings]
 
 
-def test_what_was_measured_is_never_overwritten(tmp_path: Path) -> None:
+def test_measured_data_are_never_overwritten(tmp_path: Path) -> None:
     source, channel_map = setup(tmp_path, ".parquet")
     before = source.read_bytes()
-    with pytest.raises(Fault, match=r"measured\.parquet: is there already"):
+    with pytest.raises(Fault, match=r"measured\.parquet: exists already"):
         import_file(source, channel_map, tmp_path)
     assert source.read_bytes() == before
     import_file(source, channel_map, tmp_path / "made.mcap")
-    with pytest.raises(Fault, match=r"made\.mcap: is there already"):
+    with pytest.raises(Fault, match=r"made\.mcap: exists already"):
         import_file(source, channel_map, tmp_path / "made.mcap")
 
 
@@ -269,17 +270,17 @@ def test_a_file_may_have_any_name(tmp_path: Path) -> None:
 
 
 def test_a_time_of_any_clock_is_read(tmp_path: Path) -> None:
-    """Nanoseconds since 1970 need more digits than a float has whole ones."""
+    """Nanoseconds since 1970 need more digits than a float holds exactly."""
     path = tmp_path / "epoch.parquet"
     pq.write_table(pa.table({"timestamp_ns": np.int64(1_700_000_000_123_456_789) + np.arange(5) * 500_000}), path)
     assert np.diff(read_table(path).column("timestamp_ns")) == pytest.approx(500_000, abs=256)
 
 
 @pytest.mark.parametrize(
-    ("byte", "value", "expected"), [(145, 11, "its reader died of signal"), (144, 0, "it is damaged")]
+    ("byte", "value", "expected"), [(145, 11, "its reader was ended by signal"), (144, 0, "it is damaged")]
 )
-def test_a_damaged_file_of_matlab_is_told(tmp_path: Path, byte: int, value: int, expected: str) -> None:
-    """The first says of a column of real numbers that it is one of complex ones: SciPy reads on behind the end of the file."""
+def test_a_damaged_file_of_matlab_is_refused(tmp_path: Path, byte: int, value: int, expected: str) -> None:
+    """The first damage marks a real column as complex, so SciPy reads beyond the end of the file."""
     scipy.io.savemat(tmp_path / "run.mat", raw())
     damaged = bytearray((tmp_path / "run.mat").read_bytes())
     damaged[byte] = value
@@ -288,7 +289,7 @@ def test_a_damaged_file_of_matlab_is_told(tmp_path: Path, byte: int, value: int,
         read_table(tmp_path / "run.mat")
 
 
-def test_a_damaged_compressed_file_of_matlab_is_told(tmp_path: Path) -> None:
+def test_a_damaged_compressed_file_of_matlab_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "run.mat"
     scipy.io.savemat(path, {"force": np.random.default_rng(1).normal(size=4000)}, do_compression=True)
     data = bytearray(path.read_bytes())
@@ -309,25 +310,25 @@ def test_the_command(tmp_path: Path) -> None:
     assert json.loads(result.stdout)["fault"] == "BAD_EVIDENCE"
 
 
-def test_a_log_tells_what_it_cannot_hold(tmp_path: Path) -> None:
+def test_columns_that_a_log_cannot_hold_are_reported(tmp_path: Path) -> None:
     vibration = '[channels]\nvibration_frequency_Hz = { column = "acc" }\nvibration_amplitude_m = { column = "acc" }\n'
     source, channel_map = setup(tmp_path, ".csv", MAP.replace("[channels]\n", vibration))
     findings = import_file(source, channel_map, tmp_path / "made.mcap").findings
-    told = [one.where for one in findings if "import it into a folder" in one.text]
-    assert told == [f"{source.name}: vibration_frequency_Hz", f"{source.name}: vibration_amplitude_m"]
+    reported = [finding.where for finding in findings if "import it into a folder" in finding.text]
+    assert reported == [f"{source.name}: vibration_frequency_Hz", f"{source.name}: vibration_amplitude_m"]
 
 
 @pytest.mark.parametrize("sentinel", [-9999.0, 1e30, 2047.0])
-def test_what_stands_for_no_value_is_left_out_and_told(tmp_path: Path, sentinel: float) -> None:
+def test_placeholders_of_missing_values_are_left_out_and_reported(tmp_path: Path, sentinel: float) -> None:
     source, channel_map = setup(tmp_path, ".parquet")
     data = raw()
     data["F"] = np.where(np.isin(np.arange(ROWS), [70, 71, 900]), sentinel, data["F"])
     write_raw(source, data)
     done = import_file(source, channel_map, tmp_path / "evidence")
-    told = {one.kind: one for one in done.findings}
-    assert (told["outlier"].times, told["not-finite"].times) == (3, 3)
-    assert f"3 outliers, first row 71 = {sentinel:.6g}: no measurement; left out" in told["outlier"].text
-    assert "drive_force_N" in told["not-finite"].where
+    reported = {finding.kind: finding for finding in done.findings}
+    assert (reported["outlier"].times, reported["not-finite"].times) == (3, 3)
+    assert f"3 outliers, first row 71 = {sentinel:.6g}: no measurement; left out" in reported["outlier"].text
+    assert "drive_force_N" in reported["not-finite"].where
     assert np.isnan(pq.read_table(tmp_path / "evidence" / "measured.parquet")["drive_force_N"].to_numpy()).sum() == 3
 
 
@@ -337,6 +338,8 @@ def test_a_force_with_the_other_sign_is_offered_in_a_line_that_can_be_copied(tmp
         channel_map.write_text(
             MAP.replace("scale = 0.5", f"scale = {scale}").replace("offset = 1.0", f"offset = {2.0 * scale}")
         )
-        told = {one.kind: one.text for one in import_file(source, channel_map, tmp_path / name).findings}
+        reported = {
+            finding.kind: finding.text for finding in import_file(source, channel_map, tmp_path / name).findings
+        }
         line = 'under [channels] write drive_force_N = { column = "F", scale = 0.5, offset = 1.0 }'
-        assert (line in told.get("sign", "")) == (name == "turned")
+        assert (line in reported.get("sign", "")) == (name == "turned")

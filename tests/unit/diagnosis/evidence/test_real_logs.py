@@ -1,4 +1,4 @@
-"""Sensor faults in real logs: each fault does what its name says, and every case can be read as evidence."""
+"""Sensor faults in real logs: each fault has the effect of its name, and every case can be read as evidence."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ T_S = np.arange(2000) / 1000.0
 RAMP_N = 3.0 + 2.0 * T_S
 
 
-def test_what_each_sensor_shows_of_a_ramp() -> None:
+def test_each_faulty_sensor_distorts_a_ramp_as_expected() -> None:
     late = slice(500, None)
     assert gain(0.1)(T_S, RAMP_N) == pytest.approx(1.1 * RAMP_N)
     assert bias(-0.2)(T_S, RAMP_N) == pytest.approx(RAMP_N - 0.2)

@@ -1,4 +1,4 @@
-"""Records as people have them: parts of a file, a tare, a motor current, velocities, numbers that nobody knows, one long log."""
+"""Records in unusual forms: parts of a file, a tare, a motor current, velocities, unknown numbers, one long log."""
 
 from pathlib import Path
 
@@ -67,15 +67,15 @@ def test_a_wrong_stretch_is_one_clear_line(tmp_path: Path, added: str, expected:
     assert expected in caught.value.line
 
 
-def test_of_one_long_log_a_third_is_held_out_and_the_tool_says_which(tmp_path: Path) -> None:
+def test_a_third_of_one_long_log_is_held_out_and_named(tmp_path: Path) -> None:
     evidence = load_evidence(folder(tmp_path, long_log(), MANIFEST))
     assert [run.holdout for run in evidence.runs] == [False, True]
     assert evidence.runs[1].t_s[0] == pytest.approx(13.33, abs=0.01)
-    (told,) = [finding for finding in evidence.findings if finding.kind == "holdout"]
-    assert "13.3 to 20 s are held out" in told.text
+    (reported,) = [finding for finding in evidence.findings if finding.kind == "holdout"]
+    assert "13.3 to 20 s are held out" in reported.text
 
 
-def test_what_is_held_out_has_speeds_that_the_rest_has(tmp_path: Path) -> None:
+def test_the_held_out_part_has_only_speeds_of_the_other_parts(tmp_path: Path) -> None:
     data = long_log(30.0)
     speed = np.where(data["t_s"] < 20.0, 5e-4, 4e-3)  # the last third alone is fast
     speed = np.where(data["t_s"] < 10.0, -5e-4, speed)  # and the first alone goes back
@@ -112,15 +112,15 @@ def test_another_force_on_an_axis_is_added(tmp_path: Path) -> None:
     assert run.columns["drive_force_N"] == pytest.approx(40.0 * data["motor_current_A"] - 5.0)
 
 
-def test_numbers_that_nobody_knows_are_wide_and_said(tmp_path: Path) -> None:
+def test_unknown_numbers_get_a_wide_tolerance_and_are_reported(tmp_path: Path) -> None:
     manifest = AXIS.replace("mass_kg = 20.0\n", "").replace("stribeck_velocity_mps = 0.003\n", "")
     evidence = load_evidence(folder(tmp_path, axis(), manifest))
-    assert evidence.rig.mass_kg == pytest.approx(25.0, rel=0.05)  # as force and acceleration show it
+    assert evidence.rig.mass_kg == pytest.approx(25.0, rel=0.05)  # estimated from force and acceleration
     assert evidence.rig.tolerance["mass_kg"] == evidence.rig.tolerance["stribeck_velocity_mps"] == 1.0
     assert {"mass_kg", "stribeck_velocity_mps"} <= set(evidence.assumed)
-    told = {finding.where: finding.text for finding in evidence.findings if finding.kind == "assumed"}
-    assert "as the runs show it" in told["manifest.toml: rig.mass_kg"]
-    assert "decides nothing" in told["manifest.toml: rig.stribeck_velocity_mps"]
+    reported = {finding.where: finding.text for finding in evidence.findings if finding.kind == "assumed"}
+    assert "as the runs show it" in reported["manifest.toml: rig.mass_kg"]
+    assert "decides nothing" in reported["manifest.toml: rig.stribeck_velocity_mps"]
 
 
 @pytest.mark.parametrize(("way", "expected"), [("sine", True), ("even", False), ("speeds", False)])

@@ -1,4 +1,4 @@
-"""The next experiment: what one speed cannot tell, another speed or dwell does; and a check by hand where no run does."""
+"""The next experiment: another speed or dwell separates two effects, or a check by hand where no run can."""
 
 import numpy as np
 import pytest
@@ -37,32 +37,32 @@ def one_speed():
 
 
 @pytest.mark.slow
-def test_ageing_and_static_level_are_told_apart_by_speed_or_dwell(one_speed):
+def test_speed_or_dwell_separates_ageing_from_static_level(one_speed):
     problem, nuisances, fits = one_speed
     leaders = [fits["static-friction-ageing"], fits["static-level"]]
-    found = next_experiment(problem, nuisances, leaders)
-    assert found.gain is not None
-    assert found.gain > 3.0
-    assert "hold the drive" in found.what or "0.5 mm/s" not in found.what
-    assert "static-friction-ageing and static-level" in found.why
-    assert next_experiment(problem, nuisances, leaders) == found
+    proposal = next_experiment(problem, nuisances, leaders)
+    assert proposal.gain is not None
+    assert proposal.gain > 3.0
+    assert "hold the drive" in proposal.what or "0.5 mm/s" not in proposal.what
+    assert "static-friction-ageing and static-level" in proposal.why
+    assert next_experiment(problem, nuisances, leaders) == proposal
 
 
 @pytest.mark.slow
-def test_what_predicts_the_same_everywhere_gets_a_check_by_hand(one_speed):
+def test_effects_with_equal_predictions_get_a_check_by_hand(one_speed):
     problem, nuisances, fits = one_speed
     fit = fits["static-level"]
-    # the same model, once more with an effect of no size
+    # the same model plus a second effect of size 0
     axis = fit.hypothesis.coordinates[0]
     nothing = axis._replace(effect="force-sensor-gain", scale=1e-9)
     form = fit.hypothesis._replace(forms=fit.hypothesis.forms | {"force-sensor-gain": ""}, coordinates=(axis, nothing))
     columns = np.column_stack([fit.columns, np.zeros(len(fit.columns))])
     twin = fit._replace(hypothesis=form, w=np.append(fit.w, 0.0), columns=columns)
-    found = next_experiment(problem, nuisances, [fit, twin])
-    assert found.what == advice(("static-level", "force-sensor-gain"), "spring")
-    # what a run would tell is not what the check tells
-    assert found.gain is None
-    assert "no run separates them by more than 0.0 standard deviations: this is a check by hand" in found.why
+    proposal = next_experiment(problem, nuisances, [fit, twin])
+    assert proposal.what == advice(("static-level", "force-sensor-gain"), "spring")
+    # a check by hand has no gain from a run
+    assert proposal.gain is None
+    assert "no run separates them by more than 0.0 standard deviations: this is a check by hand" in proposal.why
 
 
 def test_one_explanation_needs_no_comparison(one_speed):

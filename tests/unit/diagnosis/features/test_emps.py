@@ -1,4 +1,4 @@
-"""The public EMPS ball-screw axis: what its published rigid model leaves, found in the measured runs."""
+"""The public EMPS ball-screw axis: known misfits of its published rigid model are found in the measured runs."""
 
 from pathlib import Path
 

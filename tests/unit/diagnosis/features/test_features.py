@@ -1,4 +1,4 @@
-"""What is read of a run where its log is not as the model's: another clock, a sensor that went dead or clips, no force."""
+"""Features of runs with imperfect logs: another clock, a dead or clipped sensor, no force."""
 
 import math
 
@@ -30,24 +30,24 @@ def test_time_counts_from_the_first_sample(ladder, clock_s):
     point = nuisances.point(np.zeros(len(nuisances)), LATE)
     ours = evidence._replace(runs=evidence.runs[:1])
     other = ours._replace(runs=tuple(run._replace(t_s=run.t_s + clock_s) for run in ours.runs))
-    here, there = (Problem(evidence.rig, prepare(one)) for one in (ours, other))
-    assert np.array_equal(here.measured, there.measured, equal_nan=True)
-    assert np.array_equal(here.predicted(point), there.predicted(point), equal_nan=True)
+    plain_problem, other_problem = (Problem(evidence.rig, prepare(one)) for one in (ours, other))
+    assert np.array_equal(plain_problem.measured, other_problem.measured, equal_nan=True)
+    assert np.array_equal(plain_problem.predicted(point), other_problem.predicted(point), equal_nan=True)
 
 
 def test_a_base_that_shows_no_vibration_is_compared_by_that_alone(ladder):
     evidence, runs = ladder
-    run = next(one for one in runs if one.commands.frequency_Hz.any())
+    run = next(run for run in runs if run.commands.frequency_Hz.any())
     still = {name: np.zeros(len(run.commands.drive)) for name in ("base_accel_mps2", "base_shake_mps2")}
     problem = Problem(evidence.rig, [run._replace(signals=run.signals | still)])
     labelled = zip(problem.labels, problem.measured, strict=True)
-    found = {label.name: value for (_, label), value in labelled if label.signal == "base_accel_mps2"}
-    assert found["vibration"] < -5.0
-    assert math.isnan(found["vibration over time"])
-    assert math.isnan(found["vibration over force"])
+    by_name = {label.name: value for (_, label), value in labelled if label.signal == "base_accel_mps2"}
+    assert by_name["vibration"] < -5.0
+    assert math.isnan(by_name["vibration over time"])
+    assert math.isnan(by_name["vibration over force"])
 
 
-def test_a_clipped_accelerometer_says_nothing_about_a_vibration(ladder):
+def test_a_clipped_accelerometer_gives_no_vibration(ladder):
     evidence, runs = ladder
     clipped = tuple(run._replace(clipped={"base_accel_mps2": (-math.inf, 3.0)}) for run in evidence.runs)
     for run, plain in zip(prepare(evidence._replace(runs=clipped)), runs, strict=True):
@@ -68,7 +68,7 @@ def test_without_a_force_a_slip_is_known_by_the_force_it_would_be(ladder, mass_k
 
 
 @pytest.mark.parametrize(("order", "square"), [("first-order", 1.0), ("second-order", 0.75), ("fourth-order", 0.625)])
-def test_the_bend_of_force_over_extension_tells_a_slow_sensor_from_a_late_one(ladder, order, square):
+def test_the_bend_of_force_over_extension_separates_a_slow_sensor_from_a_late_one(ladder, order, square):
     """A force late by T is F - T F' + T^2 F'' / 2, and n equal low-passes that take T have (n + 1) / 2 n there."""
     evidence, runs = ladder
     problem = Problem(evidence.rig, [run for run in runs if not run.commands.frequency_Hz.any()])
@@ -89,9 +89,9 @@ def test_the_bend_of_force_over_extension_tells_a_slow_sensor_from_a_late_one(la
     assert (slow - still) / (late - still) == pytest.approx(square / 0.5, rel=0.03)
 
 
-def test_a_jump_at_the_start_of_a_segment_is_no_cycle(ladder):
+def test_a_jump_at_the_start_of_a_segment_does_not_count_as_a_cycle(ladder):
     evidence, runs = ladder
-    run = next(one for one in runs if any(segment.slips > 3 for segment in one.commands.segments))
+    run = next(run for run in runs if any(segment.slips > 3 for segment in run.commands.segments))
     number = next(i for i, segment in enumerate(run.commands.segments) if segment.slips > 3)
     segment = run.commands.segments[number]
     jumped = run.signals["drive_force_N"].copy()

@@ -1,4 +1,4 @@
-"""A force-driven axis: the model led along the measured motion, and what is compared."""
+"""A force-driven axis: the model follows the measured motion, and the forces are compared."""
 
 import math
 import shutil
@@ -29,7 +29,7 @@ GAIN: Effects = {"force-sensor-gain": {"form": "", "ratio": 0.05}}
 
 
 def made(effects: Effects) -> tuple[Problem, list[Prepared], Point]:
-    """The fitted runs of an axis whose true parameters are the described ones, but for the effects."""
+    """The fitted runs of an axis with the described parameters and these effects."""
     evidence = load_evidence(made_evidence(Case("force", effects=effects, drawn=False), seed=5))
     runs = [run for run in prepare(evidence) if not run.holdout]
     nuisances = Nuisances(evidence.rig)
@@ -80,7 +80,7 @@ def test_an_effect_opens_a_gap_that_only_it_closes(effects: Effects) -> None:
     ],
     ids=lambda effects: next(iter(effects)),
 )
-def test_the_true_force_is_what_the_sensor_made_the_measured_one_of(
+def test_the_true_force_yields_the_measured_force_through_the_sensor(
     plain: tuple[Problem, list[Prepared], Point], effects: Effects
 ) -> None:
     run = plain[1][0]
@@ -91,10 +91,10 @@ def test_the_true_force_is_what_the_sensor_made_the_measured_one_of(
     signals |= dict.fromkeys(("mass_shake_mps2", "base_shake_mps2"), smooth) | {"drive_force_N": commands.drive}
     shown = sensed(signals, run.commands.frequency_Hz, effects, chain)["drive_force_N"]
     inner = slice(100, -100)
-    assert shown[inner] == pytest.approx(smooth[inner], abs=0.05)  # of 40 N; a lag is undone to second order
+    assert shown[inner] == pytest.approx(smooth[inner], abs=0.05)  # N of 40 N: a lag is compensated to second order
 
 
-def test_an_axis_that_hardly_moves_is_refused(plain: tuple[Problem, list[Prepared], Point], tmp_path: Path) -> None:
+def test_an_axis_that_barely_moves_is_refused(plain: tuple[Problem, list[Prepared], Point], tmp_path: Path) -> None:
     """It rests for all but the last 0.3 s."""
     shutil.copytree(made_evidence(Case("force", drawn=False), seed=5), tmp_path / "rests")
     file = tmp_path / "rests" / "run-01.parquet"

@@ -1,4 +1,4 @@
-"""The noise that replicates are made with is noise, not what a moving mean does at the ends of a run."""
+"""The noise of replicates is noise alone, without the error of a moving mean at the ends of a run."""
 
 import numpy as np
 
@@ -22,15 +22,15 @@ def test_a_position_that_is_ramped_without_noise_has_none() -> None:
     assert np.abs(drawn_m).max() < 1e-15
 
 
-def test_the_rounding_of_a_commanded_position_is_no_feature() -> None:
+def test_the_rounding_of_a_commanded_position_does_not_change_a_feature() -> None:
     blocks = 4000
     still = np.zeros(blocks)
     commands = CommandedRun(np.full(blocks, 5e-4), still, still, (Segment(0, blocks, 5e-4, 0.0, 0.0),))
     rests: list[float] = []
     for position_m in (5e-7 * np.arange(blocks), np.cumsum(np.full(blocks, 5e-7))):
-        found = spring_features({"drive_position_m": position_m, "mass_accel_mps2": still + 1.0}, commands, SCALES)
+        features = spring_features({"drive_position_m": position_m, "mass_accel_mps2": still + 1.0}, commands, SCALES)
         rests += [
-            value for label, value in zip(found.labels, found.values, strict=True)
+            value for label, value in zip(features.labels, features.values, strict=True)
             if (label.name, label.signal) == ("rest", "drive_position_m")
         ]  # fmt: skip
     assert abs(0.5 * np.log(rests[1] / rests[0])) < 0.01

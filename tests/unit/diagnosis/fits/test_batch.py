@@ -1,4 +1,4 @@
-"""Calculations that take turns: every one gets the answers to its own questions, as if it were alone."""
+"""Interleaved calculations: each gets the answers to its questions, as if it ran alone."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from diagnosis.fits.batch import AT_ONCE, Question, together
 
 
 def halving(start: float, turns: int):
-    """Asks for the half of its number so many times, and beside it for something it does not need."""
+    """Halve the number `turns` times by questions, each with an answer that is not needed."""
     value = start
     for _ in range(turns):
         half, _ = yield Question([(np.array([value]), {}), (np.array([1e9]), {})], [(np.array([0.5 * value]), {})])
@@ -16,7 +16,7 @@ def halving(start: float, turns: int):
 
 
 class Halves:
-    """Answers with halves; notes how much it was asked for at once."""
+    """Answers with halves; counts the questions of each call."""
 
     def __init__(self) -> None:
         self.asked: list[int] = []
@@ -31,20 +31,20 @@ class Halves:
 def test_each_gets_its_own_answers_in_the_order_of_the_works():
     turns = 2 * [3, 0, 2, 7, 2, 0, 5, 4, 6, 2, 8, 3]  # more than go side by side; some ask for nothing at all
     halves = Halves()
-    found = together(halves, [halving(64.0 + number, count) for number, count in enumerate(turns)])
-    assert found == [(64.0 + number) / 2.0**count for number, count in enumerate(turns)]
+    answers = together(halves, [halving(64.0 + number, count) for number, count in enumerate(turns)])
+    assert answers == [(64.0 + number) / 2.0**count for number, count in enumerate(turns)]
     assert max(halves.asked) == 2 * AT_ONCE
     assert sum(halves.asked) == 2 * sum(turns)
     assert halves.perhaps == [asked // 2 for asked in halves.asked]
 
 
-def test_no_work_is_no_question():
+def test_no_work_asks_no_question():
     halves = Halves()
     assert together(halves, []) == []
     assert halves.asked == []
 
 
-def test_what_goes_wrong_in_one_is_not_swallowed():
+def test_an_error_in_one_calculation_is_raised():
     def wrong():
         yield Question([(np.zeros(1), {})])
         raise ValueError("no such rig")

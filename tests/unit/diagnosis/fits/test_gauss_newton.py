@@ -1,4 +1,4 @@
-"""Refits: an effect that changes a number of the rig table takes over what that number was moved by."""
+"""Refits: an effect on a number of the rig table takes over the deviation of that number."""
 
 import time
 from types import SimpleNamespace
@@ -32,17 +32,17 @@ def fitter():
 
 
 def start_of(fitter, name):
-    return next(one for one in trials(fitter.problem) if one.hypothesis.effects == (name,))
+    return next(trial for trial in trials(fitter.problem) if trial.hypothesis.effects == (name,))
 
 
-def test_a_level_takes_over_what_its_number_was_moved_by(fitter):
-    """From where the rig was retuned for want of the effect: the number at its bound, the effect nothing."""
+def test_an_effect_on_a_level_takes_over_the_deviation_of_its_number(fitter):
+    """Start at the rig retuned without the effect: the number is at its bound, the effect 0."""
     retuned = together(fitter.predicted_many, [fitter.retuning(np.zeros(len(fitter.nuisances)))])[0]
     static = fitter.nuisances.names.index("static_force_N")
     assert retuned.deviations[static] == pytest.approx(-3.3)
     trial = start_of(fitter, "static-level")
     fit = fitter.refit(trial.hypothesis, retuned.deviations, np.zeros(1))
-    # with a derivative for each, -0.066 and -1.3
+    # separate derivatives would end at -0.066 and a deviation of -1.3
     assert fit.hypothesis.tables(fit.w)["static-level"]["ratio"] == pytest.approx(-0.1, abs=0.003)
     assert abs(fit.deviations[static]) < 0.2
 
@@ -118,7 +118,9 @@ def test_single_numbers_lead_on_where_derivatives_lead_astray():
     late = {"frictional-lag": {"form": "dead-time", "delay_s": 5.5e-3, "share": 1.0}}
     fitter = fitter_of(*prepared("short", late))
     form = next(
-        one.hypothesis for one in trials(fitter.problem) if one.hypothesis.forms == {"frictional-lag": "dead-time"}
+        trial.hypothesis
+        for trial in trials(fitter.problem)
+        if trial.hypothesis.forms == {"frictional-lag": "dead-time"}
     )
     described, w = (
         np.zeros(len(fitter.nuisances)),
@@ -140,11 +142,11 @@ def predictions_and_fit(fitter, work):
     return len(asked), fit
 
 
-def test_what_stands_at_its_bound_stays_there_only_if_it_would_go_beyond():
+def test_a_coordinate_at_its_bound_stays_only_if_the_step_would_leave_the_bound():
     normal = np.array([[2.0, 1.0], [1.0, 2.0]])
     at, most = np.array([3.3, 0.0]), np.array([3.3])
     outward, free = step_within(normal, np.array([1.0, 0.2]), at, most)
-    assert outward == pytest.approx([0.0, 0.1])  # the other one goes as if the first were not there
+    assert outward == pytest.approx([0.0, 0.1])  # the free coordinate moves as if the first did not exist
     assert free.tolist() == [False, True]
     inward, free = step_within(normal, np.array([-1.0, 0.2]), at, most)
     assert inward == pytest.approx(np.linalg.solve(normal, [-1.0, 0.2]))

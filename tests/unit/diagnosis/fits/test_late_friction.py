@@ -28,14 +28,14 @@ def test_a_refit_begins_at_the_right_tooth(late):
 
 
 def test_it_needs_runs_with_vibration_and_without(late):
-    own = trials(late.problem)
+    fitted_trials = trials(late.problem)
     still, vibrating = {"run-01.parquet"}, {"run-02.parquet"}
-    assert late_starts(late.of_runs(vibrating), own) == []
-    assert late_starts(late.of_runs(still), own) == []
+    assert late_starts(late.of_runs(vibrating), fitted_trials) == []
+    assert late_starts(late.of_runs(still), fitted_trials) == []
 
 
 def test_runs_add_up(late):
-    """What some runs leave and what the others leave is what all leave."""
+    """The chi2 of two parts of the runs adds up to the chi2 of all."""
     described = np.zeros(len(late.nuisances))
 
     def left(fitter):

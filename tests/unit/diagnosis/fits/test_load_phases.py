@@ -1,4 +1,4 @@
-"""A load that turns: the phase in which each run begins, from the model where the breakaways say little."""
+"""A rotating load: the phase at the begin of each run, from the model where the breakaways are too few."""
 
 import math
 
@@ -25,11 +25,11 @@ def test_every_run_begins_in_the_phase_that_suits_it():
     starts = starts_by_run(fitter, origin, trials(fitter.problem))
     form, deviations, w = starts[0]
     assert deviations is origin.deviations
-    found = {axis.name: axis.value(coordinate) for axis, coordinate in zip(form.coordinates, w.tolist(), strict=True)}
-    assert found["frequency_Hz"] == pytest.approx(FREQUENCY_HZ, abs=0.05)  # half a turn in ten seconds
-    phases = [value for name, value in found.items() if is_phase(name)]
+    values = {axis.name: axis.value(coordinate) for axis, coordinate in zip(form.coordinates, w.tolist(), strict=True)}
+    assert values["frequency_Hz"] == pytest.approx(FREQUENCY_HZ, abs=0.05)  # 0.05 Hz: half a turn in ten seconds
+    phases = [value for name, value in values.items() if is_phase(name)]
     assert len(phases) == len(fitter.problem.runs)
-    ahead = [math.remainder(one - PHASE_RAD, 2.0 * math.pi) for one in phases]
+    ahead = [math.remainder(phase - PHASE_RAD, 2.0 * math.pi) for phase in phases]
     assert max(map(abs, ahead)) < math.pi / 2
     best = fitter.refit(form, deviations, w)
     assert best.chi2 < 0.5 * origin.chi2

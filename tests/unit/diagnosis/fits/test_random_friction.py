@@ -1,4 +1,4 @@
-"""A random load is told by what it scatters, whatever path it takes."""
+"""A random load is recognised by its scatter, whatever its path."""
 
 import copy
 from types import SimpleNamespace
@@ -31,27 +31,27 @@ def rig():
     evidence, runs = prepared("short", LOAD)
     problem = Problem(evidence.rig, [run for run in runs if not run.holdout])
     unseen = Problem(evidence.rig, [run for run in runs if run.holdout])
-    return retuned_rig(evidence, problem, lambda _said, _share: None), unseen
+    return retuned_rig(evidence, problem, lambda _message, _share: None), unseen
 
 
 def test_a_random_load_pays_and_its_size_is_found(rig):
     (fitter, fit, roughness, expected_chi2), unseen = rig
-    found = RandomFriction("normal-load-fluctuation", fitter, fit).on(fit, JITTER)
-    assert found.gained > 30.0
-    assert found.fit.chi2 < 1.5 * expected_chi2 < 0.7 * fit.chi2
-    table = found.fit.effects["normal-load-fluctuation"]
+    scattered = RandomFriction("normal-load-fluctuation", fitter, fit).on(fit, JITTER)
+    assert scattered.gained > 30.0
+    assert scattered.fit.chi2 < 1.5 * expected_chi2 < 0.7 * fit.chi2
+    table = scattered.fit.effects["normal-load-fluctuation"]
     assert table["form"] == "random"
     assert RATIO / 2 < table["ratio"] < RATIO * 2
-    # on other runs the load takes another path: their gap is what such loads scatter
-    held_out = HeldOut(unseen, fitter.nuisances, found.fit, fit, roughness)
-    closed = held_out.closed_by(found.fit)
+    # on other runs the load takes another path: their gap is compared with the scatter of such loads
+    held_out = HeldOut(unseen, fitter.nuisances, scattered.fit, fit, roughness)
+    closed = held_out.closed_by(scattered.fit)
     assert closed.shrinkage is not None
     assert closed.shrinkage > 0.5
     assert held_out.closed_by(fit).shrinkage == pytest.approx(0.0)
 
 
 def gained_on(rig, effects):
-    """What each random effect is worth on a rough and noisy run of the model with these effects."""
+    """Log evidence gained by each random effect on a rough and noisy run of the model with these effects."""
     (fitter, fit, roughness, _), _ = rig
     other = copy.copy(fitter.problem)
     other.measured = replicates(other, fitter.nuisances.point(fit.deviations, effects), roughness, 1, 9)[0]
@@ -73,20 +73,20 @@ def test_a_random_track_is_not_taken_for_a_random_load(rig):
 def rigs_in_bursts(folder, effect, formula, count):
     """How many of so many made rigs with an effect show bursts."""
     drawn = (draw_effect(np.random.default_rng(seed), effect) for seed in range(100))
-    found = []
-    for seed, one in enumerate([one for one in drawn if one.formula.name == formula][:count]):
+    scattered = []
+    for seed, one in enumerate([drawn_rig for drawn_rig in drawn if drawn_rig.formula.name == formula][:count]):
         make(folder / str(seed), Case((one,)), seed)
         evidence = load_evidence(folder / str(seed))
-        found.append(in_bursts(Problem(evidence.rig, [run for run in prepare(evidence) if not run.holdout])))
-    return sum(found)
+        scattered.append(in_bursts(Problem(evidence.rig, [run for run in prepare(evidence) if not run.holdout])))
+    return sum(scattered)
 
 
-def test_a_load_that_goes_on_comes_in_no_bursts(rig):
+def test_a_continuous_load_shows_no_bursts(rig):
     (fitter, _, _, _), _ = rig
     assert not in_bursts(fitter.problem)
 
 
-def test_bursts_are_one_sided_or_rare_and_a_load_that_goes_on_is_neither(monkeypatch):
+def test_bursts_are_one_sided_or_rare_and_a_continuous_load_is_neither(monkeypatch):
     """Three series of 200 breakaways: with a few strong bursts, with rare bursts of both signs, and smooth."""
     drawn = np.random.default_rng(4)
     even = np.sin(np.linspace(0.0, 60.0, 200))
@@ -99,17 +99,17 @@ def test_bursts_are_one_sided_or_rare_and_a_load_that_goes_on_is_neither(monkeyp
         return in_bursts(SimpleNamespace(runs=[], scales=None))
 
     assert [of(debris), of(rare), of(even)] == [True, True, False]
-    assert of(even[:6])  # too few to tell
+    assert of(even[:6])  # too few values to decide
 
 
 @pytest.mark.nightly  # 15 s of CPU
-def test_bursts_of_one_rig_are_told_from_a_load_that_goes_on(tmp_path):
+def test_bursts_of_one_rig_are_separated_from_a_continuous_load(tmp_path):
     assert rigs_in_bursts(tmp_path / "debris", "debris-bursts", "gaussian", 1) == 1
     assert rigs_in_bursts(tmp_path / "load", "normal-load-fluctuation", "narrow-band", 1) == 0
 
 
 @pytest.mark.nightly
-def test_bursts_are_not_taken_for_a_load_that_goes_on(tmp_path):
-    """Of 12 each 11 and 3, which takes a minute."""
+def test_bursts_are_not_taken_for_a_continuous_load(tmp_path):
+    """Of 12 rigs each, 11 and 3 show bursts; that count takes a minute."""
     assert rigs_in_bursts(tmp_path / "debris", "debris-bursts", "gaussian", 4) == 4
     assert rigs_in_bursts(tmp_path / "load", "normal-load-fluctuation", "narrow-band", 4) <= 1

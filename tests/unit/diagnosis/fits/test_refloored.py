@@ -1,4 +1,4 @@
-"""Beside a large effect the floors of the rig without it are those of another rig."""
+"""With a large effect the noise floors of the rig without the effect no longer apply."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def test_a_right_effect_leaves_little_on_its_own_floors():
     effects = {"drive-stiffness": {"form": "", "ratio": SOFTER}}
     fitter = fitter_of(*prepared("ladder", effects))
     described = np.zeros(len(fitter.nuisances))
-    (trial,) = [one for one in trials(fitter.problem) if one.hypothesis.effects == ("drive-stiffness",)]
+    (trial,) = [trial for trial in trials(fitter.problem) if trial.hypothesis.effects == ("drive-stiffness",)]
     (softer,) = refits(
         fitter, [(trial.hypothesis, described, np.array([SOFTER / trial.hypothesis.coordinates[0].scale]))], 1
     )

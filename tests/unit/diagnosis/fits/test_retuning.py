@@ -1,4 +1,4 @@
-"""The rig without effects: what an ordinary chain does is found as such, and a perfect model leaves what it is expected to."""
+"""The rig without effects: errors of the sensor chain are fitted, and a perfect model leaves the expected chi2."""
 
 import numpy as np
 import pytest
@@ -28,35 +28,35 @@ def straight(evidence_and_runs):
 
 @pytest.mark.slow
 @pytest.mark.nightly  # 6 s of CPU; the next has the same fit of a chain as described
-def test_a_bent_displacement_sensor_is_no_gap(evidence_and_runs, straight):
+def test_a_bent_displacement_sensor_causes_no_gap(evidence_and_runs, straight):
     evidence, runs = evidence_and_runs
 
     def bent(run):
         drive_m = run.signals["drive_position_m"]
         return run._replace(signals=run.signals | {"drive_position_m": drive_m * (1.0 + 0.008 - 0.4 * drive_m)})
 
-    found = retuned_rig(evidence, Problem(evidence.rig, [bent(run) for run in runs]), untold)
-    slope, bow = (found.fitter.nuisances.names.index(name) for name in ("drive_slope", "drive_bow_per_m"))
-    change = found.fit.deviations - straight.fit.deviations
+    bent_rig = retuned_rig(evidence, Problem(evidence.rig, [bent(run) for run in runs]), untold)
+    slope, bow = (bent_rig.fitter.nuisances.names.index(name) for name in ("drive_slope", "drive_bow_per_m"))
+    change = bent_rig.fit.deviations - straight.fit.deviations
     at_m = float(np.mean([run.signals["drive_position_m"].mean() for run in runs]))
     assert change[slope] * 0.006 + 2.0 * change[bow] * 0.2 * at_m == pytest.approx(0.008 - 0.8 * at_m, abs=0.002)
-    assert found.fit.chi2 < straight.fit.chi2 + 30.0
+    assert bent_rig.fit.chi2 < straight.fit.chi2 + 30.0
 
 
 @pytest.mark.slow
-def test_evidence_without_a_gap_leaves_about_what_is_expected(straight):
+def test_evidence_without_a_gap_leaves_about_the_expected_chi2(straight):
     _, fit, _, expected_chi2 = straight
     assert 0.5 * expected_chi2 < fit.chi2 < 2.0 * expected_chi2
 
 
-def test_the_numbers_told_are_those_of_the_model(evidence_and_runs):
-    """Friction levels that cross: no contact breaks away below the force that it slides under."""
+def test_the_reported_numbers_equal_the_numbers_of_the_model(evidence_and_runs):
+    """Where the friction levels cross, the static force is raised to the Coulomb force."""
     evidence, _ = evidence_and_runs
     rig = evidence.rig.model_copy(update={"tolerance": {"coulomb_force_N": 0.1, "static_force_N": 0.1}})
     nuisances = Nuisances(rig)
     deviations = np.zeros(len(nuisances))
     deviations[nuisances.rig_names.index("coulomb_force_N")] = 3.0
-    told = {parameter.name: parameter.retuned for parameter in nuisances.parameters(deviations)}
+    reported = {parameter.name: parameter.retuned for parameter in nuisances.parameters(deviations)}
     contact = rig_config(rig, nuisances.point(deviations, {}).values, {}, None).contact
-    assert told["coulomb_force_N"] == pytest.approx(1.3 * rig.coulomb_force_N)
-    assert told["static_force_N"] == contact.static_force_N == told["coulomb_force_N"]
+    assert reported["coulomb_force_N"] == pytest.approx(1.3 * rig.coulomb_force_N)
+    assert reported["static_force_N"] == contact.static_force_N == reported["coulomb_force_N"]

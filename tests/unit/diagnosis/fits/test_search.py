@@ -1,4 +1,4 @@
-"""The search: a second effect beside a fit that is done, and a large effect that screening passes over."""
+"""The search: a second effect in addition to a fitted effect, and a large effect that screening misses."""
 
 import numpy as np
 import pytest
@@ -23,12 +23,12 @@ EFFECTS = {"coulomb-level": {"ratio": -0.14}, "stribeck-velocity": {"ratio": -0.
 @pytest.mark.slow
 # nightly: the rule is carried by whole diagnoses in the small set, a pair of effects among them
 @pytest.mark.nightly
-def test_a_second_effect_is_found_beside_one_that_is_there():
+def test_a_second_effect_is_found_in_addition_to_the_first():
     fitter = fitter_of(*prepared("ladder", EFFECTS))
     described = np.zeros(len(fitter.nuisances))
     names = {"coulomb-level", "stribeck-velocity", "static-level"}
-    tried = [one for one in trials(fitter.problem) if names.intersection(one.hypothesis.effects)]
-    coulomb = next(one for one in tried if one.hypothesis.effects == ("coulomb-level",))
+    tried = [trial for trial in trials(fitter.problem) if names.intersection(trial.hypothesis.effects)]
+    coulomb = next(trial for trial in tried if trial.hypothesis.effects == ("coulomb-level",))
     first = fitter.refit(coulomb.hypothesis, described, coulomb.w)
     pairs = pairs_of_effects(fitter, [first], Screening([], []), tried)
     assert set(pairs[0].hypothesis.effects) == set(EFFECTS)
@@ -41,21 +41,21 @@ def test_a_second_effect_is_found_beside_one_that_is_there():
 # nightly: the rule is carried by whole diagnoses in the small set, a pair of effects among them
 @pytest.mark.nightly
 def test_a_large_effect_that_screening_passes_over_is_tried_in_several_sizes():
-    """Screening is linear: here it is made to see next to nothing in the static level, and in the other direction."""
+    """Screening is linear: this test replaces its size of the static level by a small size of the wrong sign."""
     fitter = fitter_of(*prepared("short", {"static-level": {"ratio": 0.2}}))
     described = np.zeros(len(fitter.nuisances))
     base = fitter.refit(NOTHING, described, described[:0])
-    tried = [one for one in trials(fitter.problem) if one.hypothesis.effects == ("static-level",)]
+    tried = [trial for trial in trials(fitter.problem) if trial.hypothesis.effects == ("static-level",)]
     (seen,) = screened(fitter, base, tried).singles
     passed_over = Screening([seen._replace(w=-0.1 * seen.w, others=())], [])
     best = refitted(fitter, base.chi2, passed_over)[0]
     assert best.effects["static-level"]["ratio"] == pytest.approx(0.2, rel=0.2)
 
 
-def test_a_pair_takes_what_neither_effect_takes_alone():
-    """Two directions at right angles hold the difference, a third one a part of each."""
+def test_a_pair_explains_more_than_either_effect_alone():
+    """Two orthogonal directions span the difference; the third direction is a mixture of both."""
     columns = [column(name, along) for name, along in (("a", (2.0, 0.0)), ("b", (0.0, 1.0)), ("c", (1.0, 1.0)))]
-    inner = np.array([one.direction for one in columns])
+    inner = np.array([column.direction for column in columns])
     left = np.array([6.0, 4.0])
     bounds = (np.full(3, -8.0), np.full(3, 8.0))
     found = best_pairs(columns, inner @ inner.T, inner @ left, bounds, float(left @ left))
@@ -65,8 +65,8 @@ def test_a_pair_takes_what_neither_effect_takes_alone():
     assert by_pair[frozenset((0, 1))][3] == pytest.approx(0.0)
 
 
-def test_a_nuisance_at_its_bound_does_not_take_what_an_effect_would():
-    """A difference of 8 along the only nuisance's column, which has gone to its bound of 5."""
+def test_a_nuisance_at_its_bound_does_not_absorb_an_effect():
+    """A difference of 8 along the column of the only nuisance, which is at its bound of 5."""
     along = np.array([1.0, 0.0, 0.0])
     fit = Fit(NOTHING, np.array([5.0]), np.zeros(0), 89.0, 8.0 * along, along[:, None])
     assert Directions(fit, np.array([5.0])).freed(along)[:3] == pytest.approx(along)

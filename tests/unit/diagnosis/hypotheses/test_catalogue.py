@@ -22,14 +22,14 @@ def test_every_form_is_tried_but_random_ones(name):
 
 
 @pytest.mark.parametrize(("name", "form"), FORMS)
-def test_what_has_a_scale_is_a_parameter_of_the_form(name, form):
+def test_each_scale_belongs_to_a_parameter_of_the_form(name, form):
     scales = CATALOGUE[name].forms[form].scale(SIZES)
     assert scales.keys() <= {row.name for row in EFFECTS[name].forms[form].parameters}
-    assert all(one.scale > 0.0 and one.prior > 0.0 for one in scales.values())
+    assert all(scale.scale > 0.0 and scale.prior > 0.0 for scale in scales.values())
 
 
 @pytest.mark.parametrize("name", EFFECTS)
-def test_a_row_names_what_is_there(name):
+def test_a_row_names_existing_relations_and_effects(name):
     row = CATALOGUE[name]
     assert row.words
     assert row.shown_by

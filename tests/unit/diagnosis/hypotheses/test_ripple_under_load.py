@@ -1,4 +1,4 @@
-"""A screw that gives way is told from one whose lead is wrong: the one is even while it carries nothing."""
+"""A compliant screw is separated from a lead error: without load a compliant screw runs evenly."""
 
 import math
 
@@ -24,7 +24,7 @@ def fitted(request):
     described = np.zeros(len(fitter.nuisances))
 
     def off(trial):
-        pitch = next(one for one in trial.hypothesis.coordinates if one.name == "wavelength_m")
+        pitch = next(axis for axis in trial.hypothesis.coordinates if axis.name == "wavelength_m")
         return abs(math.log(pitch.scale / WAVELENGTH_M))
 
     fits = {}
@@ -35,13 +35,13 @@ def fitted(request):
 
 
 def test_the_form_that_is_there_fits_best(fitted):
-    there, fits = fitted
-    other = "screw" if there == "load" else "load"
-    assert fits[there].chi2 < 0.8 * fits[other].chi2
+    present, fits = fitted
+    other = "screw" if present == "load" else "load"
+    assert fits[present].chi2 < 0.8 * fits[other].chi2
 
 
 def test_its_numbers_come_back(fitted):
-    there, fits = fitted
-    found = fits[there].hypothesis.tables(fits[there].w)[EFFECT]
-    assert found["ratio"] == pytest.approx(RATIO, rel=0.05)
-    assert found["wavelength_m"] == pytest.approx(WAVELENGTH_M, rel=0.01)
+    present, fits = fitted
+    table = fits[present].hypothesis.tables(fits[present].w)[EFFECT]
+    assert table["ratio"] == pytest.approx(RATIO, rel=0.05)
+    assert table["wavelength_m"] == pytest.approx(WAVELENGTH_M, rel=0.01)

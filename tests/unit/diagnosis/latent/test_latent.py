@@ -32,7 +32,7 @@ def one_pass(wave_N: float) -> ExcessRows:
 
 
 def to_and_fro(push_N: float, along_N: float) -> ExcessRows:
-    """Sliding of an axis with a constant push, and a force that goes with the place whatever the direction."""
+    """Sliding of an axis with a constant push, and a force that depends on the position whatever the direction."""
     random = np.random.default_rng(4)
     phase = 2.0 * np.pi * 6.0 * np.arange(ROWS) / ROWS
     place, sign = 0.1 * np.sin(phase), np.where(np.cos(phase) >= 0.0, 1.0, -1.0)
@@ -44,60 +44,60 @@ def to_and_fro(push_N: float, along_N: float) -> ExcessRows:
     )  # fmt: skip
 
 
-def of(found: LatentSignal, what: str) -> LatentShare:
-    return next(one for one in found.shares if one.what == what)
+def of(signal: LatentSignal, what: str) -> LatentShare:
+    return next(share for share in signal.shares if share.what == what)
 
 
 def test_a_wave_along_the_track_is_found_with_its_share():
-    found = signal_of(one_pass(0.3))
-    wave = of(found, PLACE)
+    signal = signal_of(one_pass(0.3))
+    wave = of(signal, PLACE)
     assert wave.share == pytest.approx(0.045 / 0.055, abs=0.1)
     assert wave.null_90 is not None
     assert wave.null_90 < wave.interval_90[0] <= wave.interval_90[1]
-    assert sum(one.share for one in found.shares) == pytest.approx(1.0)
-    assert not found.revisited
-    assert named_by([found]) == (PLACE,)
+    assert sum(share.share for share in signal.shares) == pytest.approx(1.0)
+    assert not signal.revisited
+    assert named_by([signal]) == (PLACE,)
 
 
 def test_scatter_alone_has_no_name():
-    found = signal_of(one_pass(0.0))
-    assert named_by([found]) == ()
-    assert of(found, SCATTER).share > 0.5
+    signal = signal_of(one_pass(0.0))
+    assert named_by([signal]) == ()
+    assert of(signal, SCATTER).share > 0.5
 
 
-def test_a_share_is_told_as_a_cause_only_where_its_whole_interval_is_beyond_chance():
-    found = signal_of(one_pass(0.3))
-    assert latent_rows([found])[0].causes == (PLACE,)
-    wave = of(found, PLACE)
+def test_a_share_is_a_cause_only_where_its_whole_interval_exceeds_chance():
+    signal = signal_of(one_pass(0.3))
+    assert latent_rows([signal])[0].causes == (PLACE,)
+    wave = of(signal, PLACE)
     within = wave._replace(null_90=0.5 * (wave.interval_90[0] + wave.share))
     assert within.null_90 is not None
     assert within.share > within.null_90
-    assert latent_rows([found._replace(shares=(within,))])[0].causes == ()
-    assert latent_line([found._replace(shares=(within,))]) == ""
+    assert latent_rows([signal._replace(shares=(within,))])[0].causes == ()
+    assert latent_line([signal._replace(shares=(within,))]) == ""
 
 
-def test_a_force_with_the_place_is_no_friction():
-    found = signal_of(to_and_fro(0.0, 0.3))
-    assert of(found, FORCE_PLACE).share > 0.7
-    assert of(found, PLACE).share < 0.1
-    assert found.revisited
+def test_a_force_that_depends_on_position_is_not_named_as_friction():
+    signal = signal_of(to_and_fro(0.0, 0.3))
+    assert of(signal, FORCE_PLACE).share > 0.7
+    assert of(signal, PLACE).share < 0.1
+    assert signal.revisited
 
 
 def test_a_push_is_a_matter_of_direction():
-    found = signal_of(to_and_fro(0.4, 0.0))
-    assert of(found, DIRECTION).share == pytest.approx(0.16 / 0.17, abs=0.1)
+    signal = signal_of(to_and_fro(0.4, 0.0))
+    assert of(signal, DIRECTION).share == pytest.approx(0.16 / 0.17, abs=0.1)
 
 
-def test_unexplained_becomes_partly_by_what_is_named_and_no_other_verdict_moves():
-    found = signal_of(one_pass(0.3))
+def test_unexplained_becomes_partly_by_a_named_share_and_other_verdicts_stay():
+    signal = signal_of(one_pass(0.3))
     names = (PLACE, "none", "unexplained")
     verdict = Verdict("unexplained", None, dict.fromkeys(names, 1.0 / 3.0), None, (), 1.0)
-    after = with_latent(verdict, [found], None)
+    after = with_latent(verdict, [signal], None)
     assert (after.kind, after.names) == ("partly", (PLACE,))
     assert sum(after.probabilities.values()) == pytest.approx(1.0)
-    assert with_latent(verdict._replace(kind="no-gap"), [found], None).kind == "no-gap"
-    assert with_latent(verdict._replace(refuted=(PLACE,)), [found], None).kind == "unexplained"
-    assert with_latent(verdict, [found._replace(judged_on_held_out=False)], None).kind == "unexplained"
+    assert with_latent(verdict._replace(kind="no-gap"), [signal], None).kind == "no-gap"
+    assert with_latent(verdict._replace(refuted=(PLACE,)), [signal], None).kind == "unexplained"
+    assert with_latent(verdict, [signal._replace(judged_on_held_out=False)], None).kind == "unexplained"
 
 
 @pytest.mark.parametrize(("left", "kind"), [(1.6, "no-gap"), (20.5, "partly")])
@@ -108,9 +108,9 @@ def test_no_gap_becomes_partly_where_the_held_out_runs_show_one(left: float, kin
 
 
 def test_every_slip_of_a_run_is_a_row_at_its_place():
-    found = {one.signal: one for one in latent_of(rig(), [_quiet(run) for run in runs()])}
-    assert set(found) == {BREAKAWAY, SLIDING}
-    assert 60 < found[BREAKAWAY].rows <= MOST_ROWS
+    signals = {signal.signal: signal for signal in latent_of(rig(), [_quiet(run) for run in runs()])}
+    assert set(signals) == {BREAKAWAY, SLIDING}
+    assert 60 < signals[BREAKAWAY].rows <= MOST_ROWS
 
 
 def _quiet(run):

@@ -1,4 +1,4 @@
-"""What a tribologist writes in eight lines of numpy: peaks, troughs, and a line through the first stick."""
+"""A tribologist's eight lines of numpy for comparison: peaks, troughs, and a line through the first stick."""
 
 from typing import Any, NamedTuple
 
@@ -7,7 +7,7 @@ from scipy.signal import find_peaks
 
 
 class Rival(NamedTuple):
-    """Its numbers."""
+    """Results of the eight lines."""
 
     slips: int
     static_force_N: float
@@ -18,7 +18,7 @@ class Rival(NamedTuple):
 
 
 def eight_lines(t_s: Any, force_N: Any, speed_mps: float) -> Rival:
-    """Its way."""
+    """Evaluate the record by peaks and troughs."""
     prominence = 0.3 * (force_N.max() - force_N[len(force_N) // 4 :].min())
     peaks, _ = find_peaks(force_N, prominence=prominence)
     troughs, _ = find_peaks(-force_N, prominence=prominence)

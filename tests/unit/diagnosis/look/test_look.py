@@ -48,7 +48,7 @@ def test_slips_that_last_longer_than_their_sticks_are_counted(
     assert numbers["stiffness_N_per_m"].value == pytest.approx(stiffness, rel=0.01)
 
 
-def test_times_of_slips_and_sticks_are_no_longer_in_noise():
+def test_noise_does_not_lengthen_the_times_of_slips_and_sticks():
     held = []
     for fall_s in (0.01, 0.02, 0.05):
         for noise in (0.0, 0.004, 0.02):
@@ -103,7 +103,7 @@ def test_the_numbers_of_a_tribometer_are_within_a_percent(pair: str, every: int,
 
 
 def test_intervals_hold_the_truth_nine_times_in_ten() -> None:
-    """Friction that scatters from slip to slip: the mean of all slips is what the interval is for."""
+    """Friction scatters from slip to slip; the interval is an interval of the mean of all slips."""
     random = np.random.default_rng(7)
     held = 0
     for _ in range(16):
@@ -118,7 +118,7 @@ def test_intervals_hold_the_truth_nine_times_in_ten() -> None:
     assert 11 <= held <= 16
 
 
-def test_a_swing_is_no_stick_slip_and_noise_is_nothing() -> None:
+def test_a_harmonic_swing_and_noise_are_not_taken_for_stick_slip() -> None:
     t_s = np.arange(0, 5, 1e-3)
     swings = look(t_s, 10.0 + np.sin(40.0 * t_s))
     assert swings is not None
@@ -166,11 +166,11 @@ def ageing(speeds_mps: tuple[float, ...], halts_s: tuple[float, ...]) -> LookRes
 
 
 def test_friction_over_speed_and_over_stick_time() -> None:
-    """A stick that lasts long because the drive is slow tells nothing of the time alone; a halt of the drive does."""
+    """Long sticks of a slow drive do not show the effect of time alone; a halt of the drive does."""
     seen = ageing((2e-4, 5e-4, 2e-3), (0.0, 0.0))
-    assert [round(1e3 * one.speed_mps, 1) for one in seen.at_speeds] == [0.2, 0.5, 2.0]
+    assert [round(1e3 * level.speed_mps, 1) for level in seen.at_speeds] == [0.2, 0.5, 2.0]
     assert "dwell_N_per_decade" not in seen.numbers
-    assert any("may be one on the speed; stop the drive" in line for line in limits_of_look(seen))
+    assert any("the speed may be the cause; stop the drive" in line for line in limits_of_look(seen))
     halted = ageing((5e-4,), (0.0, 1.0, 4.0))
     assert halted.numbers["dwell_N_per_decade"].value == pytest.approx(1.0, rel=0.05)
     assert halted.numbers["stiffness_N_per_m"].value == pytest.approx(1e4, rel=0.1)
@@ -187,8 +187,8 @@ def test_one_stick_that_is_cut_short_shows_no_dependence_on_its_time() -> None:
     assert any("all sticks last alike" in line for line in limits_of_look(seen))
 
 
-def test_a_drive_that_stands_has_no_speed() -> None:
-    """1 and 0.2 mm/s, then a rest; the noise of the position is no third speed."""
+def test_a_resting_drive_adds_no_speed() -> None:
+    """1 and 0.2 mm/s, then a rest; the noise of the position does not count as a third speed."""
     t_s = np.arange(0, 30, 1e-3)
     rng = np.random.default_rng(4)
     way_m = np.cumsum(np.where(t_s < 10.0, 1e-3, np.where(t_s < 20.0, 2e-4, 0.0))) * 1e-3
@@ -196,10 +196,10 @@ def test_a_drive_that_stands_has_no_speed() -> None:
         t_s, 10.0 + 0.05 * rng.standard_normal(len(t_s)), way_m + 1e-6 * rng.standard_normal(len(t_s)), RecordFacts()
     )
     assert seen is not None
-    assert [round(1e3 * one.speed_mps, 1) for one in seen.at_speeds] == [0.2, 1.0]
+    assert [round(1e3 * level.speed_mps, 1) for level in seen.at_speeds] == [0.2, 1.0]
 
 
-def test_a_triangle_and_a_reversal_are_no_slips() -> None:
+def test_a_triangle_and_a_reversal_do_not_count_as_slips() -> None:
     t_s = np.arange(0, 20, 1e-3)
     noise_N = 0.05 * np.random.default_rng(3).standard_normal(len(t_s))
     triangle = look(t_s, 14.5 + np.abs(t_s % 2.0 - 1.0) + noise_N)
@@ -210,8 +210,8 @@ def test_a_triangle_and_a_reversal_are_no_slips() -> None:
     assert turning.slips == 0
 
 
-def test_a_drift_and_several_speeds_are_told_and_an_even_record_tells_neither() -> None:
-    def told(tops: list[float], speeds_mps: list[float]) -> str:
+def test_a_drift_and_several_speeds_are_reported_and_an_even_record_shows_neither() -> None:
+    def limits_text(tops: list[float], speeds_mps: list[float]) -> str:
         pieces: list[np.ndarray] = []
         for top, speed_mps in zip(tops, speeds_mps, strict=True):
             rise = round((top - 12.0) / (11_700.0 * speed_mps) * 2e3)
@@ -222,17 +222,19 @@ def test_a_drift_and_several_speeds_are_told_and_an_even_record_tells_neither() 
         return "; ".join(limits_of_look(seen))
 
     scatter = 17.0 + 0.1 * np.random.default_rng(5).standard_normal(30)
-    even = told(scatter.tolist(), [1e-3] * 30)
+    even = limits_text(scatter.tolist(), [1e-3] * 30)
     assert "no steady level" not in even
     assert "no single speed" not in even
-    assert "the breakaway rises by 2.85 N" in told((scatter + np.linspace(0.0, 3.0, 30)).tolist(), [1e-3] * 30)
-    assert "no single speed: sticks climb by 11.7 to 23.5" in told(scatter.tolist(), [1e-3] * 15 + [2e-3] * 15)
+    assert "the breakaway rises by 2.85 N" in limits_text((scatter + np.linspace(0.0, 3.0, 30)).tolist(), [1e-3] * 30)
+    assert "no single speed: sticks climb by 11.7 to 23.5" in limits_text(scatter.tolist(), [1e-3] * 15 + [2e-3] * 15)
 
 
 @pytest.mark.parametrize("decay", [0.0, 0.06, 0.15])
-def test_what_viscous_damping_takes_from_a_fall_is_not_taken_for_friction(decay: float) -> None:
+def test_the_loss_of_a_fall_by_viscous_damping_is_not_taken_for_friction(decay: float) -> None:
     t_s = np.arange(0.0, 20.0, 1e-3)
-    phase = np.pi * (t_s % 1.0 - 0.97) / 0.03  # of a swing from rest to rest, decay over frequency known
+    phase = (
+        np.pi * (t_s % 1.0 - 0.97) / 0.03
+    )  # phase of a swing from rest to rest; `decay` is the decay rate over the frequency
     end = -np.exp(-decay * np.pi)
     swing = np.exp(-decay * phase.clip(0.0)) * (np.cos(phase) + decay * np.sin(phase))
     share = np.where(phase < 0.0, end + (1.0 - end) * (t_s % 1.0) / 0.97, swing)

@@ -73,10 +73,10 @@ def test_a_refit_finds_both_phases(problem):
 TABLE = LOAD | {"phase_rad": 0.4, phase_of("run-02.csv"): 2.8}
 
 
-def test_every_run_has_its_own_phase_and_nobody_knows_that_of_one_kept_aside():
+def test_every_fitted_run_has_its_phase_and_a_held_out_run_a_random_one():
     assert in_run(TABLE, "run-01.csv", False, None) == LOAD | {"phase_rad": 0.4}
     assert in_run(TABLE, "run-02.csv", False, 5) == LOAD | {"phase_rad": 2.8}
-    assert in_run(TABLE, "run-03.csv", True, None) is None  # its mean
+    assert in_run(TABLE, "run-03.csv", True, None) is None  # the mean over the unknown phase
     drawn = [in_run(TABLE, "run-03.csv", True, seed) for seed in range(200)]
     phases = np.array([table["phase_rad"] for table in drawn if table])
     assert len(phases) == 200

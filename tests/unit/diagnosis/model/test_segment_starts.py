@@ -38,7 +38,7 @@ def test_entries_are_sticks_and_even_sliding(ladder):
             assert 0.0 < entry.age_s < 2.0
 
 
-def test_a_contact_that_no_slip_has_renewed_is_as_old_as_it_was_before(ladder):
+def test_a_contact_that_no_slip_has_renewed_keeps_its_age(ladder):
     evidence, runs = ladder
     begun = [entry for run in runs for entry in run.entries if entry.from_before]
     run = shaken_run(runs)
@@ -120,7 +120,7 @@ def test_when_the_vibration_catches_the_slide_changes_no_level(ladder):
     rows = slice(still.first, still.last)
 
     def apart_N(first, second):
-        forces = [problem.signals(one, point)["drive_force_N"][rows] for one in (first, second)]
+        forces = [problem.signals(part, point)["drive_force_N"][rows] for part in (first, second)]
         return float(np.abs(forces[0] - forces[1]).max())
 
     assert apart_N(run, other) < 1e-3

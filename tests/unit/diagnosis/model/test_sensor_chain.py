@@ -1,4 +1,4 @@
-"""What the sensors make of predicted signals."""
+"""The sensor chain applied to predicted signals."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Where refits start: what the evidence itself shows of a wave or of a ring, and a screw placed by the drive's own sensor."""
+"""Start values of refits: waves and ringing found in the evidence, and the screw phase from the drive's sensor."""
 
 import math
 
@@ -37,7 +37,7 @@ def test_a_wave_of_the_drive_is_found_with_its_second_harmonic(screw):
     assert (wave.second_sin**2 + wave.second_cos**2) ** 0.5 == pytest.approx(0.5, rel=0.15)
 
 
-def test_a_screw_stands_where_the_drives_own_sensor_says(screw):
+def test_the_phase_of_a_screw_follows_the_drives_position_sensor(screw):
     """A quarter of a turn on the sensor is a quarter of a turn of the phase."""
     evidence, runs = screw
     run = runs[0]
@@ -68,22 +68,22 @@ def test_two_waves_along_the_track_are_found_together():
 
 
 @pytest.mark.slow
-def test_waves_beside_a_wave_have_their_own_phase():
-    """At other periods the phase at the zero of the position differs by turns; where the slide is it must stay."""
+def test_waves_of_neighbouring_periods_keep_the_phase_at_the_slide():
+    """The phase at position 0 differs between periods by whole turns; at the position of the slide it must agree."""
     bumps = {"form": "bumps", "ratio": 0.15, "wavelength_m": 3e-3, "phase_rad": 0.7, "width": 0.12}
     evidence, runs = prepared("ladder", {"position-dependent-friction": bumps})
     scales = Problem(evidence.rig, runs).scales
-    own = Wave(3e-3, 0.05, 0.0, spread=0.04)
-    shorter, same, longer = friction_waves_beside(runs, scales, [own], (-0.25, 0.0, 0.25))
-    assert [one.period for one in (shorter, same, longer)] == pytest.approx([2.97e-3, 3e-3, 3.03e-3])
-    at_m = np.concatenate([one.at for one in friction_series(runs, scales, "position")]).mean()
-    turns = [at_m / one.period + one.phase_rad / (2.0 * math.pi) for one in (shorter, same, longer)]
+    middle = Wave(3e-3, 0.05, 0.0, spread=0.04)
+    shorter, same, longer = friction_waves_beside(runs, scales, [middle], (-0.25, 0.0, 0.25))
+    assert [wave.period for wave in (shorter, same, longer)] == pytest.approx([2.97e-3, 3e-3, 3.03e-3])
+    at_m = np.concatenate([series.at for series in friction_series(runs, scales, "position")]).mean()
+    turns = [at_m / wave.period + wave.phase_rad / (2.0 * math.pi) for wave in (shorter, same, longer)]
     for beside in (turns[0], turns[2]):
         assert math.remainder(beside - turns[1], 1.0) == pytest.approx(0.0, abs=0.15)
 
 
 def test_a_wave_over_time_turns_once_in_a_run():
-    """Slower, in a phase of its own in every run, it would be any trend."""
+    """A slower wave with a free phase in every run could imitate any trend."""
     trial = wave_trial("normal-load-fluctuation", "sine", Wave(5.0, 0.02, 0.0), slowest_Hz=0.1)
     (frequency,) = [axis for axis in trial.hypothesis.coordinates if axis.name == "frequency_Hz"]
     assert frequency.value(0.0) == pytest.approx(0.2)
@@ -92,11 +92,11 @@ def test_a_wave_over_time_turns_once_in_a_run():
 
 @pytest.mark.slow
 def test_a_base_that_rings_shows_its_frequency():
-    """Stuck to the base, the slide lowers it: 1 / (compliance omega^2) is 5 kg, and 1.5 kg more."""
+    """The sticking slide lowers the frequency: it adds 1.5 kg to the base of 1 / (compliance omega^2) = 5 kg."""
     ring = {"compliance_m_per_N": 2e-7, "frequency_Hz": 160.0, "damping_ratio": 0.03}
     evidence, runs = prepared("ladder", {"base-compliance": ring})
     base_kg = 1.0 / (2e-7 * (2.0 * math.pi * 160.0) ** 2)
     stuck_Hz = 160.0 / math.sqrt(1.0 + evidence.rig.mass_kg / base_kg)
-    found = ringing_Hz(Problem(evidence.rig, runs).runs, "base_accel_mps2", 2)
-    assert any(abs(one - stuck_Hz) < 5.0 for one in found)
+    ringing = ringing_Hz(Problem(evidence.rig, runs).runs, "base_accel_mps2", 2)
+    assert any(abs(frequency_Hz - stuck_Hz) < 5.0 for frequency_Hz in ringing)
     assert ringing_Hz(runs, "nothing", 2) == []

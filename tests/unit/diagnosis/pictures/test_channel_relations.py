@@ -19,11 +19,11 @@ LIT = {
 
 def levels(evidence, runs):
     """The largest rms of every residual."""
-    found = {}
+    by_relation = {}
     for run in runs:
         for residual in parity_residuals(evidence.rig, run):
-            found[residual.name] = max(found.get(residual.name, 0.0), residual.rms)
-    return found
+            by_relation[residual.name] = max(by_relation.get(residual.name, 0.0), residual.rms)
+    return by_relation
 
 
 @pytest.fixture(scope="module")
@@ -32,9 +32,9 @@ def clean():
 
 
 def test_a_clean_rig_leaves_its_noise(clean):
-    found = levels(*clean)
-    assert set(found) == {"spring", "curvature", "motion", "exciter", "drive", "friction"}
-    assert all(0.02 < level < 2.0 for level in found.values()), found
+    by_relation = levels(*clean)
+    assert set(by_relation) == {"spring", "curvature", "motion", "exciter", "drive", "friction"}
+    assert all(0.02 < level < 2.0 for level in by_relation.values()), by_relation
 
 
 @pytest.mark.slow
@@ -44,10 +44,12 @@ def test_a_clean_rig_leaves_its_noise(clean):
 def test_an_effect_lights_its_relation(effect, clean):
     numbers, name, variable = LIT[effect]
     evidence, runs = prepared("ladder", {effect: numbers})
-    found = levels(evidence, runs)
-    assert found[name] > 2.0
-    assert found[name] > 1.8 * levels(*clean)[name]
-    residual = next(one for run in runs for one in parity_residuals(evidence.rig, run) if one.name == name)
+    by_relation = levels(evidence, runs)
+    assert by_relation[name] > 2.0
+    assert by_relation[name] > 1.8 * levels(*clean)[name]
+    residual = next(
+        residual for run in runs for residual in parity_residuals(evidence.rig, run) if residual.name == name
+    )
     assert len(residual.over[variable]) == len(residual.values)
 
 
@@ -91,5 +93,5 @@ def test_a_drive_that_is_held_moves_evenly(clean, place_m):
         noise=runs[0].noise._replace(pieces=pieces),
         commands=commands,
     )
-    (drive,) = (one for one in parity_residuals(evidence.rig, run) if one.name == "drive")
+    (drive,) = (residual for residual in parity_residuals(evidence.rig, run) if residual.name == "drive")
     assert drive.rms < 1e-3

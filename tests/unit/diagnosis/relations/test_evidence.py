@@ -43,8 +43,8 @@ def test_the_evidence_of_a_set_is_the_marginal_likelihood_of_all_samples():
 
         keep = band_of_rows(relation, ROWS, band_edges_Hz(relation)) >= 0
         covariance = np.eye(int(keep.sum()))
-        for one in (*relation.nuisances, *(relation.effects[i] for i in chosen)):
-            turned = np.asarray(dct(one.values[0], axis=0, norm="ortho"))[: len(keep)][keep] * one.spread
+        for column in (*relation.nuisances, *(relation.effects[i] for i in chosen)):
+            turned = np.asarray(dct(column.values[0], axis=0, norm="ortho"))[: len(keep)][keep] * column.spread
             covariance += turned @ turned.T
         left = np.asarray(dct(relation.left[0], norm="ortho"))[: len(keep)][keep]
         return -0.5 * float(left @ np.linalg.solve(covariance, left)) - 0.5 * float(np.linalg.slogdet(covariance)[1])
@@ -64,7 +64,7 @@ def test_a_coefficient_of_a_forbidden_sign_has_no_evidence():
     assert evidences(data, [(0,)])[0] == -math.inf
 
 
-def test_the_noise_of_each_band_is_the_one_that_was_drawn_although_many_columns_were_fitted():
+def test_the_noise_of_each_band_is_recovered_although_many_columns_were_fitted():
     random = np.random.default_rng(5)
     white = 2.0 * random.standard_normal(20000)
     columns = [random.standard_normal(20000) for _ in range(60)]

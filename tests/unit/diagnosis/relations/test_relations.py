@@ -1,4 +1,4 @@
-"""Relations on made runs whose cause is known: it is named, and nothing else; what the library lacks is told as outside."""
+"""Relations on made runs with a known cause: only the cause is named; a cause missing in the library is outside."""
 
 import numpy as np
 import pytest
@@ -11,15 +11,15 @@ T_S = (np.arange(8000) + 0.5) * BLOCK_S
 
 
 def answer(cause=None) -> tuple[Relations, Decision]:
-    found = relations_of(rig(), runs(cause))
-    return found, decision_of(found, rig())
+    relations = relations_of(rig(), runs(cause))
+    return relations, decision_of(relations, rig())
 
 
-def test_without_a_cause_nothing_is_named_and_the_noise_is_that_of_the_sensors():
-    found, decision = answer()
+def test_without_a_cause_nothing_is_named_and_the_noise_equals_the_sensor_noise():
+    relations, decision = answer()
     assert decision == Decision((), ())
-    assert [one.name for one in found.answered] == ["spring", "motion", "drive", "exciter", "base"]
-    spring = found.answered[0]
+    assert [item.name for item in relations.answered] == ["spring", "motion", "drive", "exciter", "base"]
+    spring = relations.answered[0]
     # means over two blocks, up to 120 of 250 Hz, of force noise and of two displacement sensors on the spring
     whole_N = np.hypot(6e-3, STIFFNESS_N_PER_M * 3e-8 * np.sqrt(2.0))
     assert spring.noise == pytest.approx(whole_N / np.sqrt(2.0) * np.sqrt(120.0 / 250.0), rel=0.1)
@@ -66,7 +66,7 @@ def is_uneven(_: int, signals: Signals) -> None:
 )
 def test_a_cause_is_named_by_its_relation_alone(cause, name: str, relation: str):
     _, decision = answer(cause)
-    assert [one.relation for one in decision.decided] == [relation]
+    assert [item.relation for item in decision.decided] == [relation]
     assert name in decision.decided[0].alike  # a delay of 2 ms and three low-passes differ by less than these runs show
     assert len(decision.decided[0].alike) <= 2
     assert decision.outside == ()
@@ -86,8 +86,8 @@ def test_effects_that_their_relation_does_not_show_are_ruled_out():
 
 
 def test_the_size_of_a_drift_is_near_the_true_one():
-    found, _ = answer(drifts)
-    spring = found.answered[0]
+    relations, _ = answer(drifts)
+    spring = relations.answered[0]
     drift = next(i for i, term in enumerate(spring.chosen.terms) if term.cause == "force-sensor-drift")
     shown_N = spring.chosen.terms[drift].values[0][:, 0] * spring.chosen.sizes[drift][0]
     # the wander that ordinary sensors have takes a part of it
@@ -120,20 +120,20 @@ def drops_out(number: int, signals: Signals) -> None:
         (drops_out, "spring", "in bursts"),
     ],
 )
-def test_what_the_library_lacks_is_told_as_outside(cause, relation: str, what: str):
+def test_a_cause_missing_in_the_library_is_reported_as_outside(cause, relation: str, what: str):
     _, decision = answer(cause)
-    assert [one.relation for one in decision.outside] == [relation]
+    assert [item.relation for item in decision.outside] == [relation]
     assert decision.outside[0].what.startswith(what)
     assert decision.outside[0].size > decision.outside[0].noise > 0.0 or decision.outside[0].evidence > 25.0
-    assert not any(one.known for one in decision.decided)
+    assert not any(item.known for item in decision.decided)
 
 
-def test_a_pattern_that_no_column_explains_is_told_with_its_variable():
+def test_a_pattern_that_no_column_explains_is_reported_with_its_variable():
     def steps(_: int, signals: Signals) -> None:
         signals["drive_force_N"] += 0.05 * np.sin(2.0 * np.pi * signals["drive_force_N"] / 1.5)
 
     _, decision = answer(steps)
-    assert [(one.relation, one.what) for one in decision.outside] == [("spring", "over the extension")]
+    assert [(item.relation, item.what) for item in decision.outside] == [("spring", "over the extension")]
     assert decision.outside[0].size == pytest.approx(0.05 / np.sqrt(2.0), rel=0.3)
 
 
@@ -141,28 +141,28 @@ def test_an_unevenness_too_small_to_pull_is_not_named_however_well_it_shows():
     def by_nanometres(_: int, signals: Signals) -> None:
         signals["drive_position_m"] += 7e-9 * np.sin(2.0 * np.pi * signals["drive_position_m"] / 1e-3)
 
-    found, decision = answer(by_nanometres)
-    assert found.answered[2].chosen.evidence > 50.0
+    relations, decision = answer(by_nanometres)
+    assert relations.answered[2].chosen.evidence > 50.0
     assert decision == Decision((), ())
 
 
-def test_a_size_that_differs_between_runs_takes_the_name_back():
+def test_a_size_that_differs_between_runs_withdraws_the_name():
     def in_one_run(number: int, signals: Signals) -> None:
         if number == 0:
             hardens(number, signals)
 
     _, decision = answer(in_one_run)
-    assert "drive-hardening" not in {one.cause for one in decision.decided}
+    assert "drive-hardening" not in {item.cause for item in decision.decided}
 
 
-def test_channels_that_are_missing_leave_their_relations_out_and_are_told():
+def test_missing_channels_leave_their_relations_out_and_are_reported():
     lacking = [
         run._replace(signals={name: run.signals[name] for name in ("drive_force_N", "drive_position_m")})
         for run in runs()
     ]
-    found = relations_of(rig(), lacking)
-    assert [one.name for one in found.answered] == ["drive"]
-    assert {one.name: one.why for one in found.missing} == {
+    relations = relations_of(rig(), lacking)
+    assert [item.name for item in relations.answered] == ["drive"]
+    assert {item.name: item.why for item in relations.missing} == {
         "spring": "run-01.csv has no mass_position_m",
         "motion": "run-01.csv has no mass_accel_mps2",
         "exciter": "run-01.csv has no base_accel_mps2 that is fast enough",

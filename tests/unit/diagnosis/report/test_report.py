@@ -134,7 +134,7 @@ def test_a_diagnosis_with_nothing_in_it(verdict, tmp_path):
     assert "base64" not in page
 
 
-def test_numbers_that_are_none(tmp_path):
+def test_numbers_that_are_not_finite_are_shown_as_unknown(tmp_path):
     made = made_up.diagnosis()
     hole = Curve("hole", np.array([0.0, 1.0, 2.0]), np.array([NAN, math.inf, 1.0]), "measured")
     nothing = Curve("nothing", np.array([]), np.array([]), "points")
@@ -155,7 +155,7 @@ def test_numbers_that_are_none(tmp_path):
     assert "width: nan" not in page
 
 
-def test_without_a_held_out_run_there_is_no_chart_but_what_to_do(tmp_path):
+def test_without_a_held_out_run_the_report_gives_advice_in_place_of_the_chart(tmp_path):
     made = made_up.diagnosis()
     alone = made.gap._replace(files=(), nominal=NAN, retuned=NAN, with_effect=NAN, floor=NAN, compared=())
     page = page_of(made._replace(gap=alone), tmp_path)
@@ -165,7 +165,7 @@ def test_without_a_held_out_run_there_is_no_chart_but_what_to_do(tmp_path):
     assert "unknown" not in page.split("<h2>How far")[1].split("<h2>")[0]
 
 
-def test_the_map_keeps_the_order_of_a_cycle_and_counts_what_it_leaves_out():
+def test_the_map_keeps_the_order_of_a_cycle_and_counts_the_share_left_out():
     cells = tuple(
         Cell("drive_force_N", regime, (0.0, 20.0), run, share)
         for regime, run, share in (
@@ -185,21 +185,21 @@ def test_the_map_keeps_the_order_of_a_cycle_and_counts_what_it_leaves_out():
     assert left_out == pytest.approx(0.004)
 
 
-def test_an_effect_that_cannot_be_told_from_another_says_so_at_once():
+def test_the_headline_names_effects_that_cannot_be_distinguished():
     made = made_up.diagnosis()._replace(not_distinguishable=(("drive-damping", "drive-backlash"),))
     assert "or drive-damping, which would explain these runs nearly as well" in in_words.headline(made)
     assert "two and three" in in_words.headline(made._replace(effects=("two", "three")))
 
 
-@pytest.mark.parametrize(("form", "said"), [("random", True), ("sine", False)])
-def test_what_scatters_at_random_says_what_else_would(form, said):
+@pytest.mark.parametrize(("form", "expected"), [("random", True), ("sine", False)])
+def test_an_unexplained_verdict_names_a_random_effect_that_would_scatter_likewise(form, expected):
     nearest = (Candidate("unexplained", 0.6), Candidate("normal-load-fluctuation", 0.3, form))
     made = made_up.diagnosis()._replace(verdict="unexplained", effects=(), candidates=nearest)
     told = " ".join(summary(made))
-    assert ("as normal-load-fluctuation at random would (probability 30 %)" in told) is said
+    assert ("as normal-load-fluctuation at random would (probability 30 %)" in told) is expected
 
 
-def test_words_fit_what_the_held_out_runs_say():
+def test_the_summary_agrees_with_the_held_out_runs():
     made = made_up.diagnosis()
     far = made._replace(verdict="no-gap", effects=(), gap=made.gap._replace(retuned=3.4))
     assert "the fitted runs show no gap, but the held-out runs are 3.4 noise floors off" in in_words.headline(far)
@@ -213,25 +213,25 @@ def test_words_fit_what_the_held_out_runs_say():
     assert units.percent(-0.003) == "0 %"
 
 
-@pytest.mark.parametrize(("retuned", "said"), [(0.97, True), (1.3, False)])
-def test_a_gap_that_the_held_out_runs_do_not_show_is_said_to_be_in_the_others(retuned, said):
+@pytest.mark.parametrize(("retuned", "expected"), [(0.97, True), (1.3, False)])
+def test_a_gap_that_the_held_out_runs_do_not_show_is_ascribed_to_the_fitted_runs(retuned, expected):
     made = made_up.diagnosis()
     gap = made.gap._replace(retuned=retuned)
     told = " ".join(summary(made._replace(verdict="unexplained", effects=(), gap=gap)))
     assert f"held out, rig and model are {gap.nominal:g} noise floors apart" in told
-    assert ("So the gap shows in the fitted runs alone." in told) is said
+    assert ("So the gap shows in the fitted runs alone." in told) is expected
 
 
 @pytest.mark.parametrize(
-    ("left", "effects", "said"),
+    ("left", "effects", "expected"),
     [(2.2, ("drive-backlash",), False), (5.54, ("drive-backlash",), True), (5.54, (), False)],
 )
-def test_a_name_that_leaves_more_than_a_right_one_says_so(left, effects, said):
+def test_the_summary_warns_where_a_name_leaves_more_than_a_right_name(left, effects, expected):
     made = made_up.diagnosis()
     verdict = "effect" if effects else "unexplained"
     gap = made.gap._replace(retuned=6.51, with_effect=left)
     told = " ".join(summary(made._replace(verdict=verdict, effects=effects, gap=gap)))
-    assert ("leaves about 1 there, not 5.5" in told) is said
+    assert ("leaves about 1 there, not 5.5" in told) is expected
 
 
 def test_runs_of_two_folders_keep_their_names_apart():
@@ -246,7 +246,7 @@ def test_runs_in_which_nothing_moves_are_in_the_summary():
     assert "In run-01.csv, run-03.csv the drive does not move: friction and drive are not tested there." in told
 
 
-def test_what_vibrates_as_no_model_does_is_in_the_summary_with_its_runs():
+def test_vibrations_that_no_model_has_are_in_the_summary_with_their_runs():
     picked_up = tuple(Finding(PICK_UP, f"run-0{i}.csv: drive_force_N", "vibrates with 0.3 N") for i in (1, 2, 4))
     findings = (*picked_up[:2], Finding(DISTORTED, "run-02.csv: base_accel_mps2", "moves at 5000 Hz"), picked_up[2])
     told = " ".join(summary(made_up.diagnosis()._replace(findings=findings)))
@@ -274,7 +274,7 @@ def test_an_estimate_in_words(name, estimate, words):
     assert in_words.estimate_in_words("drive-hardening", name, estimate) == words
 
 
-def test_what_is_nearly_sure_is_not_certain():
+def test_a_nearly_certain_share_is_not_rounded_to_certainty():
     assert [units.percent(share) for share in (0.0, 1e-4, 0.004, 0.93, 0.996, 0.9999, 1.0, NAN, None)] == [
         "0 %",
         "< 0.1 %",
@@ -296,21 +296,21 @@ def test_a_number_known_exactly_has_not_moved():
     assert tail.shift_sd == pytest.approx(-0.3)
 
 
-def test_a_name_that_the_held_out_runs_do_not_test_says_so(tmp_path):
+def test_the_summary_warns_where_the_held_out_runs_do_not_test_the_name(tmp_path):
     made = made_up.diagnosis()
     untested = made._replace(gap=made.gap._replace(retuned=1.0, with_effect=1.0, shrinkage=None, interval_90=None))
     assert any(
-        "held out, the baseline leaves no gap to close: new data have not tested the name" in one
-        for one in summary(untested)
+        "held out, the baseline leaves no gap to close: new data have not tested the name" in line
+        for line in summary(untested)
     )
     page = text_of(page_of(untested, tmp_path))
     assert "There is no gap to close on these runs: they do not test the named effect." in page
     assert "Nothing is named" not in page
 
 
-def test_no_more_than_the_whole_gap_is_said_to_be_closed_and_json_has_the_number():
+def test_the_text_closes_at_most_the_whole_gap_and_the_json_has_the_number():
     made = made_up.diagnosis()
-    compared = tuple(one._replace(shrinkage=1.06, interval_90=(0.43, 1.76)) for one in made.gap.compared)
+    compared = tuple(fit._replace(shrinkage=1.06, interval_90=(0.43, 1.76)) for fit in made.gap.compared)
     gap = made.gap._replace(shrinkage=1.06, interval_90=(0.43, 1.76), compared=compared)
     made = made._replace(gap=gap)
     told = summary(made)

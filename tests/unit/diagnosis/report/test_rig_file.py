@@ -44,7 +44,7 @@ def test_no_gap_gives_the_retuned_rig(evidence, tmp_path):
     assert "effects" not in tomllib.loads((tmp_path / "rig.toml").read_text())
 
 
-def test_what_is_no_rig_is_refused_and_nothing_is_written(evidence, tmp_path):
+def test_a_verdict_without_a_rig_is_refused_and_nothing_is_written(evidence, tmp_path):
     path = tmp_path / "rig.toml"
     with pytest.raises(Fault, match="unexplained"):
         write_rig(made_up.diagnosis()._replace(verdict="unexplained", effects=()), evidence, path)
@@ -84,7 +84,7 @@ def test_the_loop_holds_on_the_corrected_rig(diagnosed, tmp_path):
     assert table["velocity_ratio_min"] > 1.0
 
 
-def test_a_piezo_that_is_too_weak_is_said(diagnosed, tmp_path):
+def test_a_piezo_that_is_too_weak_is_reported(diagnosed, tmp_path):
     weak = ("--set", "rig.effects.piezo-roll-off.corner_Hz=300.0")
     result = run("--rig", diagnosed, *weak, *SHORT, "--verbose", "--log", tmp_path / "run.mcap")
     assert "with piezo-roll-off, static-friction-ageing" in result.stdout

@@ -50,7 +50,7 @@ def test_a_seed_gives_the_same_bytes(tmp_path, short):
     assert all(first[name] != other[name] for name in first if name.endswith(".parquet"))
 
 
-def test_the_folder_says_nothing_about_the_effect():
+def test_the_folder_does_not_reveal_the_effect():
     folders = made_evidence(Case(), 1), made_evidence(Case(effects=BACKLASH), 1)
     plain, disturbed = map(contents, folders)
     assert plain.keys() == disturbed.keys()
@@ -131,13 +131,13 @@ def test_other_rates_and_fewer_channels(short, rate_Hz):
 
 
 @pytest.mark.parametrize("case", [Case("unheard-of"), Case(rate_Hz=777.0)])
-def test_what_cannot_be_made_leaves_nothing(tmp_path, case):
+def test_an_impossible_case_leaves_no_folder(tmp_path, case):
     with pytest.raises(ValueError, match=r"must|known"):
         make_evidence(tmp_path / "new", case, 1)
     assert not (tmp_path / "new").exists()
 
 
-def test_the_axis_obeys_its_equation_of_motion():
+def test_the_axis_satisfies_its_equation_of_motion():
     evidence = load_evidence(made_evidence(Case(FORCE_PROTOCOL, drawn=False), 1))
     assert evidence.rig.drive == "force"
     run = evidence.runs[1]
@@ -148,4 +148,4 @@ def test_the_axis_obeys_its_equation_of_motion():
     sliding[:2000] = sliding[-100:] = False
     friction_N = 20.0 * np.sign(speed_mps) + 200.0 * speed_mps
     left_N = run.columns["drive_force_N"] - 95.0 * accel_mps2 - friction_N
-    assert np.abs(left_N[sliding]).mean() < 1.5  # of 110 N; smoothing the acceleration costs 1 %
+    assert np.abs(left_N[sliding]).mean() < 1.5  # N of 110 N: smoothing the acceleration costs 1 %

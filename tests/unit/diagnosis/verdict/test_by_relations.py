@@ -1,4 +1,4 @@
-"""Relations correct the verdict of the contest: what they decide, and what they show as outside."""
+"""Relations correct the verdict of the contest by decided causes and by causes outside the library."""
 
 from typing import Any
 
@@ -28,8 +28,8 @@ def verdict(kind: Any, *effects: str) -> Verdict:
 
 
 def cause(name: str, share: float | None = None, alike: tuple[str, ...] = ()) -> Decided:
-    told = None if share is None else RelationShare(name, "", share, (share - 0.1, share + 0.1), 0.01)
-    return Decided(name, "spring", 100.0, (name, *alike), told)
+    relation_share = None if share is None else RelationShare(name, "", share, (share - 0.1, share + 0.1), 0.01)
+    return Decided(name, "spring", 100.0, (name, *alike), relation_share)
 
 
 OUTSIDE = Outside("spring", "in bursts", 0.046, 0.012, "N", 30.0)
@@ -71,7 +71,7 @@ DRIFT = fit("force-sensor-drift")
         (verdict("no-gap"), Decision((), ()), "no-gap", ()),
     ],
 )
-def test_what_relations_decide_corrects_the_verdict(before, decision, kind, names):
+def test_decisions_of_relations_correct_the_verdict(before, decision, kind, names):
     after = with_relations_verdict(before, decision, [DRIFT], ClosedByRelations(None, None))
     assert (after.kind, after.names) == (kind, names)
     assert next(iter(after.probabilities)) == ("unexplained" if kind == "unexplained" else (*names, "none")[0])

@@ -1,4 +1,4 @@
-"""A name of little evidence is checked, and one that falls makes room for the next one."""
+"""A name of little evidence is checked, and a rejected name is replaced by the next."""
 
 import numpy as np
 import pytest
@@ -13,12 +13,12 @@ BASE = 160.0
 
 
 @pytest.fixture
-def found() -> list[Fit]:
+def ranked() -> list[Fit]:
     return [fit(80.0, "coulomb-level"), fit(84.0, "drive-backlash"), fit(130.0, "static-level")]
 
 
-def checked(monkeypatch, found: list[Fit], middles: dict[str, float]):
-    """What is left of the verdict where an effect's middle fit leaves this, and the rig without one `BASE`."""
+def checked(monkeypatch, ranked: list[Fit], middles: dict[str, float]):
+    """The verdict after the check, where the middle fit of an effect leaves `middles` and the rig without effects `BASE`."""
     asked: list[str] = []
 
     def middle_fits(_fitter, none, _singles, named, _jobs):
@@ -28,33 +28,33 @@ def checked(monkeypatch, found: list[Fit], middles: dict[str, float]):
 
     monkeypatch.setattr(selection, "middle_fits", middle_fits)
     rig = Retuned(np.nan, fit(BASE), ROUGHNESS, EXPECTED)
-    singles, verdict = selection.checked(rig, found, [], judge(rig.fit, found, [], EXPECTED), 1)
+    singles, verdict = selection.checked(rig, ranked, [], judge(rig.fit, ranked, [], EXPECTED), 1)
     return asked, singles, verdict
 
 
-def test_a_name_that_stands_stays(monkeypatch, found):
-    asked, singles, verdict = checked(monkeypatch, found, {"coulomb-level": 82.0})
+def test_a_confirmed_name_stays(monkeypatch, ranked):
+    asked, singles, verdict = checked(monkeypatch, ranked, {"coulomb-level": 82.0})
     assert asked == ["coulomb-level"]
     assert verdict.named.hypothesis.effects == ("coulomb-level",)
-    assert singles == found
+    assert singles == ranked
 
 
-def test_the_next_one_is_named_where_the_first_falls(monkeypatch, found):
-    asked, singles, verdict = checked(monkeypatch, found, {"coulomb-level": 158.0, "drive-backlash": 86.0})
+def test_the_next_effect_is_named_where_the_first_is_rejected(monkeypatch, ranked):
+    asked, singles, verdict = checked(monkeypatch, ranked, {"coulomb-level": 158.0, "drive-backlash": 86.0})
     assert asked == ["coulomb-level", "drive-backlash"]
     assert verdict.named.hypothesis.effects == ("drive-backlash",)
-    assert [one.chi2 for one in singles] == [84.0, 130.0, 158.0]
+    assert [fit.chi2 for fit in singles] == [84.0, 130.0, 158.0]
     assert verdict.probabilities["static-level"] > 0.0
 
 
-def test_where_all_fall_nothing_is_named(monkeypatch, found):
-    asked, _, verdict = checked(monkeypatch, found, {"coulomb-level": 158.0, "drive-backlash": 159.0})
+def test_nothing_is_named_where_all_effects_are_rejected(monkeypatch, ranked):
+    asked, _, verdict = checked(monkeypatch, ranked, {"coulomb-level": 158.0, "drive-backlash": 159.0})
     assert asked == ["coulomb-level", "drive-backlash"]
     assert verdict.named is None
 
 
-def test_what_the_held_out_runs_refute_is_what_they_were_asked_about(monkeypatch):
-    """Two effects that did not pay beside the name that fell would pay beside the next one."""
+def test_the_held_out_runs_refute_only_the_checked_name(monkeypatch):
+    """A pair that does not beat the rejected name would beat the next name."""
     middles = {("coulomb-level",): fit(124.0, "coulomb-level"), ("drive-backlash",): fit(67.0, "drive-backlash")}
     monkeypatch.setattr(
         selection,

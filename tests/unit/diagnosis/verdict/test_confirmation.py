@@ -1,4 +1,4 @@
-"""What the held-out runs make of a verdict: runs that leave what a test says, and verdicts over made-up fits."""
+"""Confirmation by held-out runs: fake runs with a given misfit, and verdicts over made-up fits."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -57,8 +57,8 @@ def outcome(
 
 def test_a_name_that_they_bear_out_stays(monkeypatch):
     named = fit(50.0, "static-level")
-    found = outcome(monkeypatch, named)
-    assert (found.verdict.kind, found.best, found.gone) == ("effect", named, None)
+    confirmed = outcome(monkeypatch, named)
+    assert (confirmed.verdict.kind, confirmed.best, confirmed.gone) == ("effect", named, None)
 
 
 def test_a_name_that_leaves_more_than_right_ones_is_less_sure(monkeypatch):
@@ -70,28 +70,28 @@ def test_a_name_that_leaves_more_than_right_ones_is_less_sure(monkeypatch):
 
 def test_a_name_that_they_refute_goes(monkeypatch):
     named = fit(50.0, "static-level")
-    found = outcome(monkeypatch, named, refuted=(named,))
-    assert (found.verdict.kind, found.verdict.refuted) == ("unexplained", ("static-level",))
-    assert found.gone is named
-    assert found.best.hypothesis.effects == ()
+    confirmed = outcome(monkeypatch, named, refuted=(named,))
+    assert (confirmed.verdict.kind, confirmed.verdict.refuted) == ("unexplained", ("static-level",))
+    assert confirmed.gone is named
+    assert confirmed.best.hypothesis.effects == ()
 
 
 def test_waves_of_a_track_that_another_place_refutes_make_room_for_a_path_at_random(monkeypatch):
     waves, path = fit(50.0, TRACK), random(60.0)
-    found = outcome(monkeypatch, waves, elsewhere=path, refuted=(waves,))
-    assert (found.verdict.kind, found.best, found.gone) == ("effect", path, None)
-    assert found.held_out is not None
-    assert found.held_out.best is path
+    confirmed = outcome(monkeypatch, waves, elsewhere=path, refuted=(waves,))
+    assert (confirmed.verdict.kind, confirmed.best, confirmed.gone) == ("effect", path, None)
+    assert confirmed.held_out is not None
+    assert confirmed.held_out.best is path
     neither = outcome(monkeypatch, waves, elsewhere=path, refuted=(waves, path))
     assert (neither.verdict.kind, neither.gone) == ("unexplained", waves)
 
 
-def test_a_path_at_random_that_scatters_nothing_there_is_none(monkeypatch):
+def test_a_random_path_without_scatter_in_the_held_out_runs_becomes_no_gap(monkeypatch):
     path = random(50.0)
     assert outcome(monkeypatch, path, retuned=1.1).best is path
-    found = outcome(monkeypatch, path, retuned=0.97)
-    assert (found.verdict.kind, found.gone) == ("no-gap", None)
-    assert found.best.hypothesis.effects == ()
+    confirmed = outcome(monkeypatch, path, retuned=0.97)
+    assert (confirmed.verdict.kind, confirmed.gone) == ("no-gap", None)
+    assert confirmed.best.hypothesis.effects == ()
 
 
 def test_another_effect_may_not_show_there(monkeypatch):

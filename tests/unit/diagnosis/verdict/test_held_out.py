@@ -1,4 +1,4 @@
-"""Which names a held-out run may refute: those that say what it will show."""
+"""Names that a held-out run may refute: only effects that predict its course."""
 
 import math
 from types import SimpleNamespace
@@ -14,7 +14,9 @@ from diagnosis.verdict.held_out import HeldOut, foretells
 
 
 def form(name: str, form: str, *parameters: str) -> Hypothesis:
-    return Hypothesis({name: form}, tuple(Coordinate(name, one, 0.1, False, 1.0, -1.0, 1.0) for one in parameters))
+    return Hypothesis(
+        {name: form}, tuple(Coordinate(name, parameter, 0.1, False, 1.0, -1.0, 1.0) for parameter in parameters)
+    )
 
 
 WAVE = ("ratio", "phase_rad", "second_sin", "second_cos")
@@ -37,7 +39,7 @@ def stand_in(
     shows: bool = True,
     left_open: float | None = None,
 ) -> Any:
-    """Held-out runs of 100 features, in chi2 by their course; gap and what is left of it in floors, by their scatter."""
+    """Held-out runs of 100 features: `retuned` and `left` are chi2 of the course; `gap` and `scattered` are in floors."""
     runs = SimpleNamespace(
         _too_much=lambda left, expected: HeldOut._too_much(runs, left, expected),
         _left_open=lambda _fit, _residual: left if left_open is None else left_open,
@@ -65,8 +67,8 @@ def test_the_axes_of_two_effects_are_not_one_wave():
     assert not foretells(both(load, base))
 
 
-def test_what_goes_by_a_wider_floor_is_measured_by_that_floor():
-    """A cell as its own replicates are, at a level of 2 there and 1 here, is 1 floor off with either."""
+def test_a_random_effect_is_measured_by_its_wider_floor():
+    """A cell that differs by the level of its floor, 1 or 2, is 1 floor off with either floor."""
     ones = np.ones(1)
     narrow = Floor(0 * ones, ones < 0, ones, ones > 0, np.eye(1), (("force", "stick", (0.0, 20.0), "a"),), 1.0)
     held_out = HeldOut.__new__(HeldOut)
@@ -78,8 +80,8 @@ def test_what_goes_by_a_wider_floor_is_measured_by_that_floor():
 
 
 @pytest.mark.parametrize(("effect", "does"), FORETELLS)
-def test_what_says_nothing_of_another_run_is_not_asked_to_follow_it(effect, does):
-    """Held-out runs of which the fit leaves all that there was by its course, and nothing by its scatter."""
+def test_an_effect_that_predicts_nothing_of_another_run_is_not_refuted_by_its_course(effect, does):
+    """Held-out runs whose course the fit does not explain at all, and whose scatter it explains fully."""
     held_out = stand_in(500.0, 500.0, gap=5.0, scattered=1.0)
     assert foretells(effect) is does
     assert HeldOut.refutes(held_out, fit_of(effect), 0.4) is does
@@ -90,11 +92,11 @@ def test_what_says_nothing_of_another_run_is_not_asked_to_follow_it(effect, does
     [
         (8.8, 5.3, True),  # a tilted track taken for a load
         (9.5, 1.9, False),
-        (1.5, 1.4, False),  # nothing is left that a right one would not leave
+        (1.5, 1.4, False),  # the misfit is within the range of a right effect
         (8.8, 3.5, False),  # much is left, and most is closed
     ],
 )
-def test_what_another_run_scatters_far_more_than_it_should_is_refuted(gap, left, refuted):
+def test_an_effect_that_leaves_most_scatter_of_another_run_is_refuted(gap, left, refuted):
     load = FORETELLS[4][0]
     assert HeldOut.refutes(stand_in(500.0, 500.0, gap, left), fit_of(load), 0.4) is refuted
 
@@ -102,23 +104,23 @@ def test_what_another_run_scatters_far_more_than_it_should_is_refuted(gap, left,
 @pytest.mark.parametrize(
     ("retuned", "left", "refuted"),
     [
-        (100.0, 95.0, True),  # of little to be seen hardly anything
-        (100.0, 75.0, False),  # two fifths of it are enough
-        (2000.0, 1000.0, True),  # half of it, and 25 times what a right model leaves
+        (100.0, 95.0, True),  # a small misfit, of which 5 % is closed
+        (100.0, 75.0, False),  # a small misfit, of which 25 % is closed
+        (2000.0, 1000.0, True),  # half is closed, and the rest is 25 times the misfit of a right model
         (2000.0, 500.0, False),  # much is left, and most is closed
         (340.0, 172.0, False),  # little is left
     ],
 )
-def test_what_another_run_does_not_bear_out_is_refuted(retuned, left, refuted):
+def test_an_effect_that_another_run_does_not_confirm_is_refuted(retuned, left, refuted):
     assert HeldOut.refutes(stand_in(retuned, left), fit_of(FORETELLS[0][0]), 0.4) is refuted
 
 
-def test_what_would_not_show_in_another_run_is_not_refuted_by_it():
+def test_an_effect_that_does_not_show_in_another_run_is_not_refuted_by_it():
     hidden = stand_in(2000.0, 0.0, shows=False)  # backlash, where nothing reverses
     assert not HeldOut.refutes(hidden, fit_of(FORETELLS[0][0]), 0.4)
 
 
-def test_where_nothing_can_be_compared_there_is_no_shrinkage():
+def test_without_compared_features_the_shrinkage_is_unknown():
     held_out = HeldOut.__new__(HeldOut)
     held_out.retuned = HeldOut._gap(np.zeros(0))
     closed = held_out._closed(np.zeros(0), [np.zeros(0)])
@@ -129,14 +131,14 @@ def test_where_nothing_can_be_compared_there_is_no_shrinkage():
 @pytest.mark.parametrize(
     ("left", "left_open", "refuted"), [(298.0, 84.0, False), (255.0, 250.0, True), (100.0, 300.0, False)]
 )
-def test_what_a_fit_leaves_open_may_be_otherwise_elsewhere(left, left_open, refuted):
-    """An ageing whose scale the fitted runs do not tell; a seal named as a static level; a name that needs no such help."""
+def test_undetermined_parameters_may_differ_in_the_held_out_runs(left, left_open, refuted):
+    """An ageing of undetermined scale; a seal misnamed as a static level; a name that fits without moved parameters."""
     held_out = stand_in(255.0, left, left_open=left_open)
     assert HeldOut.refutes(held_out, fit_of(FORETELLS[0][0]), 0.4) is refuted
 
 
-def test_what_is_left_open_is_the_least_that_moved_parameters_leave(monkeypatch):
-    """A straight problem: the same as by least squares with the parameters' own covariance as a prior."""
+def test_the_open_misfit_is_the_least_over_parameters_within_their_covariance(monkeypatch):
+    """A linear problem: equal to least squares with the covariance of the parameters as a prior."""
     random = np.random.default_rng(1)
     rates, residual = random.normal(size=(30, 4)), random.normal(size=30)
     covariance = np.cov(random.normal(size=(4, 9)))

@@ -1,4 +1,4 @@
-"""The verdict over made-up fits of 100 compared features, of which a right model leaves 20 to 60 of chi2."""
+"""The verdict over made-up fits of 100 compared features; the chi2 of a right model is 20 to 60."""
 
 import numpy as np
 import pytest
@@ -28,11 +28,11 @@ def fit(chi2, *effects):
     return Fit(form if effects else NOTHING, np.zeros(NUISANCES), np.zeros(len(effects)), chi2, residual, columns)
 
 
-def test_what_fits_well_without_effects_is_no_gap():
+def test_a_good_fit_without_effects_gives_no_gap():
     assert judge(fit(50.0), [fit(48.0, "coulomb-level")], [], EXPECTED).kind == "no-gap"
 
 
-def test_an_effect_that_takes_most_is_named():
+def test_an_effect_that_explains_most_is_named():
     verdict = judge(fit(400.0), [fit(50.0, "coulomb-level"), fit(380.0, "static-level")], [], EXPECTED)
     assert verdict.kind == "effect"
     assert verdict.named is not None
@@ -40,7 +40,7 @@ def test_an_effect_that_takes_most_is_named():
     assert sum(verdict.probabilities.values()) == pytest.approx(1.0)
 
 
-def test_what_shows_elsewhere_turns_no_gap_into_unexplained_and_nothing_else():
+def test_an_outside_finding_turns_only_no_gap_into_unexplained():
     nothing = judge(fit(50.0), [fit(48.0, "coulomb-level")], [], EXPECTED)
     outside = with_outside(nothing)
     assert (outside.kind, outside.outside) == ("unexplained", True)
@@ -50,7 +50,7 @@ def test_what_shows_elsewhere_turns_no_gap_into_unexplained_and_nothing_else():
     assert with_outside(effect) == effect
 
 
-def test_what_shows_elsewhere_takes_the_name_of_an_effect_that_imitates_it():
+def test_an_outside_finding_withdraws_the_name_of_an_effect_that_imitates_it():
     effect = judge(fit(400.0), [fit(50.0, "piezo-resonance")], [], EXPECTED)
     assert with_outside(effect, frozenset({"piezo-sag"})) == effect
     outside = with_outside(effect, frozenset({"piezo-sag", "piezo-resonance"}))
@@ -59,7 +59,7 @@ def test_what_shows_elsewhere_takes_the_name_of_an_effect_that_imitates_it():
     assert sum(outside.probabilities.values()) == pytest.approx(1.0)
 
 
-def test_harmonics_take_a_piezo_s_name_and_a_pick_up_takes_none():
+def test_harmonics_withdraw_a_piezo_effect_and_a_pick_up_withdraws_none():
     plain = MeasuredRun("run-01.csv", np.zeros(2), {}, {}, None, False)
     picked_up = plain._replace(pick_up=PickUp(2500.0, 0.3, 1e-5, 0.1))
     distorted = plain._replace(distortion=Distortion(2500.0, 2.0, 0.1))
@@ -77,7 +77,7 @@ def test_harmonics_take_a_piezo_s_name_and_a_pick_up_takes_none():
     )
 
 
-def test_a_gap_that_nothing_takes_is_unexplained():
+def test_a_gap_that_no_effect_explains_is_unexplained():
     assert judge(fit(4000.0), [fit(3900.0, "coulomb-level")], [], EXPECTED).kind == "unexplained"
 
 
@@ -87,11 +87,11 @@ def test_a_gap_that_nothing_takes_is_unexplained():
         (400.0, 75.0, "effect"),
         (400.0, 200.0, "unexplained"),
         (4000.0, 145.0, "effect"),
-        (4000.0, 500.0, "effect"),  # a tenth of the gap: what another formula of the same effect leaves
+        (4000.0, 500.0, "effect"),  # a tenth of the gap, as another formula of the same effect leaves
         (4000.0, 1500.0, "unexplained"),
     ],
 )
-def test_what_leaves_more_than_a_right_effect_would_is_unexplained(base, left, kind):
+def test_an_effect_that_leaves_more_than_a_right_effect_is_unexplained(base, left, kind):
     assert judge(fit(base), [fit(left, "coulomb-level")], [], EXPECTED).kind == kind
 
 
@@ -105,7 +105,7 @@ def test_two_effects_must_leave_less_than_one():
     assert judge(fit(4000.0), [single], [double], EXPECTED).kind == "unexplained"
 
 
-def test_what_the_held_out_runs_refute_is_unexplained():
+def test_a_name_that_the_held_out_runs_refute_becomes_unexplained():
     named = fit(50.0, "coulomb-level")
     verdict = judge(fit(400.0), [named], [], EXPECTED, refuted=True)
     assert (verdict.kind, verdict.named, verdict.refuted) == ("unexplained", None, ("coulomb-level",))
@@ -122,13 +122,18 @@ def test_where_noise_hides_the_slips_an_effect_must_leave_nothing(expected, kind
 @pytest.mark.parametrize(
     ("base", "single", "double", "named"),
     [
-        (1000.0, 400.0, 50.0, 2),  # the second closes what the first leaves
-        (1000.0, 90.0, 80.0, 1),  # it closes little of it
-        (20000.0, 59.0, 45.0, 1),  # nothing was left
-        (20000.0, 300.0, 50.0, 2),  # a gap was left and is closed, although it is small beside what both close
-        (20000.0, 600.0, 200.0, 1),  # neither does: the rest is what the first one's formula does not fit
-        (7200.0, 80.0, 55.0, 1),  # the same, less of it
-        (3000.0, 50.0, 20.0, 1),  # one alone left nothing that evidence without a gap does not leave
+        (1000.0, 400.0, 50.0, 2),  # the second effect closes the rest of the first
+        (1000.0, 90.0, 80.0, 1),  # the second closes little of the rest
+        (20000.0, 59.0, 45.0, 1),  # the first leaves no gap
+        (
+            20000.0,
+            300.0,
+            50.0,
+            2,
+        ),  # the first leaves a gap that the second closes, although it is small compared with the whole gap
+        (20000.0, 600.0, 200.0, 1),  # neither closes the rest: another formula of the first effect would leave as much
+        (7200.0, 80.0, 55.0, 1),  # as above with a smaller rest
+        (3000.0, 50.0, 20.0, 1),  # the first alone leaves the chi2 of evidence without a gap
     ],
 )
 def test_a_second_effect_must_pay(base, single, double, named):
@@ -138,7 +143,7 @@ def test_a_second_effect_must_pay(base, single, double, named):
     assert len(verdict.named.hypothesis.effects) == named
 
 
-def test_beside_an_effect_that_has_no_other_formula_a_small_second_one_is_no_mismatch():
+def test_a_small_second_effect_is_named_where_the_first_has_no_other_formula():
     pair = [fit(80.0, "force-sensor-gain", "drive-hardening")]
     verdict = judge(fit(7200.0), [fit(200.0, "force-sensor-gain")], pair, EXPECTED)
     assert verdict.named is pair[0]
@@ -148,7 +153,7 @@ def test_beside_an_effect_that_has_no_other_formula_a_small_second_one_is_no_mis
     assert named.hypothesis.effects == ("coulomb-level",)
 
 
-def test_no_gap_leaves_room_for_what_is_too_small_to_see():
+def test_no_gap_keeps_a_probability_for_effects_too_small_to_see():
     probabilities = judge(fit(50.0), [fit(48.0, "coulomb-level")], [], EXPECTED).probabilities
     assert sum(probabilities.values()) == pytest.approx(1.0)
     assert next(iter(probabilities)) == "none"
@@ -157,7 +162,7 @@ def test_no_gap_leaves_room_for_what_is_too_small_to_see():
     assert probabilities["drive-backlash"] == pytest.approx(0.0065, abs=0.002)
 
 
-def test_no_verdict_is_surer_than_such_verdicts_were():
+def test_no_verdict_is_more_certain_than_its_counted_rate():
     named = judge(fit(4000.0), [fit(50.0, "coulomb-level")], [], EXPECTED).probabilities
     assert named["coulomb-level"] == pytest.approx(0.98, abs=0.005)
     assert named["unexplained"] == pytest.approx(0.01, abs=0.005)
@@ -171,7 +176,7 @@ def test_no_verdict_is_surer_than_such_verdicts_were():
         assert sum(probabilities.values()) == pytest.approx(1.0)
 
 
-def test_a_name_that_leaves_much_of_the_held_out_runs_is_less_sure():
+def test_a_name_that_leaves_much_of_the_held_out_runs_is_less_certain():
     pairs = [fit(50.0, "coulomb-level", "drive-backlash")]
     for verdict in (
         judge(fit(4000.0), [fit(50.0, "coulomb-level")], [], EXPECTED),
@@ -181,7 +186,7 @@ def test_a_name_that_leaves_much_of_the_held_out_runs_is_less_sure():
         names, less_sure = verdict.named.hypothesis.effects, doubted(verdict)
         assert less_sure.named is verdict.named
         assert tuple(sorted(list(less_sure.probabilities)[: len(names)])) == tuple(sorted(names))
-        sure, less = (sum(one.probabilities[name] for name in names) for one in (verdict, less_sure))
+        sure, less = (sum(outcome.probabilities[name] for name in names) for outcome in (verdict, less_sure))
         assert 0.55 * sure < less < 0.7 * sure
         assert 0.2 < less_sure.probabilities["unexplained"] < 0.3
         assert sum(less_sure.probabilities.values()) == pytest.approx(1.0)
@@ -195,14 +200,14 @@ def test_no_gap_stays_the_likeliest_where_it_is_the_verdict():
 
 
 class Scatter:
-    """Stands in for a random effect: what it leaves on top of a fit, and what log evidence that is worth."""
+    """Fake of a random effect: chi2 that it leaves in addition to a fit, and its log evidence."""
 
     def __init__(self, left, gained, more=0.0, effect="normal-load-fluctuation", in_bursts=False):
         self.left, self.gained, self.more, self.effect, self.in_bursts = left, gained, more, effect, in_bursts
 
     def on(self, under, noise):
         form = Hypothesis(under.hypothesis.forms | {self.effect: "random"}, under.hypothesis.coordinates)
-        left = self.left + self.more * (noise - JITTER)  # the more is put down to noise, the shorter is the path
+        left = self.left + self.more * (noise - JITTER)  # more noise leaves a shorter path
         return Scattered(under._replace(hypothesis=form, chi2=left), self.gained)
 
 
@@ -210,11 +215,17 @@ class Scatter:
     ("single", "left", "gained", "kind", "effects"),
     [
         (900.0, 50.0, 100.0, "effect", [TRACK]),
-        (900.0, 50.0, 5.0, "unexplained", []),  # its freedom costs what it brings
-        (900.0, 500.0, 100.0, "unexplained", []),  # much is left that is no such scatter
+        (900.0, 50.0, 5.0, "unexplained", []),  # its gain does not pay for its freedom
+        (900.0, 500.0, 100.0, "unexplained", []),  # much is left that such scatter does not explain
         (400.0, 50.0, 90.0, "effect", ["coulomb-level", TRACK]),  # both
-        (45.0, 40.0, 90.0, "effect", ["coulomb-level"]),  # nothing was left for it
-        (70.0, 48.0, 90.0, "effect", ["coulomb-level"]),  # little, which may be another formula's
+        (45.0, 40.0, 90.0, "effect", ["coulomb-level"]),  # the first effect leaves no gap
+        (
+            70.0,
+            48.0,
+            90.0,
+            "effect",
+            ["coulomb-level"],
+        ),  # the small rest may belong to another formula of the first effect
     ],
 )
 def test_friction_that_scatters_must_pay_for_its_path(single, left, gained, kind, effects):
@@ -224,18 +235,18 @@ def test_friction_that_scatters_must_pay_for_its_path(single, left, gained, kind
     assert sorted(verdict.named.hypothesis.effects if verdict.named else []) == effects
 
 
-def test_what_was_refuted_is_compared_on_the_held_out_runs_also_where_it_scatters():
+def test_a_refuted_random_effect_is_compared_on_the_held_out_runs_too():
     singles, scatter = [fit(900.0, "coulomb-level")], [Scatter(50.0, 100.0, effect=TRACK)]
     gone = judge(fit(1000.0), singles, [], EXPECTED, scatter).named
     verdict = judge(fit(1000.0), singles, [], EXPECTED, scatter, refuted=True)
     assert verdict.refuted == (TRACK,)
-    assert [one.hypothesis.effects for one in compared_fits(verdict, gone)] == [(TRACK,), ("coulomb-level",)]
+    assert [fit.hypothesis.effects for fit in compared_fits(verdict, gone)] == [(TRACK,), ("coulomb-level",)]
     named = judge(fit(400.0), [fit(50.0, "coulomb-level")], [], EXPECTED).named
     refuted = judge(fit(400.0), [fit(50.0, "coulomb-level")], [], EXPECTED, refuted=True)
-    assert [one.hypothesis.effects for one in compared_fits(refuted, named)] == [("coulomb-level",)]
+    assert [fit.hypothesis.effects for fit in compared_fits(refuted, named)] == [("coulomb-level",)]
 
 
-def test_what_comes_in_bursts_may_be_no_load():
+def test_a_load_in_bursts_stays_unexplained():
     load, singles = "normal-load-fluctuation", [fit(900.0, "coulomb-level")]
     verdict = judge(fit(1000.0), singles, [], EXPECTED, [Scatter(50.0, 100.0, in_bursts=True)])
     assert (verdict.kind, verdict.named, verdict.refuted) == ("unexplained", None, ())
@@ -255,32 +266,30 @@ def test_waves_that_another_place_refutes_may_be_a_track_at_random():
     assert verdict.named is not None
     assert is_random(verdict.named.hypothesis)
     assert of_another_place(base, [waves], EXPECTED, [Scatter(500.0, 100.0, effect=TRACK)]) is None
-    assert [is_of_one_place(one) for one in (waves, other, verdict.named)] == [True, False, False]
+    assert [is_of_one_place(fit) for fit in (waves, other, verdict.named)] == [True, False, False]
 
 
-def test_a_path_is_judged_by_what_it_can_explain_not_by_what_noise_takes_from_it():
-    # 1.5 of the expected, 2.25 where half as much again is noise
+def test_noise_does_not_count_against_a_random_path():
+    # chi2 is 1.5 times the expected value, and 2.25 times it with half as much noise again
     scatter = Scatter(60.0, 150.0, more=40.0, effect=TRACK)
     verdict = judge(fit(1000.0), [fit(900.0, "coulomb-level")], [], EXPECTED, [scatter])
     assert verdict.named is not None
     assert verdict.named.hypothesis.effects == (TRACK,)
 
 
-def test_what_few_waves_leave_of_a_rough_track_is_no_second_effect():
+def test_the_rest_of_a_rough_track_after_a_few_waves_is_not_a_second_effect():
     scatters = [Scatter(50.0, 90.0), Scatter(50.0, 80.0, effect=TRACK)]
     waves = fit(400.0, TRACK)
     verdict = judge(fit(1000.0), [waves], [], EXPECTED, scatters)
     assert verdict.named is not None
-    assert (
-        verdict.named.hypothesis == waves.hypothesis
-    )  # the waves, not a path of which nobody knows more than its size
-    assert verdict.probabilities["unexplained"] > 0.2  # as where a path is all
+    assert verdict.named.hypothesis == waves.hypothesis  # the waves, and not a path of which only the size is known
+    assert verdict.probabilities["unexplained"] > 0.2  # as for a verdict that names a path alone
     load = judge(fit(1000.0), [waves], [], EXPECTED, scatters[:1])
     assert load.named is not None
     assert len(load.named.hypothesis.effects) == 2
 
 
-def test_of_two_named_effects_the_one_that_does_more_alone_is_first():
+def test_the_stronger_of_two_named_effects_is_first():
     pairs = [fit(50.0, "coulomb-level", "drive-backlash")]
     for stronger, weaker in (("coulomb-level", "drive-backlash"), ("drive-backlash", "coulomb-level")):
         verdict = judge(fit(4000.0), [fit(900.0, stronger), fit(3000.0, weaker)], pairs, EXPECTED)

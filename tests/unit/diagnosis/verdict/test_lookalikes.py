@@ -1,4 +1,4 @@
-"""Which effects are given together, over made-up fits of which none imitates another."""
+"""Groups of effects that cannot be distinguished, over made-up fits."""
 
 from types import SimpleNamespace
 
@@ -20,7 +20,7 @@ def fit(effect, chi2):
 
 
 class Fitter:
-    """Stands in for a fitter: what an imitation leaves of perfect runs of the named effect, which itself leaves nothing."""
+    """Fake of a fitter: an imitation leaves `left` of chi2 on perfect runs of the named effect, and that effect leaves 0."""
 
     def __init__(self, left):
         self.left = left
@@ -45,7 +45,7 @@ class Fitter:
     [(1.4, 200.0, True), (8.0, 200.0, False), (8.0, 4.0, True), (20.0, 4.0, False)],
     ids=["explains the runs as well", "does neither", "imitates it", "the runs tell"],
 )
-def test_a_group_holds_what_explains_the_runs_as_well_or_imitates_what_does(behind, left, alike):
+def test_a_group_holds_effects_that_fit_as_well_or_imitate_the_named_effect(behind, left, alike):
     ranked = [RankedFit(fit("coulomb-level", 50.0), 100.0), RankedFit(fit("stribeck-velocity", 50.0), 100.0 - behind)]
-    found = imitators(Fitter(left), ranked, 1.0)
-    assert found == (("coulomb-level", "stribeck-velocity") if alike else ())
+    group = imitators(Fitter(left), ranked, 1.0)
+    assert group == (("coulomb-level", "stribeck-velocity") if alike else ())
