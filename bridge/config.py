@@ -185,7 +185,9 @@ def _line(model: type[Strict], source: str, problem: Any) -> str:
         return f"{source}: {key}: {message}" if path else f"{source}: {message}"
     if kind in {"float_type", "int_type"} and isinstance(problem["input"], str):
         comma = _COMMA.fullmatch(problem["input"].strip())
-        remedy = "write it without quotes" if _NUMBER.fullmatch(problem["input"].strip()) else "write digits, such as 1.5"
+        remedy = (
+            "write it without quotes" if _NUMBER.fullmatch(problem["input"].strip()) else "write digits, such as 1.5"
+        )
         if comma:
             remedy = f"write a decimal point: {comma[0].replace(',', '.')}"
         return f"{source}: {key} = {in_short(problem['input'])}: must be a number; {remedy}"
