@@ -129,9 +129,11 @@ lock: ## needs uv
 	$(LOCK) --extra dev --constraint requirements.lock --output-file requirements-dev.lock
 	$(LOCK) --extra bench --extra viewers --constraint requirements-dev.lock --output-file requirements-nightly.lock
 
-proto: $(READY) ## after a change of bridge/wire/stickslip.proto
+proto: $(READY) ## after a change of a .proto file
 	$(BIN)/python -m grpc_tools.protoc -I bridge/wire --python_out=bridge/wire --pyi_out=bridge/wire \
 		--include_source_info --descriptor_set_out=bridge/wire/stickslip.desc bridge/wire/stickslip.proto
+	$(BIN)/python -m grpc_tools.protoc -I bridge/log/viewers --include_imports \
+		--descriptor_set_out=bridge/log/viewers/foxglove/Log.desc foxglove/Log.proto
 
 layouts: $(READY) ## after a change of a record that kernels read: its fields for the type checkers
 	@$(BIN)/python -m docs.layouts

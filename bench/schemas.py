@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from bridge.results import write_json
-from cockpit.commands.as_json.schemas import Format, result_of, scenario
+from cockpit.commands.as_json.schemas import Format, scenario
 
 FOLDER = Path(__file__).parent / "json_schemas"
 
@@ -39,14 +39,12 @@ FORMATS = {
         Format("bank", "A family of the bank of `python -m bench control`, as in bench/control/scenarios.", _bank),
         Format(
             "blind-scores-2",
-            "`python -m bench blind score --json` and `blind pool --json`, blind-scores/2.",
-            result_of("bench.blind.pooling:BlindScores"),
+            "`python -m bench blind score --json` and `blind pool --json`, format blind-scores/2.",
+            "bench.blind.pooling:BlindScores",
         ),
-        Format(
-            "bench-control-result", "`python -m bench control --json`.", result_of("bench.control.result:BankResult")
-        ),
-        Format("bench-faults-result", "`python -m bench faults --json`.", result_of("bench.faults.run:FaultBench")),
-        Format("blind-run-result", "`python -m bench blind run --json`.", result_of("bench.blind.command:SetDone")),
+        Format("bench-control-result", "`python -m bench control --json`.", "bench.control.result:BankResult"),
+        Format("bench-faults-result", "`python -m bench faults --json`.", "bench.faults.run:FaultBench"),
+        Format("blind-run-result", "`python -m bench blind run --json`.", "bench.blind.command:SetDone"),
     )
 }
 

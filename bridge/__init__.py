@@ -4,7 +4,7 @@ wire/     messages on the bus, for every language: stickslip.proto, PROTOCOL.md,
 log/      run logs (MCAP): written, recorded, read whole or cut, checked
 guard/    limits on the exciter of a rig that hold for every command of a controller
 tables/   CSV, Parquet, MATLAB and TDMS, in and out
-config    strict TOML                              faults   codes, exit statuses and help
+config    strict TOML                              faults   codes, exit statuses and help (faults.toml)
 files     checks before reading, atomic writing    units    units in names, numbers in words
 results   the JSON of results: a named tuple is an object
 pages     one style sheet and one frame for all HTML files

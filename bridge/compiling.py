@@ -7,9 +7,9 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from bridge.plain import print_line
 
 PROGRESS = "compiling kernels, once for this version: "  # followed by `12 of 163 left`
-_LINES = 8  # lines for all kernels, if stderr is not a terminal
+_LINES = 8  # progress lines for all kernels together, if stderr is not a terminal
 _BAR = 20  # length of the progress bar [characters]
-# Set by a command: within this context a signal ends the process at once. Without it signals wait for the end of a compilation.
+# Set by a command: a context in which a signal ends the process at once. Without it signals wait for the end of a compilation.
 guard: Callable[[], AbstractContextManager[None]] = nullcontext
 
 
@@ -63,7 +63,7 @@ _work = _Work()
 
 
 def expect(kernels: set[object]) -> None:
-    """Add kernels to the ones to be compiled."""
+    """Add kernels to the ones whose compilation the progress counts."""
     _work.total |= kernels
 
 

@@ -60,7 +60,7 @@ def refuse_to_replace(path: Path, kind: str, place: str) -> None:
     gave the path, or the path.
     """
     with contextlib.suppress(OSError):  # the write that follows reports it
-        if kind == LOG and (path.is_fifo() or path.is_socket()):  # it waits for a reader and cannot be read back
+        if kind == LOG and (path.is_fifo() or path.is_socket()):  # a pipe blocks, and cannot be read back
             raise Fault("CONFIG", f"{place}: is a pipe or socket: a log must be a file on a disk; choose another file")
     if not _may_replace(path, 8, lambda begins: begins.lstrip().lower().startswith(_BEGINS[kind])):
         raise Fault("CONFIG", f"{place}: {path.name} exists and holds no {kind}: it would be lost; choose another file")

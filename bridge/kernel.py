@@ -8,9 +8,9 @@ from typing import Any, ParamSpec, TypeVar
 
 import numba
 import numpy as np
-import numpy.typing as npt
 from llvmlite.binding import get_host_cpu_features
 
+from bridge.arrays import Records
 from bridge.kernel_cache import FOLDER, usable_folder
 from bridge.kernel_linking import Kernel, SharedKernel
 
@@ -26,8 +26,7 @@ Record = Any
 _settings: Any = numba.config  # pyright: ignore[reportPrivateImportUsage]
 _settings.CACHE_DIR = os.environ[FOLDER] = str(usable_folder())  # for this process and its children
 # highlighting thousands of internal error messages takes 3 % of a compilation
-_settings.DISABLE_ERROR_MESSAGE_HIGHLIGHTING = True
-_settings.CACHE_LOCATOR_CLASSES = "bridge.kernel_cache.SourcesLocator"
+os.environ["NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING"] = "1"
 
 
 def _named_by_content(layout: Any) -> tuple[str, tuple[str]]:
@@ -92,6 +91,6 @@ def has_wide_vectors() -> bool:
     return bool(get_host_cpu_features().get("avx512f"))
 
 
-def record(dtype: np.dtype[Any]) -> npt.NDArray[Any]:
+def record(dtype: np.dtype[Any]) -> Records:
     """One zeroed record of `dtype`, with fields as attributes in compiled and interpreted kernels alike."""
     return np.zeros(1, np.dtype((np.record, dtype)))

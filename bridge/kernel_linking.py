@@ -18,18 +18,30 @@ from pathlib import Path
 from typing import Any
 
 from llvmlite import binding
-from numba.core import compiler, types
+from numba.core import caching, compiler, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.environment import lookup_environment
 from numba.core.registry import CPUDispatcher
 
 from bridge.compiling import compiling, expect, note_done
-from bridge.kernel_cache import sources_digest
+from bridge.kernel_cache import SourcesLocator, sources_digest
 
 _OPTIONS = {"nopython": True, "boundscheck": None, "error_model": "numpy", "fastmath": False, "no_cfunc_wrapper": True}
 _CPUDispatcher: Any = CPUDispatcher
 _JITCodeLibrary: Any = JITCodeLibrary
 _Compiler: Any = compiler.Compiler
+_FunctionCache: Any = caching.FunctionCache
+
+
+class _Cache(_FunctionCache):
+    """Numba's cache on disk, with a key of all sources of a kernel.
+
+    The key is not set in numba's configuration, which numba resets at the first compilation after a change of the environment:
+    kernels defined later had a key without the sources that they import, and called kernels that no longer existed.
+    """
+
+    class _impl_class(_FunctionCache._impl_class):  # noqa: N801, SLF001 - numba's name
+        _locator_classes = (SourcesLocator,)
 
 
 class _Library(_JITCodeLibrary):
@@ -86,7 +98,7 @@ class _PartCompiler(_Compiler):
 
 
 class _Inner(_CPUDispatcher):
-    """A kernel as other kernels see it."""
+    """A kernel as other kernels call it: a part that they link in."""
 
     def add_overload(self, cres: Any) -> None:
         note_done({self.py_func})
@@ -103,7 +115,7 @@ class Kernel(_CPUDispatcher):
 
     def __init__(self, py_func: Any, unlocked: bool = False) -> None:
         super().__init__(py_func, targetoptions={**_OPTIONS, "nogil": unlocked}, pipeline_class=_WholeCompiler)
-        self.enable_caching()
+        self._cache = _Cache(py_func)
         self._inner = _Inner(py_func, targetoptions=dict(_OPTIONS), pipeline_class=_PartCompiler)
 
     def __reduce__(self) -> Any:
@@ -123,7 +135,7 @@ class SharedKernel(_CPUDispatcher):
 
     def __init__(self, py_func: Any) -> None:
         super().__init__(py_func, targetoptions=dict(_OPTIONS), pipeline_class=_WholeCompiler)
-        self.enable_caching()
+        self._cache = _Cache(py_func)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         return super().get_call_template(*_of_any_value(args, kws))
@@ -166,7 +178,7 @@ _KINDS = (Kernel, SharedKernel)
 
 
 def _kernels_in(module: str) -> set[object]:
-    """The functions of all kernels that a module's functions may call."""
+    """The functions of the kernels that a module defines or imports, and of the kernels that these call."""
     entries = [value.py_func for value in vars(importlib.import_module(module)).values() if isinstance(value, _KINDS)]
     return set[object]().union(*map(_called_by, entries))
 

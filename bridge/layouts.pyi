@@ -71,28 +71,29 @@ class GuardMemory:
     vibration_mps:float
 
 class PlantParams:
-    F_c:float; F_s:float; accel_highpass_keep:float; accel_highpass_keep_stick:float; accel_keep:float;
-    accel_keep_stick:float; accel_noise_mps2:float; accel_range_mps2:float; accel_resolution_mps2:float;
-    age_exponent:float; age_growth_N:float; age_length_m:float; age_rested_N:float; age_scale_s:float;
-    age_settling_s:float; amplitude_max_m:float; amplitude_slew_m_per_s:float; backward_ratio:float; base_Hz:float;
-    base_accel_ratio:float; base_damping_ratio:float; base_m_per_N:float; block_ns:int; delivered_ratio:float;
-    disturbed:int; drift_before_s:float; drift_per_s:float; drift_ratio:float; drift_settling_s:float; dt_s:float;
-    elastic_ratio:float; elasto_plastic:int; force_bias_N:float; force_delay_s:float; force_drift_N:float;
-    force_drift_N_per_s:float; force_driven:int; force_gain:float; force_keep:float; force_keep_stick:float;
-    force_lag_order:float; force_lag_s:float; force_lowest_N:float; force_noise_N:float; force_range_N:float;
-    force_ratio:float; force_resolution_N:float; force_settling_s:float; forward_ratio:float; frame_Hz:float;
-    frame_damping_ratio:float; frame_m_per_N:float; frequency_max_Hz:float; frequency_min_Hz:float; gap_m:float;
-    h_d:float; h_t:float; h_v:float; hardening_per_m2:float; k_d:float; k_t:float; kinetic_backward_ratio:float;
-    knee_m:float; knee_ratio:float; lag_dead_s:float; lag_distance_m:float; lag_s:float; late_share:float;
-    load_cos_2:float; load_frequency_Hz:float; load_phase_rad:float; load_ratio:float; load_seed:float;
-    load_sin_2:float; m:float; mass_accel_ratio:float; mode_ratio:float; mount_damping_ratio:float;
-    mount_resonance_Hz:float; position_cos_2:float; position_keep:float; position_keep_stick:float;
-    position_linearity:float; position_lowest_m:float; position_noise_m:float; position_other_phase_rad:float;
-    position_other_share:float; position_other_wavelength_m:float; position_phase_rad:float; position_range_m:float;
-    position_ratio:float; position_resolution_m:float; position_seed:float; position_sin_2:float;
+    F_c:float; F_s:float; accel_bandwidth_Hz:float; accel_highpass_keep:float; accel_highpass_keep_stick:float;
+    accel_keep:float; accel_keep_stick:float; accel_lowest_Hz:float; accel_noise_mps2:float; accel_range_mps2:float;
+    accel_resolution_mps2:float; age_exponent:float; age_growth_N:float; age_length_m:float; age_rested_N:float;
+    age_scale_s:float; age_settling_s:float; amplitude_max_m:float; amplitude_slew_m_per_s:float; backward_ratio:float;
+    base_Hz:float; base_accel_ratio:float; base_damping_ratio:float; base_m_per_N:float; block_ns:int;
+    command_timeout_s:float; delivered_ratio:float; disturbed:int; drift_before_s:float; drift_rate_per_s:float;
+    drift_ratio:float; drift_settling_s:float; dt_s:float; elastic_ratio:float; elasto_plastic:int;
+    force_bandwidth_Hz:float; force_bias_N:float; force_delay_s:float; force_drift_N:float; force_driven:int;
+    force_gain:float; force_keep:float; force_keep_stick:float; force_lag_order:float; force_lag_s:float;
+    force_lowest_N:float; force_noise_N:float; force_range_N:float; force_rate_N_per_s:float; force_ratio:float;
+    force_resolution_N:float; force_settling_s:float; forward_ratio:float; frame_Hz:float; frame_damping_ratio:float;
+    frame_m_per_N:float; frequency_max_Hz:float; frequency_min_Hz:float; gap_m:float; h_d:float; h_t:float; h_v:float;
+    hardening_per_m2:float; k_d:float; k_t:float; kinetic_backward_ratio:float; knee_m:float; knee_ratio:float;
+    lag_dead_s:float; lag_distance_m:float; lag_s:float; late_share:float; load_frequency_Hz:float;
+    load_phase_rad:float; load_ratio:float; load_second_cos:float; load_second_sin:float; load_seed:float; m:float;
+    mass_accel_ratio:float; mode_ratio:float; mount_damping_ratio:float; mount_resonance_Hz:float;
+    position_bandwidth_Hz:float; position_keep:float; position_keep_stick:float; position_linearity:float;
+    position_lowest_m:float; position_noise_m:float; position_other_phase_rad:float; position_other_share:float;
+    position_other_wavelength_m:float; position_phase_rad:float; position_range_m:float; position_ratio:float;
+    position_resolution_m:float; position_second_cos:float; position_second_sin:float; position_seed:float;
     position_wavelength_m:float; position_width:float; quadratic_Ns2_per_m2:float; relaxation_s:float;
-    relaxing_Ns_per_m:float; ripple_cos_2:float; ripple_frequency_Hz:float; ripple_per_N:float; ripple_phase_rad:float;
-    ripple_ratio:float; ripple_sin_2:float; ripple_wavelength_m:float; rolloff_Hz:float; rolloff_order:float;
+    relaxing_Ns_per_m:float; ripple_frequency_Hz:float; ripple_per_N:float; ripple_phase_rad:float; ripple_ratio:float;
+    ripple_second_cos:float; ripple_second_sin:float; ripple_wavelength_m:float; rolloff_Hz:float; rolloff_order:float;
     roughness_length_m:float; roughness_ratio:float; roughness_seed:float; sag_ratio:float; sag_settling_s:float;
     samples_per_block:int; steps_per_sample:int; steps_per_stick_sample:int; stick_dt_s:float; stribeck_tail:float;
     v_s:float

@@ -8,14 +8,12 @@ from collections.abc import Callable
 # escape code can rename the window or type input
 _CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff]")
 
-# Lines on stderr for the parent of a process: the process waits for a compilation,
+# Begin of a line on stderr of a process that waits for a compilation; its parent prints it too.
 ANOTHER_COMPILES = "another process compiles the kernels of "
-# or it has loaded its kernels and waits for the other processes
-LOADED = "loaded"
 
 
 def plain(text: str) -> str:
-    """The text with every control character as its hexadecimal code."""
+    """The text with control and invisible characters as their codes."""
     return _CONTROL.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 

@@ -4,20 +4,6 @@ import math
 import re
 from typing import SupportsInt
 
-# longest suffix first: `_mps2` before `_mps` before `_s`
-_UNITS = (
-    ("_Ns_per_m", "N s/m"),
-    ("_N_per_m", "N/m"),
-    ("_mps2", "m/s^2"),
-    ("_mps", "m/s"),
-    ("_Hz", "Hz"),
-    ("_ns", "ns"),
-    ("_kg", "kg"),
-    ("_N", "N"),
-    ("_m", "m"),
-    ("_s", "s"),
-)
-
 
 def counted(number: SupportsInt, singular: str, plural: str = "") -> str:
     """A number of things: `1 gap`, `2 gaps`; `plural` is needed only if it is not `singular` with an s."""
@@ -26,10 +12,10 @@ def counted(number: SupportsInt, singular: str, plural: str = "") -> str:
 
 def unit_of(name: str) -> str:
     """Unit of `name`, such as `N` for `drive_force_N`; `1` for a number without a unit, such as a count or a code."""
-    return next((unit for suffix, unit in _UNITS if name.endswith(suffix)), "1")
+    return (name_and_unit(name)[1] or "1").replace("²", "^2")
 
 
-_UNIT = re.compile(r"^(?:(.*?)_)?((?:Ns2|Ns|N|mps2|mps|m2|m|s|kg|Hz|rad)(?:_per_(?:N|m2|m|s))?|per_s)$")
+_UNIT = re.compile(r"^(?:(.*?)_)?((?:Ns2|Ns|N|mps2|mps|m2|m|ns|s|kg|Hz|rad)(?:_per_(?:N|m2|m|s))?|per_s)$")
 _SYMBOLS = {"mps2": "m/s²", "mps": "m/s", "Ns2": "N s²", "Ns": "N s", "m2": "m²", "per": "1"}
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
 _SCIENTISTS = {"coulomb", "stribeck"}
@@ -88,7 +74,7 @@ def percent(share: float | None) -> str:
 
 
 def times(value: float | None) -> str:
-    """A gap in noise floors as text, three significant digits."""
+    """A ratio as text, such as a gap in noise floors: three significant digits."""
     return "unknown" if value is None or not math.isfinite(value) else f"{value:.3g}"
 
 
@@ -106,7 +92,7 @@ def band(edges_Hz: tuple[float, float]) -> str:
 
 
 def prefixed(size: float, unit: str) -> tuple[float, str]:
-    """The factor and the prefixed unit that bring a number of this size between 1 and 1000."""
+    """Factor and prefixed unit for a number of this size: 0.1 to 1000 stays, others become 1 to 1000; a share becomes percent."""
     if unit == "%":
         return 100.0, unit
     if unit in _WITHOUT_PREFIX or not math.isfinite(size) or size == 0.0 or 0.1 <= size < 1000.0:

@@ -14,7 +14,7 @@ from cockpit.commands.as_json.option import JsonGroup
 _PANELS: dict[str, dict[str, tuple[str, ...]]] = {
     "Try it": {
         "run": (
-            "run.run",
+            "processes.run",
             "stickslip run",
             "stickslip run --in-process --set controller.limits.v_ratio=1.3",
             "stickslip run --scenario stop-and-go --log runs/axis.mcap",
@@ -99,17 +99,17 @@ _PANELS: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "Proof": {
         "fault": (
-            "stress.fault.fault",
+            "proof.fault",
             "stickslip fault --list",
             "stickslip fault base-accel-half --for 5",
             "stickslip fault controller-frozen-2-s",
         ),
         "soak": (
-            "stress.soak.soak",
+            "proof.soak",
             "stickslip soak --hours 1 --report soak.md",
             "stickslip soak --minutes 3",
         ),
-        "schema": ("schema.schema",),
+        "schema": ("proof.schema",),
     },
 }
 _MOVED = {"blind": ("moved.moved",), "bench": ("moved.moved",)}

@@ -17,11 +17,11 @@ def main(app: typer.Typer = stickslip) -> None:
     os.environ["PYTHONSAFEPATH"] = "1"
     # pictures are only written to files; matplotlib fails at import if the variable holds an unknown name
     os.environ["MPLBACKEND"] = "Agg"
-    # numpy's import takes 90 ms on two cores, of which 35 ms start the second thread of linear algebra. Two threads also add in
-    # another order than one. diagnosis/processes.py sets one thread for a diagnosis that is called from other programs.
+    # One thread for linear algebra: to start the second takes 35 of the 90 ms of numpy's import on two cores, and two threads add
+    # in another order than one. diagnosis/processes.py sets one thread for a diagnosis that is called from other programs.
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     os.environ["PYDANTIC_DISABLE_PLUGINS"] = "1"  # the search for plugins takes 10 ms, which would delay a stop
-    # a read-only home holds no font cache; matplotlib warns of it in two lines, but the picture is the same
+    # suppresses matplotlib's warning that it cannot store its font cache in a read-only home; the picture is the same
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     prepare_stdout()
     status = 1  # exit status after an exception that no command catches
@@ -30,8 +30,8 @@ def main(app: typer.Typer = stickslip) -> None:
         sys.stdout.flush()
         os._exit(status)
 
-    # Registered first, so it runs last, and ends the process before the interpreter is torn down: an Arrow thread that frees a
-    # table during the teardown aborts the process: on a busy computer one in seven commands that read a CSV.
+    # Registered first, so it runs last, and ends the process before the interpreter is torn down. During the teardown an Arrow
+    # thread that frees a table would abort the process, on a busy computer in one of seven commands that read a CSV.
     atexit.register(end)
     status = exit_status_of(lambda: _status(app))
     sys.exit(status)

@@ -17,7 +17,6 @@ telemetry      the state for plots and the memory for replay
 node, app      the controller as a participant of the bus; the process
 freshness      whether blocks come in time; stalls of the controller itself
 replay         the controller on the frames of a log; replay_steps: comparison of its steps with the log
-loop_design    margins of the amplitude loop if its delay is wrong
 message_faults faults of received messages; rig_header: whether the controller can control the rig
 
     v_d  drive velocity [m/s]          s    1 - v_s / v_d, the force rate (dF_d/dt) / (k_d v_d) [-]

@@ -17,28 +17,28 @@ from controller.trips.doubts import ACCELEROMETER
 from controller.trips.stall import is_judged
 
 TWO_PI = 2.0 * math.pi
-REMEMBERED = 512  # remembered steps of the command: 0.1 s of blocks of 0.25 ms
+REMEMBERED = 512  # number of stored commands, one a step: 0.1 s of blocks of 0.25 ms
 FIRST_SHARE = 0.1  # first stroke over the stroke of the rigid mount, for a gain that was never measured
-_GROWTH = 1.25  # factor of the stroke in each loop delay, while the gain is not known
+_GROWTH = 1.25  # factor by which the stroke grows in each loop delay, while the gain is not known
 _UNKNOWN_DELAY_S = 0.05  # loop delay until it is measured: the longest that the loop is designed for
-SETTLE_S = 0.004  # shortest vibration until a first gain is accepted
+SETTLE_S = 0.004  # duration of a detected vibration until its gain is learnt
 LEARN_S = 0.01  # time constant of the learnt gain
-MOST_DELAY_S = 0.05  # longest loop delay. Larger: a gain that changes together with v_d is learnt later
+MOST_DELAY_S = 0.05  # longest loop delay of the gain's learning. Larger: a gain that changes with v_d is learnt later
 TAIL = 3.0  # time constants of the demodulator's low-pass after which earlier commands have no effect
-SLOTS = 18  # slots for extremes of the command; a fixed number, so that a scan costs the same at any block length
-_HEARD = 5.0  # smallest detected vibration, in sigmas of the silent accelerometer
+SLOTS = 18  # time slots for extremes of the command; fixed, so that a scan costs the same at any block length
+_HEARD = 5.0  # smallest v_a that counts as detected, over the mean v_a that noise shows at rest
 _LEAST_HEARD_MPS = 1e-7  # no accelerometer detects a weaker vibration of some kHz
-_MEAN_STEPS = 50  # silent blocks over which the noise is averaged
-_FEW_STEPS = 10  # silent blocks until which the blocks before a vibration arrives count as silent, too
+_MEAN_STEPS = 50  # silent blocks over which the accelerometer's noise is averaged
+_FEW_STEPS = 10  # with fewer silent blocks, blocks until a first vibration is detected count as silent, too
 # Number of silent blocks at which a vibration must be twice as strong to be detected. Smaller: noise is detected in the first
 # blocks, and a delay of 0 is learnt; at 5 that happens in 0.1 % of the first starts in the second block of a run.
 _UNSURE_STEPS = 5.0
 _LOUDER, _MUCH_LOUDER = 1.3, 2.0  # measured over wanted v_a above which the command is corrected, or cut, at once
-LOUD_S = 0.003  # time for which v_a must exceed this ratio
+LOUD_S = 0.003  # time for which v_a must exceed _LOUDER times the wanted v_a until it is corrected
 SILENCE_S = 0.1  # duration of zero commands until the base counts as at rest
 _LARGEST_LOG_GAIN = 4.6  # largest logarithm of the gain, either sign: a factor of 100
-_WEAK_S = 0.05  # time until a piezo counts as weak, and until it no longer does
-_ALARM_RATIO = 1.05  # v_a / v_d below which a vibration is too weak
+_WEAK_S = 0.05  # time at the limit until a piezo counts as weak, and time without until it no longer does
+_ALARM_RATIO = 1.05  # v_a / v_d below which a vibration at the exciter's limit is too weak
 
 
 @kernel
@@ -115,7 +115,7 @@ def listen(p: ControllerParams, s: ControllerMemory, late: bool) -> None:
 
 @kernel
 def _learn(p: ControllerParams, s: ControllerMemory, i: int, most_mps: float) -> None:
-    """Learn a candidate's gain from a v_a that no recent command explains; `most_mps` is the largest of these commands."""
+    """Learn the gain at a candidate frequency from a v_a that no recent command explains; `most_mps`: their largest."""
     now_mps = s.vibration_velocity_mps
     if s.expected_mps <= 0.0 or now_mps <= 0.0:
         return
@@ -152,7 +152,7 @@ def _note_delay(s: ControllerMemory) -> None:
     else:
         s.loop_delay_steps += (s.onset_steps - s.loop_delay_steps) // 2
     s.listening, s.even_steps = 0, 0
-    # both low-passes begin here, as the delay was not known before
+    # restart the low-passes of measured and expected v_a, as the delay was not known before
     s.expected_mps, s.in_phase_mps2, s.quadrature_mps2 = 0.0, 0.0, 0.0
 
 

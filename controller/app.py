@@ -34,9 +34,7 @@ from controller.rig_header import RigAgain, refuse_another_rig
 _PLANT_LOST_S = 1.0  # silence after which a plant that has left the bus counts as lost
 _GIVEN_UP_S = 30.0  # time without a rig after which this process ends; equals the wait for a rig at the start
 _HEADER_S = 1.0  # longest wait for the header of the rig; a rig without a header delays the start by all of it
-_TOKEN_WAIT_S = (
-    1.0  # longest wait for a plant at the start; a rig without a liveliness token delays the start by all of it
-)
+_TOKEN_WAIT_S = 1.0  # longest wait for the plant's liveliness token; a rig without one delays the start by all of it
 _AT_ONCE_S = 0.05  # time for a controller that starts at the same moment to appear, and period of checking again
 _ANSWER_EVERY_S = 0.4  # least time between two answers to a command, which is repeated every 0.5 s until answered
 _MOST_ANSWERS = 16  # most answers to operators in a second; further commands are applied without an answer
@@ -57,7 +55,7 @@ def run(
 ) -> int:
     """Answer every block on the bus until the plant ends its run or `stop` is set; return the number of steps.
 
-    `report`: reports the life of this process to the operator.
+    `report`: reports start, waiting and end of this process to the operator.
 
     Raises Fault NO_PEER, PEER_DIED, BAD_MESSAGE, CONFIG, ENDPOINT_BUSY.
     """
@@ -72,8 +70,8 @@ def run(
         refuse_another_rig(bus.headers(["plant"], _HEADER_S, stop).get("plant"), config)
         granted = ""
         if lockstep:
-            # Plant and controller take turns: on one core waking the other process takes a tenth of the time. Runs at the
-            # same time have other ports and so other cores.
+            # Plant and controller take turns: if they share a core, waking the other process takes a tenth of the time.
+            # Parallel runs have other ports and so other cores.
             realtime.claim(realtime.core(bus_config.port), realtime.LOCKSTEP_PRIORITY)
         else:
             granted = realtime.claim(realtime.core(1))  # before the announcement, as the rig may begin right after
@@ -110,7 +108,7 @@ class ControllerProcess:
         bus: the controller's session.
         lockstep: whether the rig waits for the command of each block.
         inbox: queue of received messages; by default a new inbox.
-        report: reports the life of this process and its important events to the operator.
+        report: reports start, waiting and end of this process, and its important events, to the operator.
 
     """
 
@@ -199,7 +197,7 @@ class ControllerProcess:
                     started = True
                     self._report("running", granted or "in lockstep")
                     if not self._lockstep:
-                        # only now, as the plant sends its first block when the recorder is subscribed
+                        # only now: the plant sends its first block once the recorder listens, so the log holds this event
                         self.event("START", granted)
                 self._doubts.look()
                 self._rig_again.refuse()
@@ -278,7 +276,7 @@ class ControllerProcess:
             text = f"block {node.last_block} after block {before}: the controller continues with empty windows"
             self.event("RIG_RESTARTED", text)
             self._rig_again.begin()
-        if self._rig_lost:  # with the reason again: RIG_LOST may not have passed the broken link
+        if self._rig_lost:  # the event repeats the reason, as RIG_LOST may not have passed the broken link
             self._report("joined", "the rig again")
             self.event("RIG_BACK", f"blocks arrive again, from block {node.last_block} on; {self._rig_lost}")
             self._rig_lost = ""
@@ -313,7 +311,7 @@ class ControllerProcess:
         if command.action not in wire.Operator.Action.values():
             raise Fault("BAD_MESSAGE", f"{OPERATOR.name}: action = {command.action}: not known")
         self._node.operator(command.action)
-        if self._node.rig_reports and self._blocks.is_fresh:  # a rig with a guard reports it
+        if self._node.rig_reports and self._blocks.is_fresh:  # a rig with a guard reports the command itself
             return
         report = f"{wire.Operator.Action.Name(command.action)} by {command.who[:_LONGEST_WHO] or 'an unnamed operator'}"
         now_s = time.monotonic()

@@ -9,9 +9,8 @@ from bridge.config import Strict, Two
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
-Share = Annotated[float, Field(gt=0, le=1)]
-MOST_BANDS = 8  # forbidden bands of frequency
-_FEWEST_SILENT_BLOCKS = 2  # fewest block periods in `stale_after_s`; with fewer every block would be too late
+MOST_BANDS = 8  # most forbidden bands of frequency
+_FEWEST_SILENT_BLOCKS = 2  # fewest block periods in `stale_after_s`; with one, every block would be too late
 Mode = Literal["on-demand", "moving", "start-only", "settle"]
 MODES: tuple[Mode, ...] = get_args(Mode)
 
@@ -19,9 +18,9 @@ MODES: tuple[Mode, ...] = get_args(Mode)
 class EstimatorConfig(Strict):
     """Inputs of the estimate of stick, slip and smooth sliding. Everything else is measured."""
 
-    use_force: bool = Field(default=True, description="false: the rig has no force sensor; positions decide.")
+    use_force: bool = Field(default=True, description="false: the rig has no force sensor; only positions show sticks.")
     use_slide_position: bool = Field(
-        default=True, description="false: the rig has no slide position; force and drive_stiffness_N_per_m decide."
+        default=True, description="false: the rig has no slide position; force and drive_stiffness_N_per_m show sticks."
     )
     # 0.5 um/s is the drift of a transducer during warm-up; no axis feeds as slowly (30 um a minute)
     least_feed_mps: Positive = Field(default=5e-7, description="Drive speed up to which the drive counts as at rest.")
@@ -38,24 +37,25 @@ class PolicyConfig(Strict):
 
     mode: Mode = Field(
         default="on-demand",
-        description="on-demand: when the slide sticks; moving: while the drive moves; start-only: for start_s after each start; "
-        "settle: on-demand, and fading out over settle_s after each move.",
+        description="When to vibrate. on-demand: once the slide sticks, while needed; moving: while the drive moves; "
+        "start-only: for start_s after each start; settle: on-demand, and fading out over settle_s after each move.",
     )
     enabled_from_s: NotNegative = Field(
         default=0.0, le=1e9, description="Time of the run from which vibration is allowed."
     )
     first_probe_s: Positive = Field(
-        default=0.5, description="Time from the first vibration at a speed to its first probe."
+        default=0.5,
+        description="Time from the first vibration at a speed to its first probe: a trial without vibration.",
     )
     probe_every_s: Positive = Field(
         default=10.0,
         description="Time between probes; doubles when a probe finds the vibration still needed, up to probe_every_max_s.",
     )
     probe_every_max_s: Positive = 600.0
-    probe_fade_s: Positive = Field(default=0.5, description="Shortest time in which a probe fades out.")
-    probe_hold_s: Positive = Field(default=0.5, description="Shortest time without vibration until it is not needed.")
+    probe_fade_s: Positive = Field(default=0.5, description="Shortest time in which a probe fades the vibration out.")
+    probe_hold_s: Positive = Field(default=0.5, description="Shortest trial without vibration to show it needless.")
     # on the paper's rig 1.00 fails, 1.02 works at some frequencies, 1.05 at all with even friction; 1.07 adds a margin
-    least_ratio: Annotated[float, Field(ge=1.02, le=1.5)] = Field(default=1.07, description="Least v_a / v_d held.")
+    least_ratio: Annotated[float, Field(ge=1.02, le=1.5)] = Field(default=1.07, description="Least v_a / v_d to hold.")
     most_ratio: Annotated[float, Field(ge=1.2, le=3.0)] = Field(
         default=2.4, description="Largest v_a / v_d, after slips in spite of the vibration."
     )
@@ -64,11 +64,11 @@ class PolicyConfig(Strict):
 
 
 class AmplitudeConfig(Strict):
-    """The loop that brings the measured v_a to its set point; `loop_design` gives its margins."""
+    """The loop that brings the measured v_a to its set point."""
 
     gone = {"gain": "the exciter's gain is learnt"}
 
-    filter_s: Positive = Field(default=0.005, description="Time constant of the demodulated amplitude.")
+    filter_s: Positive = Field(default=0.005, description="Time constant of the measured v_a.")
     gain_band: Annotated[float, Field(ge=1.1, le=3.0)] = Field(
         default=1.4,
         description="Factor by which the exciter's gain may change either way. It also limits the stroke, relative to the stroke "
@@ -103,11 +103,11 @@ class LimitsConfig(Strict):
     )
     travel_m: Two | None = Field(
         default=None,
-        description="Lowest and highest position of the drive with vibration. Not given: everywhere.",
+        description="Lowest and highest position of the drive at which the base may vibrate. Not given: any.",
     )
     # larger: a rig that hangs goes on vibrating; smaller: a late block ramps the vibration down
     stale_after_s: Annotated[float, Field(gt=0, le=5.0)] = Field(
-        default=0.02, description="Silence after which the vibration ramps down."
+        default=0.02, description="Time without a block after which the vibration ramps down."
     )
 
 
@@ -172,7 +172,7 @@ class ControllerConfig(Strict):
         return self
 
 
-MOST_CANDIDATES = 64  # frequencies to choose from; more: finer steps, more memory
+MOST_CANDIDATES = 64  # most frequencies to choose from; more: finer steps, more memory
 # Lowest candidate over the contact resonance. Smaller: the v_a / v_d that stops stick-slip depends on the damping. Larger: fewer
 # frequencies are left. From about 2 up, v_a / v_d = 1.05 stops stick-slip for any damping.
 _ABOVE_RESONANCE = 2.2
@@ -191,7 +191,7 @@ def forbidden_bands_Hz(limits: LimitsConfig) -> list[tuple[float, float]]:
 
 
 def _lowest_candidate(config: ControllerConfig) -> tuple[float, str]:
-    """The lower end of the candidates [Hz], and a text on its origin."""
+    """The lower end of the candidates [Hz], and its origin as a text for messages."""
     limits = config.limits
     above_Hz = _ABOVE_RESONANCE * config.contact_resonance_Hz
     if limits.frequency_min_Hz < above_Hz < limits.frequency_max_Hz:

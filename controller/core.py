@@ -1,10 +1,8 @@
 """One step of the controller: estimate, policy, amplitude, limits. The same function runs live, in lockstep and in replay."""
 
 import math
-from typing import Any
 
-import numpy.typing as npt
-
+from bridge.arrays import Records
 from bridge.kernel import kernel, shared_kernel
 from bridge.layouts import CommandRow, ControllerMemory, ControllerParams, SensorRow, TraceRow
 from bridge.wire.messages import BLOCK, LATE
@@ -23,20 +21,20 @@ from controller.trips.stall import is_judged, note_stall
 from controller.trips.watch import reported_reason, restrain, watch
 from controller.vibration import measure, skip
 
-_STEPS_LOOK = 16  # blocks between two measurements of resolution and noise of the samples
-_MOST_BRIDGED_BINS = 640  # 64 ms of bins of 0.1 ms: v_d is then still known from the longer windows
+_STEPS_LOOK = 16  # steps between two measurements of resolution and noise of the samples
+_MOST_BRIDGED_BINS = 640  # most lost bins that a line replaces: after 64 ms the longer windows still know v_d
 
 
 @shared_kernel
 def step(
-    params: npt.NDArray[Any],
-    state: npt.NDArray[Any],
-    sensors: npt.NDArray[Any],
+    params: Records,
+    state: Records,
+    sensors: Records,
     events: int,
     gap_blocks: int,
     t_ns: int,
-    command: npt.NDArray[Any],
-    trace: npt.NDArray[Any],
+    command: Records,
+    trace: Records,
 ) -> None:
     """Advance `state` by one frame, in place, and fill in `command` and `trace`.
 
@@ -73,7 +71,7 @@ def step(
             listen(p, s, events & LATE != 0)
             force_N = _look(p, s, block)
             if not is_judged(s):
-                s.even_steps = 0  # this block does not show the latest commands
+                s.even_steps = 0  # soon after a stall v_a does not follow the commands
             watch(p, s, block)
             decide(p, s, t_ns, force_N, p.block_s)
             restrain(p, s)
@@ -135,7 +133,7 @@ def _begin(p: ControllerParams, s: ControllerMemory) -> None:
     begin_known(p, s)
     s.followed, s.confirmed, s.went_m[:] = -1, 1.0, -1.0
     s.listening, s.onset_steps, s.loop_delay_steps = 1, -1, -1
-    s.silent_steps = p.silence_steps  # no vibration was ever commanded
+    s.silent_steps = p.silence_steps  # the base counts as at rest, as no vibration was ever commanded
     s.level, s.swing_level = -1, -1
     s.growth, s.quiet_s = FIRST_SHARE, math.inf
     s.demodulated_Hz = 0.0
@@ -148,7 +146,7 @@ def _begin(p: ControllerParams, s: ControllerMemory) -> None:
 def _mean(
     p: ControllerParams, s: ControllerMemory, block: SensorRow, first: int, samples: int
 ) -> tuple[float, float, float]:
-    """Means of force [N], slide and drive position [m] over some samples; without a force sensor by the spring's elongation."""
+    """Means of force [N], slide and drive position [m] over some samples; without a force sensor, the spring's force."""
     force_N, slide_m, drive_m = 0.0, 0.0, 0.0
     for i in range(first, first + samples):
         drive_m += float(block.drive_position_m[i])

@@ -10,7 +10,7 @@ TWO_PI = 2.0 * math.pi
 
 @kernel
 def cost(p: ControllerParams, s: ControllerMemory, i: int, velocity_mps: float) -> float:
-    """Cost of a v_a [m/s] at a candidate: squared shares of the stroke and of the accelerometer's range.
+    """Cost of a v_a [m/s] at candidate `i`: sum of its squared shares of the stroke and of the accelerometer's range.
 
     A resonance needs less stroke, but its gain varies; so a gain above 1 counts as 1.
     """

@@ -21,10 +21,10 @@ class Freshness:
     """
 
     def __init__(self, block_s: float, stale_after_s: float) -> None:
-        self.heard_s = self.due_s = 0.0  # last new block or end of a stall; next step without a block
+        self.heard_s = self.due_s = 0.0  # last new block or end of a stall; time of the next step without a block
         self._block_s, self._stale_after_s = block_s, stale_after_s
         self._state = _State.FRESH
-        self._silent = False  # whether the last step had no block
+        self._silent = False  # whether the last step of the controller was made without a block
         self._in_time = 0  # number of successive blocks in time
         self._stalled_s = 0.0  # total stall of this process that is not published yet
 

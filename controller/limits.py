@@ -90,7 +90,7 @@ def allow(p: ControllerParams, s: ControllerMemory, events: int, wanted_Hz: floa
 
 @kernel
 def _of_trips(s: ControllerMemory) -> int:
-    """The limit on the amplitude that a doubt causes."""
+    """The limit that a doubted signal or the gain band sets, for the command; NO_LIMIT if neither does."""
     if s.doubted & DRIVE:
         return NO_DRIVE
     if s.wanted_m == 0.0:

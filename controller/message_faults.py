@@ -10,7 +10,7 @@ from controller.node import ControllerNode
 
 
 class MessageFaults:
-    """Reports the counters of node and inbox.
+    """Reports faulty and lost messages, from the counters of node and inbox.
 
     Args:
         node: the controller.
@@ -46,7 +46,7 @@ class MessageFaults:
                 new,
             )
         if node.clock_jump_ns:
-            late = f"t_ns is {node.clock_jump_ns * 1e-6:g} ms off the block number"
+            late = f"t_ns is {node.clock_jump_ns * 1e-6:g} ms off the time that the block number gives"
             note(CLOCK, SENSORS.name, f"block {node.last_block}: {late}; trace and log keep the rig's times")
             node.clock_jump_ns = 0
         if node.age.is_late:

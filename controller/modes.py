@@ -24,10 +24,10 @@ def enter(s: ControllerMemory, mode: int, reason: int) -> None:
 
 @kernel
 def excite(p: ControllerParams, s: ControllerMemory, reason: int, ratio: float) -> None:
-    """Begin or continue a vibration at `ratio` or more."""
+    """Begin or continue the vibration, with a set point of v_a / v_d of `ratio` or more."""
     way = way_of(s)
     s.ratio[way] = max(s.ratio[way], ratio)
-    s.swing = max(s.swing, swing_held(s.ratio[way]))  # the ratio falls as the swing decays
+    s.swing = max(s.swing, swing_held(s.ratio[way]))  # the ratio falls no faster than this swing of friction decays
     if s.mode != EXCITE:
         s.waiting_s = 0.0
     enter(s, EXCITE, reason)
@@ -45,7 +45,7 @@ def tune_to(p: ControllerParams, s: ControllerMemory, candidate: int) -> None:
 
 @kernel
 def stop_helping(s: ControllerMemory, reason: int) -> None:
-    """End the vibration for a time that doubles with each call."""
+    """End a vibration that does not help, for a time that doubles with each call."""
     way = way_of(s)
     s.off_s[way] = _RETRY_S if s.off_s[way] == 0.0 else 2.0 * s.off_s[way]
     s.off_left_s[way] = s.off_s[way]

@@ -21,13 +21,11 @@ from controller.trips.age import MARGIN_NS, Age
 from controller.trips.stall import SETTLED_S
 from controller.trips.trip_events import TripEvents
 
-_RESTART_BLOCKS = (
-    1024  # blocks counted as lost before the first block of a restarted rig, so that every window is emptied
-)
+_RESTART_BLOCKS = 1024  # blocks that count as lost when a rig restarts, so that every window is emptied
 _MOST_GAP_BLOCKS = 1 << 20  # most lost blocks that are counted at once; more do not fit into a trace
-# Number of successive blocks of the same wrong length from which the rig's blocks have this length; fewer are clock jumps
+# Number of successive blocks of the same wrong length that show a wrong block_s of the rig; fewer are jumps of the clock
 _WRONG_LENGTHS = 3
-_FASTEST_MPS = 100.0  # largest announced velocity of a drive; faster announcements are refused
+_FASTEST_MPS = 100.0  # largest announced velocity of a drive that is accepted
 
 
 class ControllerNode:
@@ -44,7 +42,7 @@ class ControllerNode:
     def __init__(self, config: ControllerConfig, lockstep: bool = False) -> None:
         self.duplicates = 0  # number of repeated blocks, and of late blocks that were counted as a gap
         self.restarts = 0  # number of restarts of the rig
-        self.clock_jump_ns = 0  # t_ns of the last block minus the time by its number
+        self.clock_jump_ns = 0  # t_ns of the last block minus the time by its number; 0 if about equal
         self.steps = 0
         self.t_ns = 0  # time of the last frame
         self._params, self._state = build(config)
@@ -64,7 +62,7 @@ class ControllerNode:
         self._trip_events = TripEvents()
         self.age = Age()
         self._lockstep = lockstep
-        self.slide_accel_unread = False  # whether samples of the slide's accelerometer are not finite
+        self.slide_accel_unread = False  # whether samples of the slide's accelerometer are NaN or infinite
         self.slipped_unmoved = False  # whether a slip began in the last step at a constant drive position
 
     @property
@@ -79,7 +77,7 @@ class ControllerNode:
 
     @property
     def block_was_late(self) -> bool:
-        """Whether the last block was older than the margin of the loop."""
+        """Whether the last block was answered later than the amplitude loop tolerates, 15 ms."""
         return self.age.late_ns > MARGIN_NS
 
     @property
@@ -230,7 +228,7 @@ class ControllerNode:
 
 
 def obeyed(events: int, action: int) -> int:
-    """The operator's bits for the next frame, after a further action (`wire.Operator.Action`); a STOP is not revoked."""
+    """The operator's bits for the next frame, after a further action (`wire.Operator.Action`); a RESET does not cancel a STOP."""
     if action == wire.Operator.STOP:
         return STOP
     return RESET if action == wire.Operator.RESET and not events & STOP else events

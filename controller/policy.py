@@ -63,22 +63,22 @@ _STICK_STEP, _SLIP_STEP = 0.08, 0.4  # rise of the ratio at a stick, and at a sl
 # Duration of the start of a move; force over sliding force from which the spring is wound up; factor on the ratio until then.
 _STARTS_S, _WOUND, _AHEAD = 0.2, 0.5, 1.25
 _BEGINS_S = 0.02  # first part of a move, in which the spring's force decides whether it is wound up
-_RISING = 1.05  # held over measured v_d above which the drive slows down
+_RISING = 1.05  # `held_mps` over measured |v_d| above which the drive slows down
 _ABOVE_SLIDE = 1.1  # least v_a over v_s of a slide that slows down after its drive
 _TURNING_S = 0.05  # longest rest of a drive at a reversal
-_STARTING_S = 0.15  # start of a vibration, in which slips release the force stored before it
-# Shortest stick, over the expected stick, that contradicts "not needed": the force has risen by 5 % then
+_STARTING_S = 0.15  # first part of a vibration, in which slips do not count: they release the force stored before
+# Shortest stick, over the expected stick, that contradicts a result "not needed": the force has risen by 5 % then
 _REAL_STICK = 0.25
 _CALM_SHARE = 6.0  # expected stick lengths without an event until the vibration counts as helpful
-_LEAST_CALM_S, _MOST_CALM_S = 0.5, 4.0
-_LOOK_STEPS = 16  # blocks between two selections of the windows for the swing
-_LEAST_SLIDING = 0.5  # least v_s over v_d; a slower slide gives no information on the swing
+_LEAST_CALM_S, _MOST_CALM_S = 0.5, 4.0  # bounds of this time
+_LOOK_STEPS = 16  # steps between two selections of the windows in which the swing of v_s is measured
+_LEAST_SLIDING = 0.5  # least mean v_s over v_d; a slower slide gives no information on the swing of friction
 _EVEN = 0.1  # largest deviation of v_s from v_d, over v_d, of a slide that follows
-# Memory of a swing: two periods of the slowest swing that the spring does not level out; 10 s at most, as it costs energy.
+# Memory of a swing of friction: two periods of the slowest swing that the spring does not level out; 10 s at most, for energy.
 _PERIODS, _LONGEST_S = 2.0, 10.0
-_SEEING_S = 2.0  # time without blindness until BLIND ends
-_HELPLESS = 3  # events at the limit until another frequency is tried, and again until CANNOT_HELP
-_WORSE = 1.1  # roughness with vibration over roughness without, from which the vibration counts as harmful
+_SEEING_S = 2.0  # time for which noise must not hide a stick until BLIND ends
+_HELPLESS = 3  # sticks or slips at the exciter's limit until another frequency is tried; as many again: CANNOT_HELP
+_WORSE = 1.1  # mean square of v_s / v_d - 1 with vibration, over without, from which the vibration is harmful
 
 
 @kernel

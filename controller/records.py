@@ -5,8 +5,8 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Records
 from bridge.kernel import record
 from controller.amplitude import LEARN_S, LOUD_S, MOST_DELAY_S, REMEMBERED, SETTLE_S, SILENCE_S, SLOTS, TAIL
 from controller.announced import MOST_ANNOUNCED
@@ -22,9 +22,9 @@ from controller.estimate.spikes import BENDS
 from controller.estimate.windows import BINS, LEVELS, MOST_FRESH, ROWS
 from controller.trips import band, confirmed, delivered, doubts, frozen, spring
 
-_BIN_S = 1e-4  # shortest bin: a window of four sees the slips of a drive of 50 N/um
-_TICK_S = 1e-3  # period of the estimate of the contact, for any length of a block
-_LONGEST_WINDOW_S = 3.3  # a feed of 0.5 um/s exceeds 0.5 um of noise in 0.1 s; drift makes longer windows useless
+_BIN_S = 1e-4  # longest bin; one sample if samples are longer: four bins resolve the slips of a drive of 50 N/um
+_TICK_S = 1e-3  # longest period of the estimate of motion and contact; a longer block holds several periods
+_LONGEST_WINDOW_S = 3.3  # drift makes longer windows useless; a feed of 0.5 um/s exceeds 0.5 um of noise in 0.1 s
 
 
 def _divisor(count: int, wanted: float) -> int:
@@ -70,42 +70,39 @@ PARAMS = np.dtype(
     align=True,
 )
 
-_WAYS = 2  # forwards and backwards
+_WAYS = 2  # directions of the drive, forwards and backwards: entries of a value that is learnt for each direction
 STATE = np.dtype(
     [
-        # windows: rows FORCE, SLIDE, DRIVE
+        # windows; the rows are FORCE [N], SLIDE [m] and DRIVE [m]
         ("bins", "f8", (ROWS, LEVELS, BINS)),
-        ("fresh", "f8", (ROWS, MOST_FRESH)),  # bins that are being added
+        ("fresh", "f8", (ROWS, MOST_FRESH)),  # means of the bins that are added next
         ("slope", "f8", (ROWS, LEVELS)),
         ("slope_before", "f8", (ROWS, LEVELS, 2)),  # slopes of the last window, and of the window before it
         ("sigma", "f8", (ROWS, LEVELS)),  # measured noise of a slope
-        (
-            "noise",
-            "f8",
-            (ROWS, LEVELS),
-        ),  # noise of a slope: sigma, or the extrapolated sigma of a shorter window, and the resolution; 0: unknown
+        # noise of a slope: sigma, extrapolated from a shorter window until it is measured, and quantisation; 0: unknown
+        ("noise", "f8", (ROWS, LEVELS)),
         ("law_mps", "f8", (LEVELS,)),  # sigma of the slope of x_s + F / k_d - x_d, which is 0 without noise
-        ("agreements", "i8", (LEVELS,)),  # number of differences in law_mps
-        ("pushed", "i8", (LEVELS,)),  # number of bins since the start
-        ("differences", "i8", (LEVELS,)),  # number of differences in sigma
-        ("resolution", "f8", (ROWS,)),
+        ("agreements", "i8", (LEVELS,)),  # number of slope differences from which law_mps was learnt
+        ("pushed", "i8", (LEVELS,)),  # number of bins since the windows were last emptied
+        ("differences", "i8", (LEVELS,)),  # number of slope differences from which sigma was learnt
+        ("resolution", "f8", (ROWS,)),  # quantisation step of a sample; 0: unknown
         # spikes: single samples far from their neighbours
         ("bends", "f8", (ROWS,)),  # mean second difference of the samples; 0: unknown
         ("most_bend", "f8", (ROWS,)),  # second difference above which a sample is a spike
         ("tail", "f8", (ROWS, 2)),  # last two samples of the block before; NaN: unknown
         ("spiked", "i8"),  # whether any channel has a spike in this block
         ("spike_at", "i8", (ROWS,)),  # sample of the spike; -1: no spike
-        ("spike", "f8", (ROWS,)),  # replacement of the spike
-        ("spike_step", "i8", (ROWS,)),  # step of the last spike
+        ("spike", "f8", (ROWS,)),  # value that replaces the spike
+        ("spike_step", "i8", (ROWS,)),  # number of the controller's step with the last spike
         # motion
         ("drive_velocity_mps", "f8"),
         ("drive_velocity_sigma_mps", "f8"),
-        ("held_mps", "f8"),  # |v_d| that rises at once and falls slowly
-        ("rising_mps", "f8"),  # |v_d| extrapolated to the end of its windows while it grows
-        ("late_mps", "f8"),  # least |v_s| since the drive began to change its speed
-        ("steady_mps", "f8"),
-        ("steady_s", "f8"),  # time since v_d last changed
-        ("moved_s", "f8"),  # time since the drive started or turned
+        ("held_mps", "f8"),  # |v_d| whose rises count at once and whose falls with a time constant of 0.1 s
+        ("rising_mps", "f8"),  # |v_d| at the end of its windows while it grows, with a margin for noise
+        ("late_mps", "f8"),  # least |v_s| in EXCITE since v_d last changed; infinite at a constant v_d
+        ("steady_mps", "f8"),  # |v_d| after its last change by 4 % or more
+        ("steady_s", "f8"),  # time since that change
+        ("moved_s", "f8"),  # time since the drive started or turned; 0 at rest
         ("stood_s", "f8"),
         ("rested", "i8"),  # 1 if the slide must have been at rest when the drive started or turned
         ("measured", "i8"),
@@ -113,7 +110,7 @@ STATE = np.dtype(
         ("direction", "i8"),
         # contact
         ("contact", "i8"),  # ContactState
-        ("level", "i8"),  # level of the shortest window that resolves a stick; -1: no level
+        ("level", "i8"),  # level of the shortest windows that resolve a stick at the present v_d; -1: no level
         ("window_s", "f8"),
         ("sliding_mps", "f8"),  # velocity of the slide along the drive's direction
         ("fine_mps", "f8"),  # sliding_mps over a longer window with less noise
@@ -123,19 +120,19 @@ STATE = np.dtype(
         ("stick_s", "f8"),
         ("since_stick_s", "f8"),
         ("smooth_s", "f8"),
-        ("slid_s", "f8"),  # duration of sliding in this move, without vibration
+        ("slid_s", "f8"),  # duration of smooth sliding without vibration since v_d last changed
         ("expected_stick_s", "f8"),
         ("unseen_s", "f8"),
         ("time_to_slip_s", "f8"),
         ("blind", "i8"),
         ("slipping", "i8"),
-        ("slip_began", "i8"),  # in this step
+        ("slip_began", "i8"),  # 1 if a slip began in this step
         ("stick_began", "i8"),
         ("slips", "i8"),
         ("surges", "i8"),
         # learnt values of the axis
         ("stiffness_N_per_m", "f8"),
-        ("stiffness_sigma", "f8"),  # over the stiffness
+        ("stiffness_sigma", "f8"),  # relative sigma of the learnt stiffness
         ("stiffness_learnt", "i8"),
         ("taught", "f8"),
         ("taught_ratio", "f8"),
@@ -143,9 +140,9 @@ STATE = np.dtype(
         ("relaxed_m", "f8"),  # elongation of the relaxed spring, for a rig without a force sensor
         ("shortest_m", "f8"),
         ("longest_m", "f8"),
-        ("stretched", "i8"),  # 1 once an elongation was seen
+        ("stretched", "i8"),  # 1 once these elongations are known
         ("dragged", "i8", (_WAYS,)),  # 1 once the slide slid in this direction
-        ("peak_N", "f8"),  # highest force of this stick
+        ("peak_N", "f8"),  # highest force of this stick, along the motion
         ("slip_from_N", "f8"),  # highest force before the last slip without vibration; 0 once the next stick began
         ("swing_N", "f8", (_WAYS,)),  # fall of the force in a slip
         ("breakaway_N", "f8", (_WAYS,)),
@@ -161,32 +158,32 @@ STATE = np.dtype(
         ("mode", "i8"),
         ("reason", "i8"),
         ("mode_s", "f8"),
-        ("calm_s", "f8"),  # time without stick or slip since the ratio last changed
+        ("calm_s", "f8"),  # duration of smooth sliding under vibration since the last stick or slip in it
         ("waiting_s", "f8"),
         ("swing", "f8"),  # relative swing of friction under vibration; decays
-        ("even_s", "f8"),  # time with a small swing in this mode
-        ("swung", "f8"),  # mean square of the swing of v_s, over v_d
+        ("even_s", "f8"),  # time in this mode for which v_s stayed within 10 % of v_d
+        ("swung", "f8"),  # mean square of (swing of v_s / v_d)
         ("swung_least", "f8"),  # least `swung` since a trial fade began; infinite in a fade after a wobble
-        ("fade", "f8"),  # ratio of a vibration that fades
+        ("fade", "f8"),  # v_a / v_d of a probe, during which the vibration fades out
         ("fade_from_N", "f8"),
         ("fade_per_s", "f8"),
-        ("unasked_s", "f8"),  # time of vibration since the last probe or wobble
-        ("wobbles", "i8"),  # whether v_a wobbles
-        ("wobble_level", "i8"),  # level of the windows for v_s
+        ("unasked_s", "f8"),  # time in EXCITE since the last result of a probe or wobble
+        ("wobbles", "i8"),  # 1 while v_a wobbles, to test whether friction falls with speed
+        ("wobble_level", "i8"),  # level of the windows in which v_s is measured during a wobble
         ("wobble_s", "f8"),
         ("wobble_period_s", "f8"),
-        ("wobble_a", "f8", (3,)),  # sums of v_a: in phase, a quarter of a period later, mean
-        ("wobble_v", "f8", (3,)),  # the same sums of v_s
-        ("lead", "f8"),  # share of v_d by which the slide is ahead because the ratio rises
-        ("swing_level", "i8"),  # level of the windows for the swing; -1: no level
-        ("wound", "i8"),  # whether the spring was wound up at the begin of this move
-        ("slid_N", "f8", (_WAYS,)),  # force at which the vibrated slide followed
-        ("top", "f8"),  # largest share of v_d by which the slide was ahead; decays; -1: at rest
+        ("wobble_a", "f8", (3,)),  # weighted sums over a wobble: v_a times its cosine, v_a times its sine, v_a
+        ("wobble_v", "f8", (3,)),  # the same sums with v_s in place of v_a
+        ("lead", "f8"),  # share of v_d by which the slide is ahead because the ratio rose; decays
+        ("swing_level", "i8"),  # level of the windows in which the swing of v_s is measured; -1: no level
+        ("wound", "i8"),  # whether the spring was wound up when this move began
+        ("slid_N", "f8", (_WAYS,)),  # force of the spring when the vibrated slide last followed v_d
+        ("top", "f8"),  # largest share of v_d by which the slide was ahead; decays; -1: not known yet
         ("settle_left_s", "f8"),
         ("settle_mps", "f8"),
         ("helpless", "i8"),
-        ("failed", "i8"),  # number of slips that more vibration could not have prevented
-        ("failed_left_s", "f8"),  # time until this number restarts
+        ("failed", "i8"),  # number of slips or surges that more vibration could not have prevented
+        ("failed_left_s", "f8"),  # time until `failed` restarts from 0
         ("roughness", "f8"),
         ("roughness_s", "f8"),
         ("rough_with", "f8", (_WAYS,)),
@@ -229,9 +226,9 @@ STATE = np.dtype(
         # trips
         ("trip", "i8"),  # Reason of the reported trip; 0: no trip
         ("doubted", "i8"),  # bits of `controller.trips.doubts`
-        ("known_gain", "f8", (MOST_CANDIDATES,)),  # delivered over commanded v_a
-        ("known_steps", "i8", (MOST_CANDIDATES,)),  # number of steps in the mean `known_gain`
-        ("checked_blocks", "i8"),  # blocks with a tone of the loop check
+        ("known_gain", "f8", (MOST_CANDIDATES,)),  # delivered over commanded v_a, from which faults are detected
+        ("known_steps", "i8", (MOST_CANDIDATES,)),  # number of steps over which `known_gain` is averaged
+        ("checked_blocks", "i8"),  # number of received blocks with a tone of the last loop check
         ("tone_Hz", "f8", (MOST_CANDIDATES, 2)),  # nearest tones of the check below and above a candidate; 0: no tone
         ("tone_gain", "f8", (MOST_CANDIDATES, 2)),  # delivered over commanded v_a at these tones
         ("gain_other_s", "f8"),  # time for which GAIN_OTHER is still reported
@@ -239,53 +236,50 @@ STATE = np.dtype(
         ("even_steps", "i8"),  # steps for which the expected v_a has been even
         ("followed", "i8"),  # candidate of `followed_gain`
         ("followed_gain", "f8"),  # measured gain, averaged over a second
-        ("low_steps", "i8"),  # steps of too small a v_a
-        ("high_steps", "i8"),  # steps of too large a v_a; negative: reported, until as many steps without
-        ("rest_mps2_2", "f8"),  # mean square of the acceleration without the sine, over a second
-        ("rest_steps", "i8"),  # steps for which it is far larger
+        ("low_steps", "i8"),  # number of successive steps of too small a v_a
+        ("high_steps", "i8"),  # successive steps of too large a v_a; negative: RESONANCE, for as many steps
+        ("rest_mps2_2", "f8"),  # mean square of the base's acceleration minus its sine, over a second
+        ("rest_steps", "i8"),  # number of steps for which it has been far larger
         ("kept_mps", "f8", (ROWS,)),  # velocities of slide and drive when the spring's law last held
         ("kept_N_per_m", "f8"),  # stiffness when the spring's law last held
         ("broken_steps", "i8"),  # steps for which the law is broken
-        ("broken_drive", "i8"),  # steps in which the drive changed during this break, minus the other steps
-        (
-            "broken_slide",
-            "i8",
-        ),  # steps in which the slide is faster than drive and spring explain, minus the other steps
+        ("broken_drive", "i8"),  # checks during this break in which mostly the drive changed, minus the others
+        ("broken_slide", "i8"),  # checks in which the slide was faster than drive and spring explain, minus the others
         ("shaken_s", "f8"),  # time for which the drive has moved under vibration
-        ("confirmed", "f8"),  # share of v_d that slide and force confirm, with its margin
+        ("confirmed", "f8"),  # share of v_d that slide and force confirm, with a margin; 1: all of it
         ("apart_s", "f8"),  # time for which slide and force do not confirm v_d
-        ("apart_by", "i8"),  # row of the signal that changed at its begin; negative: unknown
+        ("apart_by", "i8"),  # row of the signal that alone changed before `apart_s` began; negative: unknown
         ("agreed_mps", "f8", (ROWS,)),  # velocities along the drive's direction when v_d was last confirmed
         ("stiffest_N_per_m", "f8"),  # largest learnt stiffness
-        ("went_m", "f8", (2,)),  # steps of the drive's position in the last two blocks; negative: unknown
-        ("jumps", "f8"),  # number of jumps of the drive's position in the last second
-        ("jumped_s", "f8"),  # time for which v_d before the last jump is still used
-        ("drops", "f8"),  # number of dropouts of the base accelerometer in the last second
-        ("dropped", "i8"),  # whether it dropped out in the last block
-        ("grown_steps", "i8"),  # steps of a slightly too large v_a
+        ("went_m", "f8", (2,)),  # last two |changes| of the drive's position from block to block; negative: unknown
+        ("jumps", "f8"),  # count of jumps of the drive's position, decays with a time constant of 1 s
+        ("jumped_s", "f8"),  # time for which the v_d from before the last jump is still used
+        ("drops", "f8"),  # count of dropouts of the base accelerometer, decays with a time constant of 1 s
+        ("dropped", "i8"),  # whether the base accelerometer dropped out in the last block
+        ("grown_steps", "i8"),  # number of successive steps of a slightly too large v_a
         ("spring_level", "i8"),  # level of the windows in which the spring's law is checked
         ("bend_m", "f8"),  # mean second difference of the drive's position
-        ("bent", "i8"),  # number of successive blocks with a far larger one
-        ("slip_count", "f8"),  # number of slips in the last second
-        ("slips_wound", "f8"),  # number of slips for which the spring could wind up in the last second
-        ("unbelieved_s", "f8"),  # time for which slips still count as noise
+        ("bent", "i8"),  # number of successive checks with a far larger second difference
+        ("slip_count", "f8"),  # count of slips, decays with a time constant of 1 s
+        ("slips_wound", "f8"),  # count of slips for which the spring could wind up, decays likewise
+        ("unbelieved_s", "f8"),  # time for which slips are still ignored as noise
         ("quiet_s", "f8"),  # time since the last stall of the computer or the link
         ("stalling_s", "f8"),  # time for which blocks have not been compared with commands, because of stalls
         ("noise_told_s", "f8"),  # time for which grown noise is still reported
         ("slide_accel_unread", "i8"),  # whether samples of the slide's accelerometer are not finite
         ("outside", "i8"),  # whether the drive is outside of its travel
-        ("first_sample", "f8", (doubts.CHANNELS,)),  # first sample of the last block
-        ("seen_block", "i8"),  # block of `first_sample`
+        ("first_sample", "f8", (doubts.CHANNELS,)),  # first sample of the last block, by channel
+        ("seen_block", "i8"),  # number of the block of `first_sample`
         ("first_seen", "i8"),  # whether there is a `first_sample`
         ("same_steps", "i8", (doubts.CHANNELS,)),  # successive blocks with the same first sample
-        ("lively", "f8", (doubts.CHANNELS, 2)),  # share of `looks` that showed noise, at rest and in motion
-        ("looks", "i8", (doubts.CHANNELS, 2)),  # number of checks of the noise, at rest and in motion
-        ("looked", "i8"),  # number of checks of all channels
+        ("lively", "f8", (doubts.CHANNELS, 2)),  # share of `looks` with noise: at rest; in motion (base: vibrated)
+        ("looks", "i8", (doubts.CHANNELS, 2)),  # number of checks of the noise, in the same two conditions
+        ("looked", "i8"),  # number of checks of all channels together, which selects the next channel
         # limits
         ("allowed_Hz", "f8"),
         ("allowed_m", "f8"),
         ("limit", "i8"),
-        ("free_steps", "i8"),  # steps since a limit last changed the command
+        ("free_steps", "i8"),  # number of steps since a limit last changed the command
         ("stopped", "i8"),
         ("stale", "i8"),
         # announced drive velocity: `controller.announced`
@@ -305,7 +299,7 @@ STATE = np.dtype(
 LAYOUT_ID = hashlib.sha256(repr(STATE).encode()).hexdigest()
 
 
-def build(config: ControllerConfig) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+def build(config: ControllerConfig) -> tuple[Records, Records]:
     """The parameters and an empty memory for a configuration."""
     params = record(PARAMS)
     p: Any = params[0]

@@ -14,19 +14,20 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Records
 from bridge.faults import Fault
 from bridge.log.logfile import RunData
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import ANNOUNCE, BLOCK, COMMAND, TRACE, Records, sensor_block
+from bridge.wire.messages import ANNOUNCE, BLOCK, COMMAND, TRACE, sensor_block
 from controller.config import ControllerConfig
 from controller.records import LAYOUT_ID, STATE, build
 from controller.replay_steps import (
     AGAIN,
+    BLOCK_MISSING,
     DIFFERS,
     GAP,
-    NO_ANNOUNCEMENT,
-    NO_BLOCK,
-    NO_COMMAND,
+    LACKS_ANNOUNCEMENT,
+    LACKS_COMMAND,
     ReplayDifference,
     StepComparer,
 )
@@ -66,8 +67,8 @@ class _Waiting:
 
     def __init__(self, empty: Records) -> None:
         self._parts = [empty]
-        self.passed = -1  # largest sequence that no later step uses
-        self.lacked: list[npt.NDArray[np.uint64]] = []  # sequences that were missing for replayed steps
+        self.passed = -1  # largest sequence of dropped messages, which no later step uses
+        self.lacked: list[npt.NDArray[np.uint64]] = []  # sequences that replayed steps lacked
 
     def add(self, records: Records) -> None:
         """Add messages, in the order of the log."""
@@ -129,7 +130,7 @@ class Replayer:
         self._phase: Callable[[int], bool] = self._start
         self._lost_from = 0  # step from which the memory is lost, until a snapshot at or after it
         self._compared = self._skipped = 0
-        self._newest = 0  # number of steps in the newest piece, whose other topics may follow
+        self._newest = 0  # number of steps in the newest piece, whose blocks and commands may follow
 
     def add(self, topic: str, records: Records) -> None:
         """Add messages of a streaming topic; messages of other topics are skipped."""
@@ -168,7 +169,7 @@ class Replayer:
     def _in_time(self, topic: str, waiting: _Waiting, records: Records) -> Records:
         """The messages that can still be used; repetitions of a message are skipped."""
         sequence = records["sequence"]
-        if topic == "announce":  # steps refer to them by their number
+        if topic == "announce":  # steps refer to announcements by their number
             steps = np.diff(sequence, prepend=waiting.records()["sequence"][-1:]).astype(np.int64)
             if waiting.lacked or (steps <= 0).any():
                 raise OutOfOrder
@@ -191,7 +192,7 @@ class Replayer:
                 self._refuse_two(trace[twice[0]], trace[twice[0] + 1])
             if not self._phase(len(trace) if end else max(len(trace) - max(WINDOW, self._newest), 0)):
                 break
-        for waiting in (self._sensors, self._command):  # drops old blocks that no controller answered
+        for waiting in (self._sensors, self._command):  # drops old blocks and commands that no step used
             waiting.forget(max(len(waiting.records()) - 2 * WINDOW, 0) if not self._whole else 0)
 
     @staticmethod
@@ -201,7 +202,7 @@ class Replayer:
         why = "the controller was started again, or two controllers answered"
         raise Fault("BAD_LOG", f"{line}: {why}; record every controller in a separate log")
 
-    # each phase takes the number of steps for which no message can follow, and returns whether another phase follows
+    # each phase takes the number of steps whose messages have all been read, and returns whether another phase follows
 
     def _start(self, sure: int) -> bool:
         """Find the step at which the replay begins."""
@@ -223,18 +224,18 @@ class Replayer:
         """Replay the steps from the memory on, up to a step that cannot be replayed, and drop them."""
         trace, sensors, command, announce = (waiting.records() for waiting in self._tables.values())
         if not len(sensors) and self._sensors.passed < 0 and not sure:
-            return False  # the number of samples of a block is not known
+            return False  # the first block, which shows the number of samples, may follow
         known_from = [0, 0] if self._whole else [self._sensors.passed + 1, self._command.passed + 1]
         taken = self._comparer.take((trace, sensors, command, announce), sure, *known_from)
         if taken.why == AGAIN:
             raise OutOfOrder
         self._compared += taken.compared
         steps = trace["sequence"][: taken.steps]
-        if taken.lacks & NO_COMMAND:
+        if taken.lacks & LACKS_COMMAND:
             self._command.lacked.append(np.setdiff1d(steps, command["sequence"]))
-        if taken.lacks & NO_ANNOUNCEMENT:
+        if taken.lacks & LACKS_ANNOUNCEMENT:
             self._announce.lacked.append(steps[-1:].copy())
-        if taken.why in {GAP, NO_BLOCK}:
+        if taken.why in {GAP, BLOCK_MISSING}:
             self._lost_from = int(trace["sequence"][taken.steps])
             self._phase = self._lost
         if taken.steps:
@@ -244,11 +245,11 @@ class Replayer:
             self._trace.forget(taken.steps)
             while self._snapshots and self._snapshots[0].step <= step:
                 self._snapshots.popleft()
-        if taken.why == NO_BLOCK:
+        if taken.why == BLOCK_MISSING:
             block = trace["block"][taken.steps : taken.steps + 1].copy()
             self._sensors.lacked.append(block)
             self._sensors.forget_until(int(block[0]))
-        return taken.why in {GAP, NO_BLOCK, DIFFERS}
+        return taken.why in {GAP, BLOCK_MISSING, DIFFERS}
 
     def _lost(self, sure: int) -> bool:
         """Skip steps until a snapshot restores the memory."""
@@ -266,7 +267,7 @@ class Replayer:
                     self._memory[:] = np.frombuffer(snapshot.memory, STATE)
                     self._phase = self._run
                     return True
-                if sure <= place and sure < len(sequence):  # the step may still follow
+                if sure <= place and sure < len(sequence):  # the step after the snapshot may still follow
                     break
                 if snapshot is self._before and place < len(sequence):
                     self._lost_from = int(sequence[place])

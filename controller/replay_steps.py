@@ -6,18 +6,19 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Records
 from bridge.kernel import Record, kernel, unlocked_kernel
 from bridge.layouts import ControllerMemory, TraceRow
-from bridge.wire.messages import BLOCK, COMMAND, TRACE, Layout, Records
+from bridge.wire.messages import BLOCK, COMMAND, TRACE, Layout
 from controller.announced import take_announcement
 from controller.core import step
 
-_OF_A_CLOCK = "lateness_ns"  # the field that is not compared
+_OF_A_CLOCK = "lateness_ns"  # field of the trace that comes from a clock and is not compared
 
-# why steps end: more may follow, a step is lost, its block is lost, a dropped message is needed, a bit differs
-WAITS, GAP, NO_BLOCK, AGAIN, DIFFERS = range(5)
-NO_COMMAND: Final = 1  # bits of messages that were missing for replayed steps
-NO_ANNOUNCEMENT: Final = 2
+# why a replay stops: messages may follow, a step is lost, its block is lost, a dropped message is needed, a bit differs
+WAITS, GAP, BLOCK_MISSING, AGAIN, DIFFERS = range(5)
+LACKS_COMMAND: Final = 1  # bits of `Taken.lacks`: messages that the log lacks for replayed steps
+LACKS_ANNOUNCEMENT: Final = 2
 
 
 class ReplayDifference(NamedTuple):
@@ -33,17 +34,17 @@ class ReplayDifference(NamedTuple):
 
 
 class Taken(NamedTuple):
-    """The replayed steps."""
+    """How far a call replayed."""
 
     steps: int  # number of replayed steps
-    why: int  # reason why they end
+    why: int  # reason why the replay stopped, WAITS to DIFFERS
     compared: int  # number of compared steps
-    blocks: int  # number of sensor blocks up to the last used block
+    blocks: int  # number of sensor blocks up to the last used one, which can be dropped
     lacks: int  # bits of missing messages
 
 
 @kernel
-def _place(records: npt.NDArray[Any], likely: int, sequence: int) -> int:
+def _place(records: Records, likely: int, sequence: int) -> int:
     """Index of the first message with this sequence; -1 if it is missing. `likely` is tried first."""
     if likely < records.shape[0] and records[likely].sequence == sequence:
         return likely
@@ -59,13 +60,13 @@ def _place(records: npt.NDArray[Any], likely: int, sequence: int) -> int:
 
 @unlocked_kernel
 def _steps(
-    params: npt.NDArray[Any],
+    params: Records,
     params_from_ns: npt.NDArray[np.int64],
-    state: npt.NDArray[Any],
-    logged_trace: npt.NDArray[Any],
-    sensors: npt.NDArray[Any],
-    logged_command: npt.NDArray[Any],
-    announce: npt.NDArray[Any],
+    state: Records,
+    logged_trace: Records,
+    sensors: Records,
+    logged_command: Records,
+    announce: Records,
     sure: int,
     first_block: np.uint64,
     first_command: np.uint64,
@@ -75,8 +76,8 @@ def _steps(
     logged_command_bytes: npt.NDArray[np.uint8],
     trace_mask: npt.NDArray[np.uint8],
     command_mask: npt.NDArray[np.uint8],
-    trace: npt.NDArray[Any],
-    command: npt.NDArray[Any],
+    trace: Records,
+    command: Records,
     trace_bytes: npt.NDArray[np.uint8],
     command_bytes: npt.NDArray[np.uint8],
 ) -> tuple[int, int, int, int, int]:
@@ -92,11 +93,11 @@ def _steps(
             return i, GAP if i < sure else WAITS, compared, block_at + 1, lacks
         place = _place(sensors, block_at + 1, t.block) if events & BLOCK != 0 else max(block_at, 0)
         if place < 0:
-            why = AGAIN if t.block < first_block else NO_BLOCK if i < sure else WAITS
+            why = AGAIN if t.block < first_block else BLOCK_MISSING if i < sure else WAITS
             return i, why, compared, block_at + 1, lacks
         command_at = _place(logged_command, command_at + 1, t.sequence)
         announced = min(np.int64(t.announcements), announce.shape[0])
-        lacking = (NO_COMMAND if command_at < 0 else 0) | (NO_ANNOUNCEMENT if announced < t.announcements else 0)
+        lacking = (LACKS_COMMAND if command_at < 0 else 0) | (LACKS_ANNOUNCEMENT if announced < t.announcements else 0)
         if command_at < 0 and t.sequence < first_command:
             return i, AGAIN, compared, block_at + 1, lacks
         if lacking != 0 and i >= sure:
@@ -109,7 +110,7 @@ def _steps(
         change = params.shape[0] - 1
         while change > 0 and t.t_ns < params_from_ns[change]:
             change -= 1
-        # a step without a block does not read `block`
+        # a step whose events lack BLOCK does not read `block`
         settings, block = params[change : change + 1], sensors[place : place + 1]
         step(settings, state, block, events, gap_blocks, t.t_ns, command, trace)
         if t.t_ns < compared_from_ns:
@@ -140,9 +141,9 @@ class StepComparer:
 
     def __init__(
         self,
-        params: npt.NDArray[Any],
+        params: Records,
         params_from_ns: npt.NDArray[np.int64],
-        memory: npt.NDArray[Any],
+        memory: Records,
         compared_from_s: float,
     ) -> None:
         self.difference: ReplayDifference | None = None
@@ -156,7 +157,7 @@ class StepComparer:
 
         Args:
             tables: trace, sensors, command and announcements of the log, each in order of sequence.
-            sure: steps for which no message can follow.
+            sure: number of steps whose messages have all been read.
             first_block, first_command: sequences from which on no message was dropped.
 
         """

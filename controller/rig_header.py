@@ -37,7 +37,7 @@ class RigAgain:
     """Reads the header of a restarted rig in a thread, as the loop must not wait.
 
     Args:
-        ask: returns the rig's header, or None. It may take a second.
+        ask: requests the rig's header, which may take a second; returns None without an answer.
         config: configuration of the controller.
 
     """

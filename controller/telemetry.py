@@ -1,12 +1,10 @@
 """Messages besides commands and traces: the state for plots, and the controller's whole memory for replay."""
 
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Records
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import STATE, Records
+from bridge.wire.messages import STATE
 from controller.records import LAYOUT_ID
 
 STATE_EVERY = 10  # steps between state messages: 100 Hz with blocks of 1 ms
@@ -22,8 +20,8 @@ def plotted(traces: Records, steps: int) -> Records:
     """The state messages of some steps.
 
     Args:
-        traces: trace of each of these steps, [n], STATE_EVERY apart.
-        steps: number of steps up to the first of them.
+        traces: traces of these steps, which are STATE_EVERY apart, [n].
+        steps: number of the controller's steps up to the first trace.
 
     """
     states = STATE.blank(len(traces))
@@ -32,14 +30,14 @@ def plotted(traces: Records, steps: int) -> Records:
         states[name] = traces[name]
     drive_mps = np.abs(traces["drive_velocity_mps"])
     moving = (traces["state"] > wire.STANDSTILL) & (drive_mps > 0.0)
-    # during these limits the trace repeats an old value
+    # during these limits the trace repeats an old v_a
     measured = (traces["limit"] != wire.STALE_INPUT) & (traces["limit"] != wire.NOT_FINITE)
     ratio = traces["vibration_velocity_mps"] / np.where(moving, drive_mps, 1.0)
     states["velocity_ratio"] = np.where(moving & measured, ratio, 0.0)
     return states
 
 
-def snapshot(memory: npt.NDArray[Any], steps: int, t_ns: int) -> bytes:
+def snapshot(memory: Records, steps: int, t_ns: int) -> bytes:
     """The message with the controller's memory after `steps` steps; `t_ns` is the time of the last frame."""
     message = wire.Snapshot(
         sequence=steps // SNAPSHOT_EVERY - 1, t_ns=t_ns, step=steps - 1, layout=LAYOUT_ID, memory=memory.tobytes()

@@ -13,7 +13,7 @@ def _fit(samples: Record, step_rad: float, start_rad: float) -> tuple[float, flo
     """Fit a cos + b sin at one frequency to `samples` by least squares; return a and b.
 
     The fit is exact for a pure sine over any share of a period, unlike a plain correlation. The angle is rotated from sample to
-    sample: two sines a block instead of forty, as they limit the speed of a replay.
+    sample: four calls of sine and cosine a block instead of forty, as these calls limit the speed of a replay.
     """
     c, sn = math.cos(start_rad), math.sin(start_rad)
     turn_c, turn_sn = math.cos(step_rad), math.sin(step_rad)
@@ -57,7 +57,7 @@ def measure(p: ControllerParams, s: ControllerMemory, base_accel_mps2: Record) -
 
 @kernel
 def _velocity(p: ControllerParams, frequency_Hz: float, in_phase_mps2: float, quadrature_mps2: float) -> float:
-    """v_a of an acceleration, corrected for the accelerometer's roll-off."""
+    """v_a [m/s] of an acceleration's two parts, corrected for the accelerometer's roll-off."""
     rolled_off = frequency_Hz / p.accel_bandwidth_Hz
     amplitude_mps2 = math.sqrt(in_phase_mps2 * in_phase_mps2 + quadrature_mps2 * quadrature_mps2)
     return amplitude_mps2 * math.sqrt(1.0 + rolled_off * rolled_off) / (TWO_PI * frequency_Hz)
@@ -65,7 +65,7 @@ def _velocity(p: ControllerParams, frequency_Hz: float, in_phase_mps2: float, qu
 
 @kernel
 def velocity_of(p: ControllerParams, frequency_Hz: float, samples: Record) -> float:
-    """v_a of a single block of an accelerometer [m/s]."""
+    """v_a of one block of samples of an accelerometer, without a low-pass [m/s]."""
     a, b = _fit(samples, TWO_PI * frequency_Hz * p.sample_s, 0.0)
     return _velocity(p, frequency_Hz, a, b)
 

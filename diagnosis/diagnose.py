@@ -12,26 +12,24 @@ from typing import NamedTuple
 
 from bridge.log.finding import Finding
 from diagnosis.evidence.folder import Evidence, MeasuredRun
-from diagnosis.fits.fit import Fit
+from diagnosis.evidence.foreign_vibration import DISTORTED
+from diagnosis.evidence.split import excerpt
 from diagnosis.fits.retuning import retuned_rig
-from diagnosis.gap.excerpt import excerpt
 from diagnosis.gap.prepare import Prepared, prepare
 from diagnosis.gap.problem import PIEZO_EFFECTS, OutOfTimeError, Problem
-from diagnosis.hypotheses.trials import cannot_show, trials
+from diagnosis.hypotheses.catalogue import cannot_show, trials
 from diagnosis.latent.answer import LatentSignal, latent_of
 from diagnosis.processes import one_thread
 from diagnosis.relations.answer import Relations, relations_of
 from diagnosis.relations.decide import Decision, decision_of, ruled_out
 from diagnosis.relations.relation import OUTSIDE
-from diagnosis.report.assemble import assembled
-from diagnosis.report.latent_block import latent_line
+from diagnosis.report.assemble import HOLD, LONGER, assembled, comparable, unfitted, without_fits
 from diagnosis.report.relations_block import in_a_line, with_relations
-from diagnosis.report.without_fits import HOLD, LONGER, comparable, unfitted, without_fits
+from diagnosis.report.words import latent_line
 from diagnosis.result import Diagnosis
 from diagnosis.verdict.by_latent import with_latent
-from diagnosis.verdict.by_relations import ClosedByRelations, with_relations_verdict
+from diagnosis.verdict.by_relations import with_relations_verdict
 from diagnosis.verdict.confirmation import borne_out
-from diagnosis.verdict.held_out import HeldOut
 from diagnosis.verdict.judge import Verdict, with_outside
 from diagnosis.verdict.selection import Contest, Hints, Progress
 
@@ -78,9 +76,7 @@ def _diagnosed(evidence: Evidence, progress: Progress, jobs: int, budget_s: floa
     if comparable(runs):
         done = _by_fits(evidence, seen, progress, jobs, (began, began + budget_s))
     if done is None:
-        verdict = with_latent(
-            with_relations_verdict(unfitted(), seen.decision, [], ClosedByRelations(None, None)), seen.latent, None
-        )
+        verdict = with_latent(with_relations_verdict(unfitted(), seen.decision, [], None, None), seen.latent, None)
         verdict = with_vibration_findings(verdict, evidence.runs)
         done = without_fits(verdict, runs, LONGER if comparable(runs) else HOLD, began)
         done = done._replace(findings=(*evidence.findings, _NO_FIT))
@@ -101,8 +97,14 @@ def _by_fits(
     problem.until_s = began + _FOR_FITS * (until_s - began)
     hidden = set(cannot_show(evidence.rig, runs, evidence.assumed)) | ruled_out(seen.relations, seen.decision)
     tried = [trial for trial in trials(problem) if not hidden & set(trial.hypothesis.effects)]
+    shown = {cause for answered in seen.relations.answered for cause in answered.chosen.causes if cause not in OUTSIDE}
     try:
-        contest = Contest(retuned_rig(evidence, problem, progress, jobs), tried, jobs, _known(seen))
+        contest = Contest(
+            retuned_rig(evidence, problem, progress, jobs),
+            tried,
+            jobs,
+            Hints(frozenset(shown), bool(seen.decision.outside)),
+        )
     except OutOfTimeError:
         return None
     findings: tuple[Finding, ...] = ()
@@ -122,9 +124,12 @@ def _by_fits(
         outcome = borne_out(contest, None, jobs)
         findings = (_CUT_SHORT,)
     nearest = outcome.gone or outcome.verdict.runner_up
-    closes = _closed(outcome.held_out, nearest)
+    closes = None
+    if outcome.held_out is not None and nearest is not None:
+        with suppress(OutOfTimeError):
+            closes = outcome.held_out.closed_by(nearest).shrinkage
     verdict = with_relations_verdict(
-        outcome.verdict, seen.decision, [*contest.singles, *contest.pairs], ClosedByRelations(nearest, closes)
+        outcome.verdict, seen.decision, [*contest.singles, *contest.pairs], nearest, closes
     )
     verdict = with_latent(verdict, seen.latent, outcome.held_out)
     verdict = with_vibration_findings(verdict, evidence.runs)
@@ -132,20 +137,6 @@ def _by_fits(
     progress(f"verdict: {outcome.verdict.kind}", 0.8)
     done = assembled(evidence, runs, contest, outcome, tried, began, jobs)
     return done._replace(findings=(*done.findings, *findings))
-
-
-def _closed(held_out: HeldOut | None, fit: Fit | None) -> float | None:
-    """Share of the held-out gap that a fit closes; None without held-out runs or time."""
-    if held_out is None or fit is None:
-        return None
-    with suppress(OutOfTimeError):
-        return held_out.closed_by(fit).shrinkage
-    return None
-
-
-def _known(seen: _Seen) -> Hints:
-    shown = {cause for answered in seen.relations.answered for cause in answered.chosen.causes if cause not in OUTSIDE}
-    return Hints(frozenset(shown), bool(seen.decision.outside))
 
 
 def with_vibration_findings(verdict: Verdict, runs: Sequence[MeasuredRun]) -> Verdict:
@@ -158,6 +149,5 @@ def with_vibration_findings(verdict: Verdict, runs: Sequence[MeasuredRun]) -> Ve
         runs: all runs of the evidence.
 
     """
-    if any(run.distortion for run in runs):
-        return with_outside(verdict, PIEZO_EFFECTS)
-    return with_outside(verdict) if any(run.pick_up for run in runs) else verdict
+    kinds = {vibration.kind for run in runs for vibration in run.foreign}
+    return with_outside(verdict, PIEZO_EFFECTS if DISTORTED in kinds else frozenset()) if kinds else verdict

@@ -34,3 +34,9 @@ def each(jobs: int, function: Callable[[S, T], R], shared: S, items: Sequence[T]
     # max_nbytes=None: joblib makes memory maps of arrays above 1 MB, which takes 0.1 s a call; sending them takes 0.02 s
     results: list[R] = Parallel(n_jobs=jobs, max_nbytes=None)(delayed(_alone)(function, shared, item) for item in items)  # pyright: ignore[reportAssignmentType]
     return results
+
+
+def spread(jobs: int, function: Callable[[S, list[T]], list[R]], shared: S, items: Sequence[T]) -> list[R]:
+    """The results of `function(shared, some items)`, a result for each item, in `jobs` processes; in the order of the items."""
+    shares = each(jobs, function, shared, [list(items[i::jobs]) for i in range(jobs)])
+    return [shares[number % jobs][number // jobs] for number in range(len(items))]

@@ -143,7 +143,7 @@ class Remainder(NamedTuple):
     where: str  # the relation
     what: str  # the variable that it depends on, or "in bursts"; empty without a pattern
     size: float  # rms of the residual
-    noise: float  # rms of the noise
+    noise: float  # rms of its noise
     unit: str
 
 
@@ -197,7 +197,7 @@ class Diagnosis(NamedTuple):
     relations: tuple[RelationRow, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
     numbers: tuple[RelationNumber, ...] = ()
-    cannot_show: tuple[str, ...] = ()  # effects that this kind of drive, or these runs, cannot show
+    cannot_show: tuple[str, ...] = ()  # effects excluded by the drive, the runs or assumed numbers
     JSON_HIDDEN = ("pictures",)
 
     @in_json

@@ -52,34 +52,21 @@ def _files(place: Path) -> Iterator[Path]:
 
 
 def _statements(path: Path) -> Iterator[str]:
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    for statement in _without_docstring(tree.body):
+    tree = _Judged().visit(ast.parse(path.read_text(encoding="utf-8")))
+    for statement in tree.body:
         if not isinstance(statement, ast.Import | ast.ImportFrom):
-            yield _canonical(statement)
+            yield ast.unparse(statement)
 
 
-def _without_docstring(body: list[ast.stmt]) -> list[ast.stmt]:
-    first = body[0] if body else None
-    text = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant) and isinstance(first.value.value, str)
-    return body[1:] if text else body
+class _Judged(ast.NodeTransformer):
+    """Removes docstrings, and the fields of a row that only texts and pictures use."""
 
+    def visit_keyword(self, node: ast.keyword) -> ast.AST | None:
+        return None if node.arg in _NOT_JUDGED_KEYWORDS else self.generic_visit(node)
 
-def _canonical(node: ast.AST) -> str:
-    """A syntax tree as text without empty fields, as every version of Python adds some of these."""
-    parts: list[str] = []
-    definition = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
-    for name, field in ast.iter_fields(node):
-        value = _without_docstring(field) if definition and name == "body" else field
-        if isinstance(node, ast.Call) and name == "keywords":
-            value = [keyword for keyword in node.keywords if keyword.arg not in _NOT_JUDGED_KEYWORDS]
-        if value not in (None, []):
-            parts.append(f"{name}={_text(value)}")
-    return f"{type(node).__name__}({', '.join(parts)})"
-
-
-def _text(value: object) -> str:
-    if isinstance(value, ast.AST):
-        return _canonical(value)
-    if isinstance(value, list):
-        return "[" + ", ".join(_text(item) for item in value) + "]"  # pyright: ignore[reportUnknownVariableType]
-    return repr(value)
+    def generic_visit(self, node: ast.AST) -> ast.AST:
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and ast.get_docstring(
+            node
+        ):
+            node.body = node.body[1:] or [ast.Pass()]
+        return super().generic_visit(node)

@@ -10,11 +10,11 @@ Symbols of this package, as in the paper (A. Leus et al., longitudinal tangentia
     v_s  Stribeck velocity [m/s]            u    displacement of the base [m], u0 its amplitude [m]
     k_d  drive stiffness [N/m]              phi  phase of the vibration [rad]
     h_d  drive damping [N s/m]              g    steady friction force at a velocity [N]
-    e    extension of the drive's spring, s_d - q - x [m]      v_lag  v_r as a lagging Stribeck curve sees it [m/s]
+    e    extension of the drive's spring, s_d - q - x [m]      v_lag  lagging v_r of the Stribeck curve [m/s]
     q    displacement of the frame that holds the drive [m]    age    how long the contact has been at rest [s]
     s_e  position of the drive without ripple, `even_m` [m]
 
-config, config_limits  a rig file, checked; rejection of rigs that no real rig can be
+config, config_limits  a rig file, checked; rejection of rigs that cannot exist
 drive_config  the motion of the drive, in a rig file
 drive_motion  its position over time: profiles, jerk-limited moves, cycles
 pairs         the friction pairs

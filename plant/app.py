@@ -3,16 +3,16 @@
 import collections
 import secrets
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 from bridge.faults import Fault
 from bridge.guard.config import wider
 from bridge.guard.events import GuardEvents
-from bridge.guard.kept_gain import KeptGain
-from bridge.guard.latch import StopLatch
+from bridge.guard.kept import KeptGain, StopLatch
 from bridge.guard.received import CommandQueue
 from bridge.guard.states import RESET, STOP
-from bridge.plain import StepReport, no_report, print_line
+from bridge.plain import StepReport, no_report
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.clock import time
@@ -24,14 +24,13 @@ from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, FAULT, OPERATOR, PLAN
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
 from plant.config import RigConfig
 from plant.faults.line import Message
-from plant.faults.orders import Orders
 from plant.faults.table import FaultTable
 from plant.node import PlantNode
 
 _ANSWER_TIMEOUT_S = 5.0  # lockstep: longest wait for the command that answers a block
 _GOODBYE_S = 3.0  # longest wait of the ended plant for the other processes to leave the bus
 _ROUND_TRIPS_KEPT = 1024  # blocks whose time of sending is kept; answers to older blocks have no round trip
-_LONGEST_FADE_BLOCKS = 1000  # longest wait for the exciter to come to rest
+_LONGEST_FADE_BLOCKS = 1000  # longest wait for the exciter to come to rest [blocks]
 _LATE_NS = 1_000_000  # round trip beyond which a command counts as late
 _PAUSE_NS = 250_000_000  # delay of a due block from which this process counts as stalled
 
@@ -72,7 +71,7 @@ def run(
     with Bus(bus_config, "plant", lockstep) as bus:
         bus.serve_header(header)
         process = PlantProcess(node, bus, latch, report, kept)
-        # Claimed before the other processes see this one: later, their link may lapse on busy cores (docs/method/rig.md).
+        # Priority is claimed before the other processes see this one: later, links may lapse on busy cores (docs/method/rig.md).
         if lockstep:
             realtime.claim(realtime.core(bus_config.port), realtime.LOCKSTEP_PRIORITY)
             granted = "lockstep"  # a text without the computer's settings: the same run gives the same log
@@ -140,12 +139,11 @@ class PlantProcess:
         self._latch = latch
         self._guard_events = GuardEvents()
         self._operator_orders, self._fault_orders = Inbox(16), Inbox(16)
-        self._injected = Orders(node.faults)
         self._bus = bus
         self._complaints = Complaints(self.event)
         self._commands = CommandQueue(self._complaints)
-        self._answers = Inbox(64)
-        self._on_the_way: collections.deque[Received] = collections.deque(maxlen=WAITING)
+        self._answers = Inbox(64)  # commands, read in lockstep only
+        self._on_the_way: collections.deque[Received] = collections.deque(maxlen=WAITING)  # commands on the faulty bus
         self._events = 0
         self._paused_ns = 0  # length of a stall of this process that is not yet published
         self._send_sensors = bus.publisher(SENSORS)
@@ -194,7 +192,9 @@ class PlantProcess:
 
     def _let_commands_arrive(self) -> None:
         """Pass the received commands through the faults of the bus."""
-        taken = [Message(received.payload, received) for received in _taken(self._on_the_way)]
+        # a receiving thread may add more during the call
+        taken = [self._on_the_way.popleft() for _ in range(len(self._on_the_way))]
+        taken = [Message(received.payload, received) for received in taken]
         for message in self._node.faults.on_the_way("commands", taken, self._node.block - 1):
             self._commands.push(message.of._replace(payload=message.payload))
 
@@ -204,7 +204,7 @@ class PlantProcess:
 
     def _apply_orders(self) -> None:
         """Apply the operators' orders since the last block; report and ignore unreadable ones."""
-        while (received := self._operator_orders.get_nowait()) is not None:
+        while (received := self._operator_orders.get()) is not None:
             try:
                 order = parsed(wire.Operator, received.payload, OPERATOR.name)
                 name = wire.Operator.Action.Name(order.action)
@@ -212,46 +212,39 @@ class PlantProcess:
                 self.event("OPERATOR", f"ignored: {error}")
                 continue
             self._node.apply_order(order.action)
-            self.event("OPERATOR", f"{name} by {order.who or 'an unnamed client'}")
-            if self._latch is not None and order.action in (STOP, RESET):
-                # in a thread: a slow disk must not delay the fade
-                threading.Thread(target=self._keep_order, args=(order.action, order.who), name="latch").start()
+            self.event("OPERATOR", f"{name} by {order.who or 'an unnamed operator'}")
+            if (latch := self._latch) is not None and order.action in (STOP, RESET):
+                write = partial(latch.set, order.who) if order.action == STOP else latch.clear
+                self._keep(latch, write, "the order does not outlast a restart")
 
     def _take_orders(self) -> None:
-        """Queue fault-injection requests, effective from block n + 2. Report and drop malformed ones."""
-        while (received := self._fault_orders.get_nowait()) is not None:
+        """Plan the requested faults from the block after the next one on; report and drop malformed requests."""
+        while (received := self._fault_orders.get()) is not None:
             try:
-                self._injected.take(received.payload, self._node.block + 1)
+                self._node.faults.take(received.payload, self._node.block + 1)
             except Fault as fault:
                 self._complaints.note(BAD_MESSAGE, FAULT.name, f"{fault.line.partition(': ')[2]}: dropped")
 
-    def _keep_order(self, order: int, who: str) -> None:
-        if self._latch is None:
-            return
-        try:
-            if order == STOP:
-                self._latch.set(who)
-            else:
-                self._latch.clear()
-        except OSError as error:
-            text = f"{self._latch.path}: {error.strerror}: the order does not outlast a restart"
-            self.event("STATE_FOLDER", text)
-            print_line(f"stickslip: warning: STATE_FOLDER: {text}")
+    def _keep(self, state: StopLatch | KeptGain, write: Callable[[], None], lost: str) -> None:
+        """Call `write`, which keeps a state over restarts, in a thread: a slow disk must not delay a fade."""
 
-    def _keep_gain(self, kept: KeptGain, gains: list[float]) -> None:
-        try:
-            kept.save(gains)
-        except (OSError, Fault) as error:
-            self.event("STATE_FOLDER", f"{kept.path}: {error}: the next run of this rig has no gain to compare with")
+        def keep() -> None:
+            try:
+                write()
+            except (OSError, Fault) as error:
+                self.event("STATE_FOLDER", f"{state.path}: {getattr(error, 'strerror', None) or error}: {lost}")
+
+        threading.Thread(target=keep, name="keep").start()
 
     def _publish_events(self) -> None:
         applied = self._node.applied
         for code, text in self._guard_events.news(applied):
             changed = f"by a factor of {self._node.gain_change:.2f}; " if code == "GAIN_CHANGED" else ""
             self.event(code, f"{changed}{text}")
-            if code == "GUARD" and self._kept is not None and self._accepted_gain != self._node.accepted_gain:
+            if code == "GUARD" and (kept := self._kept) is not None and self._accepted_gain != self._node.accepted_gain:
                 self._accepted_gain = self._node.accepted_gain
-                threading.Thread(target=self._keep_gain, args=(self._kept, self._accepted_gain), name="gain").start()
+                lost = "the next run of this rig has no gain to compare with"
+                self._keep(kept, partial(kept.save, self._accepted_gain), lost)
         if refused := int(applied.commands_refused):
             text = "refused; does a controller of an earlier run still run?"
             self._complaints.note(FOREIGN, f"{COMMAND.name} of another run, or not newer than the last", text, refused)
@@ -298,7 +291,7 @@ class PlantProcess:
             self._complaints.report_when_due()
             if late_ns > _PAUSE_NS:
                 self._paused_ns = max(self._paused_ns, late_ns)
-            elif late_ns < node.block_ns and commands:  # the sender's link is up again
+            elif late_ns < node.block_ns and commands:  # commands arrive again: the link is up
                 self._report_stall()
 
     def _report_stall(self) -> None:
@@ -329,8 +322,3 @@ class PlantProcess:
         if stop.is_set():
             return b""
         raise Fault("LOCKSTEP_STALLED", f"block {block}: no command answered it within {_ANSWER_TIMEOUT_S:g} s")
-
-
-def _taken(queue: collections.deque[Received]) -> list[Received]:
-    """All waiting commands, oldest first; a receiving thread may add more during the call."""
-    return [queue.popleft() for _ in range(len(queue))]

@@ -1,12 +1,11 @@
-"""The rig file; every value except the contact defaults to the paper's rig."""
+"""The rig file; the contact must be given, all other values default to the paper's rig."""
 
 import math
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from bridge.config import Strict, in_short, read_toml, validate
+from bridge.config import Strict, in_short
 from bridge.guard.config import GuardConfig
 from plant.drive_config import DriveConfig, NotNegative, Positive
 from plant.effects.library import checked
@@ -27,7 +26,7 @@ _MOST_STEPS_A_BLOCK = 1_000_000
 class ContactConfig(Strict):
     """The friction pair. `pair` fills in the numbers of a known pair; each number may be overridden."""
 
-    pair: str = Field(default="", description="A known pair, which fills in the numbers.")
+    pair: str = Field("", description="A known friction pair, which gives the numbers that this table leaves out.")
     stiffness_N_per_m: Positive
     damping_Ns_per_m: NotNegative
     viscous_damping_Ns_per_m: NotNegative = 0.0
@@ -40,16 +39,16 @@ class ContactConfig(Strict):
     )
     backbone: Literal["lugre", "elasto-plastic"] = "lugre"
     elastic_ratio: Annotated[float, Field(ge=0, lt=1)] = Field(
-        default=0.7, description="Elasto-plastic backbone: purely elastic up to this share of its largest deflection."
+        0.7, description="Elasto-plastic backbone: purely elastic up to this share of its largest deflection."
     )
     roughness_ratio: Annotated[float, Field(ge=0, le=0.3)] = Field(
-        default=0.0, description="Rough surface: rms scatter of friction along the track, over the mean."
+        0.0, description="Rough surface: rms scatter of friction along the track, over the mean."
     )
     roughness_length_m: Positive = Field(
-        default=2e-4, description="Rough surface: distance between two values of the friction."
+        2e-4, description="Rough surface: distance between two values of the friction."
     )
     roughness_seed: Annotated[int, Field(ge=0, le=1_000_000)] = Field(
-        default=0, description="Rough surface: seed of the random track."
+        0, description="Rough surface: seed of the random track."
     )
 
     @model_validator(mode="before")
@@ -84,21 +83,19 @@ class PiezoConfig(Strict):
     frequency_min_Hz: Positive = 500.0
     frequency_max_Hz: Positive = 5000.0
     # 1 um/s reaches the paper's 0.02 um in 20 ms
-    amplitude_slew_m_per_s: NotNegative = Field(
-        default=1e-6, description="0: at once, as in the paper's own calculation."
-    )
+    amplitude_slew_m_per_s: NotNegative = Field(1e-6, description="Rate of the amplitude; 0: at once, as in the paper.")
     command_timeout_s: Annotated[float, Field(gt=0, le=5.0)] = 0.05
     delivered_ratio: Positive = 1.0
-    mount_resonance_Hz: NotNegative = Field(default=0.0, description="0: a rigid mount.")
+    mount_resonance_Hz: NotNegative = Field(0.0, description="Resonance of the mount; 0: rigid.")
     mount_damping_ratio: Positive = 0.05
 
 
 class SensorsConfig(Strict):
     """The measuring chain of the paper's test rig; noise is rms, a resolution of 0 means no quantisation."""
 
-    force_range_N: Positive = Field(default=50.0, description="Highest force that is measured.")
+    force_range_N: Positive = Field(50.0, description="Highest force that is measured.")
     force_lowest_N: NotPositive = Field(
-        default=0.0, description="Lowest force that is measured; a drive that goes back needs one below 0."
+        0.0, description="Lowest force that is measured; a drive that goes back needs one below 0."
     )
     force_noise_N: NotNegative = 0.02
     force_bandwidth_Hz: Positive = 2000.0
@@ -110,9 +107,9 @@ class SensorsConfig(Strict):
     accel_bandwidth_Hz: Positive = 10000.0
     accel_resolution_mps2: NotNegative = 2 * 490.3325 / 2**20
     position_range_m: Positive = Field(
-        default=0.05, description="Highest position that is measured; slide and drive begin at 0."
+        0.05, description="Highest position that is measured; slide and drive begin at 0."
     )
-    position_lowest_m: NotPositive = Field(default=0.0, description="Lowest position that is measured.")
+    position_lowest_m: NotPositive = Field(0.0, description="Lowest position that is measured.")
     position_noise_m: NotNegative = 5e-7
     position_bandwidth_Hz: Positive = 800.0  # HBM WA on a carrier amplifier: below 1 kHz
     position_linearity: NotNegative = 0.002
@@ -123,24 +120,22 @@ class SolverConfig(Strict):
     """Time steps. Each block of `block_s` is one message with `samples_per_block` samples per channel."""
 
     step_s: Positive = 1e-5
-    # Shorter: a block of 20 kHz has fewer samples than its message has fields. Longer: a slip of the paper's rig, 36 ms, is over
+    # Shorter: at 20 kHz a message has more fields than samples of a channel. Longer: a slip of the paper's rig, 36 ms, is over
     # within two blocks.
     block_s: Annotated[float, Field(ge=0.25e-3, le=20e-3)] = Field(
-        default=1e-3, description="In real time 0.001 or more; shorter ones run in lockstep and in one process."
+        1e-3, description="Length of a block. In real time 0.001 or more; shorter in lockstep and in one process."
     )
     samples_per_block: Annotated[int, Field(ge=4, le=400)] = 20
 
 
 class LoopConfig(Strict):
-    """Delays between sensors and exciter besides the controller: converters, drivers, a slow bus."""
+    """Delays between sensors and exciter in addition to the controller's: converters, drivers, a slow bus."""
 
     delay_s: Annotated[float, Field(ge=0, le=LONGEST_DELAY_S)] = Field(
-        default=0.0,
-        description="Additional delay of each command, rounded up to whole blocks; 0: it acts in the next block.",
+        0.0, description="Additional delay of each command, rounded up to whole blocks; 0: it acts in the next block."
     )
     jitter_s: Annotated[float, Field(ge=0, le=LONGEST_JITTER_S)] = Field(
-        default=0.0,
-        description="Largest random addition to delay_s, uniform; commands do not overtake each other.",
+        0.0, description="Largest random addition to delay_s, uniform; commands do not overtake each other."
     )
 
     def longest_s(self, block_s: float) -> float:
@@ -160,7 +155,7 @@ class RigConfig(Strict):
     solver: SolverConfig = SolverConfig()
     loop: LoopConfig = LoopConfig()
     guard: GuardConfig = GuardConfig()
-    effects: dict[str, dict[str, float | str]] = Field(default={}, description="[effects.NAME]; none: the ideal rig.")
+    effects: dict[str, dict[str, float | str]] = Field({}, description="[effects.NAME]; without any: the ideal rig.")
 
     # checked before pydantic, which gives two errors for a value that is neither a number nor a string
     @model_validator(mode="before")
@@ -284,7 +279,7 @@ class RigConfig(Strict):
         compliance_m_per_N = self._value(base, "compliance_m_per_N")
         frequency_Hz = self._value(base, "frequency_Hz")
         per_kg = compliance_m_per_N * (2.0 * math.pi * frequency_Hz) ** 2
-        # the bristle between two masses is stable up to four times this
+        # the bristle between base and slide is stable down to a quarter of this mass of the base
         lightest_kg = self.contact.stiffness_N_per_m * solver.step_s**2
         if per_kg * lightest_kg > 1.0:
             raise ValueError(
@@ -306,8 +301,3 @@ class RigConfig(Strict):
                 f"the drive's springs must be at most {highest_Hz:.3g} Hz with solver.step_s = {solver.step_s:g}; lower one"
             )
         return self
-
-
-def load_rig(path: Path) -> RigConfig:
-    """Read a rig file. Raises Fault CONFIG with the file, the key, the value, the rule and the remedy."""
-    return validate(RigConfig, read_toml(path), path.name)

@@ -16,7 +16,7 @@ _ANGLES_RAD = np.linspace(0.0, 2.0 * math.pi, 2001)
 
 
 def refuse_what_no_rig_does(rig: RigConfig) -> None:
-    """Raise ValueError for a damper too strong for the step, for friction below 0, and for a drive that reverses."""
+    """Raise ValueError for a damper too strong for the step, friction of 0 or less, and a ripple that stops the drive."""
     _contact_damping(rig)
     _stribeck_curve(rig)
     _ripple(rig)
@@ -44,7 +44,7 @@ def _stribeck_curve(rig: RigConfig) -> None:
         if friction_N[least] <= 0.0:
             raise ValueError(
                 f"contact.stribeck_tail = {p['stribeck_tail']:g}: with friction levels of {p['F_s']:.3g} N and "
-                f"{coulomb_N:.3g} N, effects included, friction at {_VELOCITY_RATIOS[least]:.2g} times the Stribeck velocity "
+                f"{coulomb_N:.3g} N (with effects), friction at {_VELOCITY_RATIOS[least]:.2g} times the Stribeck velocity "
                 f"would be {friction_N[least]:.3g} N: must stay above 0; raise the tail, or bring the levels closer together"
             )
 

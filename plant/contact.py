@@ -42,7 +42,7 @@ def step(
         g: steady friction force at the present velocity [N]; the bristle's force moves towards it.
         sliding_share: 1 for LuGre; between 0 and 1 where the bristle of the elasto-plastic contact is still elastic.
         base_give: mean velocity that the base gains over the step for every newton of friction [m/(N s)]; 0 for a rigid base.
-        guarded: whether friction may change by a large share within a step; without effects it never does.
+        guarded: whether friction may change by a large share within a step, which then needs a check.
         dt, z_dt: the step [s]; the time of the bristle's motion [s], from the middle of the last step to the middle of this one.
         ahead: time to the middle of the step, as a share of the step before: 0.5 for two steps of one length.
         pull_N: force of the drive's spring in the middle of the step.
@@ -88,7 +88,7 @@ def step(
 
 @kernel
 def elasto_plastic_share(z: float, v_r: float, g: float, k_t: float, breakaway_ratio: float) -> float:
-    """Share alpha of sliding in the bristle's motion: elastic, then a sine, 1 as in LuGre (Dupont et al. 2002, eq. 14)."""
+    """Share alpha of sliding in the bristle's motion: 0 if elastic, then a sine, 1 as in LuGre (Dupont et al. 2002, eq. 14)."""
     elastic = 1e-6  # in place of 0, because the contact divides by it
     if z * v_r <= 0.0:
         return elastic

@@ -6,10 +6,8 @@ Compiled twice from one source: `advance`, the nominal rig, in which the compile
 
 import math
 from collections.abc import Callable
-from typing import Any
 
-import numpy.typing as npt
-
+from bridge.arrays import Floats, Records
 from bridge.kernel import kernel, shared_kernel
 from bridge.layouts import PlantMemory, PlantParams
 from plant.contact import elasto_plastic_share
@@ -23,9 +21,9 @@ from plant.effects.structure import base_free_mps, base_give, frame_gain_mps
 from plant.effects.waves import TWO_PI
 from plant.piezo import accepted, delivered_share
 
-# Share of v_s below which the slide sticks; after a stuck sample the next sample may be a single step. The error of the slip
-# times was the same from 0.01 to 0.05 (docs/method/rig.md). Larger: the beginning of a slip is cut short. Smaller: fewer long
-# steps.
+# Share of v_s. While |v_r| stays below it for a sample, the slide sticks: the next sample takes few long steps. The error of the
+# slip times was the same from 0.01 to 0.05 (docs/method/rig.md). Larger: a slip begins in a long step. Smaller: fewer samples
+# take long steps.
 _STICK_SHARE = 0.02
 
 
@@ -40,13 +38,13 @@ def _stribeck_share(q: float, tail: float) -> float:
 
 def _compiled(disturbed: bool) -> Callable[..., None]:
     def advance(
-        params: npt.NDArray[Any],
-        state: npt.NDArray[Any],
+        params: Records,
+        state: Records,
         drive: float,
         frequency_Hz: float,
         amplitude_m: float,
-        analogue: npt.NDArray[Any],
-        truth: npt.NDArray[Any],
+        analogue: Floats,
+        truth: Floats,
     ) -> None:
         """Advance the rig by one block, in place.
 
@@ -110,7 +108,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
             warm_share = heat_share(p, vibrating_s + 0.5 * block_s)
         if disturbed and p.force_driven:
             drive_velocity_mps = 0.0
-        # rotated from step to step: a sine in each step slowed a rig with a varying load by a third
+        # the load's sine is rotated from step to step: computed in each step, it slowed a rig with a varying load by a third
         load_omega = TWO_PI * p.load_frequency_Hz
         load_rad = load_omega * t_s + p.load_phase_rad
         load_sin, load_cos = math.sin(load_rad), math.cos(load_rad)
@@ -124,7 +122,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
 
         for sample in range(samples):
             steps = steps_per_sample
-            if not disturbed:  # with effects other parts may swing while the slide sticks
+            if not disturbed:  # long steps, not with effects: other parts may swing while the slide sticks
                 coarse = sticks and not vibrating
                 steps = p.steps_per_stick_sample if coarse else steps_per_sample
                 dt = stick_dt if coarse else fine_dt
@@ -165,7 +163,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                     slack = math.fabs(extension_m) < 0.5 * p.gap_m
                     h_d_now = 0.0 if p.force_driven or slack else h_d
                     h_d_step = h_d_now
-                    if p.relaxing_Ns_per_m > 0.0:  # its remaining force at mid-step, and a damper for the force gained
+                    if p.relaxing_Ns_per_m > 0.0:  # Maxwell arm: force left at mid-step, damping for new force
                         arm_N = 0.0 if slack else arm_N  # the gap is in series with the relaxing damper too
                         pull_N += arm_keep_half * arm_N
                         h_d_step += 0.0 if slack else p.relaxing_Ns_per_m * (1.0 - arm_keep_half)
@@ -215,7 +213,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                 if disturbed:
                     least_N = least_N_per_m * math.fabs(z)
                     g = max(g, least_N)
-                    g_before = min(g_before, 3.0 * g - 2.0 * max(least_N, 0.5 * g))  # keeps g above both in mid-step
+                    g_before = min(g_before, 3.0 * g - 2.0 * max(least_N, 0.5 * g))  # in mid-step g is above both
                 if disturbed and p.elasto_plastic:
                     sliding_share = elasto_plastic_share(z, v_r, g, k_t, p.elastic_ratio)
                 v, v_mid, z = contact_step(
@@ -236,7 +234,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                         base_m += dt * base_mean_mps
                         yield_mps2 = 2.0 * (base_mean_mps - base_mps) / dt
                         base_mps = 2.0 * base_mean_mps - base_mps
-                    frame_m += dt * frame_mps  # with the velocity in the middle of the step
+                    frame_m += dt * frame_mps  # a leapfrog: frame_mps is the velocity in the middle of the step
                     spring_force_N = spring_N(p, s_d - frame_m - x) + h_d_now * (anchor_mps - v)
                     if p.relaxing_Ns_per_m > 0.0:
                         arm_keep = arm_keep_half * arm_keep_half

@@ -15,12 +15,12 @@ NotNegative = Annotated[float, Field(ge=0)]
 class MoveConfig(Strict):
     """A jerk-limited move from standstill to standstill, then a stop."""
 
-    distance_m: float | None = Field(default=None, description="Distance; below 0: backwards. Give this or to_m.")
-    to_m: float | None = Field(default=None, description="Target position; the drive begins the run at 0.")
+    distance_m: float | None = Field(None, description="Distance; below 0: backwards. Give this or to_m.")
+    to_m: float | None = Field(None, description="Target position; the drive begins the run at 0.")
     velocity_mps: Positive = Field(description="Highest speed; a short move stays below it.")
     acceleration_mps2: Positive = Field(description="Highest acceleration, and deceleration.")
     jerk_mps3: Positive = Field(description="Highest rate of the acceleration.")
-    dwell_s: NotNegative = Field(default=0.0, description="Time at rest after the move.")
+    dwell_s: NotNegative = Field(0.0, description="Time at rest after the move.")
 
     @model_validator(mode="after")
     def _goes_somewhere(self) -> "MoveConfig":
@@ -36,17 +36,14 @@ class DriveConfig(Strict):
     stiffness_N_per_m: Positive = 11700.0
     damping_Ns_per_m: NotNegative = 0.0
     profile: Annotated[list[Two], Field(min_length=1)] = Field(
-        default=[(0.0, 0.0005)],
-        description="[[time_s, velocity_mps], ...], linear in between; below 0: backwards.",
+        [(0.0, 0.0005)], description="[[time_s, velocity_mps], ...], linear in between; below 0: backwards."
     )
     moves: Annotated[list[MoveConfig], Field(max_length=10_000)] = Field(
-        default=[], description="Jerk-limited moves, one after the other, in place of the profile."
+        [], description="Jerk-limited moves, one after the other, in place of the profile."
     )
-    repeat_every_s: NotNegative = Field(
-        default=0.0, description="Profile or moves repeat after this time; 0: they run once."
-    )
+    repeat_every_s: NotNegative = Field(0.0, description="Profile or moves repeat after this time; 0: they run once.")
     announce_ahead_s: NotNegative = Field(
-        default=0.0,
+        0.0,
         description="The rig announces the drive velocity to the controller this long ahead, in whole blocks; 0: never.",
     )
 
@@ -71,7 +68,7 @@ class DriveConfig(Strict):
         return self
 
     def motion(self) -> DriveMotion:
-        """Where the drive is at every time of a run."""
+        """Position and velocity of the drive over the time of a run."""
         once = self._once()
         return again_and_again(once, self.repeat_every_s) if self.repeat_every_s > 0.0 else once
 

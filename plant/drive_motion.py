@@ -18,7 +18,7 @@ _CLOSED_M = 1e-12  # a cycle ending this near to its beginning counts as closed:
 
 
 class DriveMotion(NamedTuple):
-    """Motion of a drive that starts at 0 m. The pieces [pieces] follow each other; the last lasts until the period."""
+    """Motion of a drive that starts at 0 m. The pieces, [pieces], follow each other; the last one lasts to the period's end."""
 
     start_s: Floats
     position_m: Floats

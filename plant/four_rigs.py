@@ -7,12 +7,11 @@ The reference is `plant.core`: tests/truth/test_side_by_side.py compares every f
 """
 
 import math
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from bridge.arrays import Floats
+from bridge.arrays import Floats, Records
 from bridge.kernel import kernel
 from bridge.layouts import PlantMemory, PlantParams
 from plant import four_rigs_step as at
@@ -28,8 +27,8 @@ from plant.piezo import delivered_share
 @kernel
 def advance_lanes(
     width: Width,
-    params: npt.NDArray[Any],
-    state: npt.NDArray[Any],
+    params: Records,
+    state: Records,
     block_s: float,
     drive: Floats,
     frequency_Hz: Floats,
@@ -69,11 +68,12 @@ def advance_lanes(
         w[at.FORWARD + i], w[at.BACKWARD + i] = p.forward_ratio, p.backward_ratio
         w[at.KINETIC_BACKWARD + i], w[at.LATE_SHARE + i] = p.kinetic_backward_ratio, p.late_share
         w[at.FALLING + i] = (1.0 - p.stribeck_tail) * (1.0 - p.late_share)
-        w[at.DRIFT + i] = p.drift_per_s
+        w[at.DRIFT + i] = p.drift_rate_per_s
         if p.drift_settling_s > 0.0:
             w[at.SETTLING + i], w[at.BEFORE_S + i] = p.drift_ratio, p.drift_before_s
             w[at.PER_SETTLING_S + i] = 1.0 / p.drift_settling_s
-        w[at.LOAD + i], w[at.LOAD_SIN_2 + i], w[at.LOAD_COS_2 + i] = p.load_ratio, p.load_sin_2, p.load_cos_2
+        w[at.LOAD + i] = p.load_ratio
+        w[at.LOAD_SIN_2 + i], w[at.LOAD_COS_2 + i] = p.load_second_sin, p.load_second_cos
         load_rad = TWO_PI * p.load_frequency_Hz * s.t_s + p.load_phase_rad
         w[at.LOAD_SIN + i], w[at.LOAD_COS + i] = math.sin(load_rad), math.cos(load_rad)
         if p.frame_m_per_N != 0.0:
@@ -192,13 +192,13 @@ def advance_lanes(
 
 @kernel
 def _varies(p: PlantParams) -> bool:
-    """Whether the friction's level depends on position or time beyond a rough surface and waves."""
+    """Whether the level of friction follows the position or a random load, for which the vector loops have no terms."""
     return p.position_ratio != 0.0 or (p.load_ratio != 0.0 and p.load_seed >= 0.0)
 
 
 @kernel
-def _enter(w: Floats, width: Width, params: npt.NDArray[Any], drive_mps: float, force_N: Floats, age_s: Floats) -> None:
-    """Place every slide so that its spring has a force [rigs]; it sticks if its age [rigs] is a number."""
+def _enter(w: Floats, width: Width, params: Records, drive_mps: float, force_N: Floats, age_s: Floats) -> None:
+    """Place every slide so that its spring has a force [rigs]; it sticks for its age [rigs] so far, or slides if that is NaN."""
     for i in range(len(width)):
         p: PlantParams = params[i]
         w[at.FRAME + i], w[at.FRAME_V + i] = force_N[i] * p.frame_m_per_N, 0.0

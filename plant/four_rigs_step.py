@@ -9,12 +9,11 @@ The equations are the same as in `plant.contact`, `plant.effects` and `plant.cor
 """
 
 import math
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-from bridge.arrays import Floats
+from bridge.arrays import Floats, Records
 from bridge.kernel import has_wide_vectors, kernel
 from bridge.layouts import PlantParams
 from plant.effects.drive import spring_law_N
@@ -196,7 +195,7 @@ def set_steps(w: Floats, p: PlantParams, i: int, dt: float) -> None:
 
 
 @kernel
-def roughen(w: Floats, width: Width, params: npt.NDArray[Any]) -> None:
+def roughen(w: Floats, width: Width, params: Records) -> None:
     """Multiply the friction's level by a rough surface, the noise of `plant.effects.waves`; its sines are kept for a cell."""
     entered = 0
     for i in range(len(width)):
@@ -218,7 +217,7 @@ def roughen(w: Floats, width: Width, params: npt.NDArray[Any]) -> None:
 
 
 @kernel
-def lag(w: Floats, width: Width, params: npt.NDArray[Any], state: npt.NDArray[Any], dt: float, t_s: float) -> None:
+def lag(w: Floats, width: Width, params: Records, state: Records, dt: float, t_s: float) -> None:
     """Update the lagging velocity, and the Stribeck curve at it."""
     for i in range(len(width)):
         p: PlantParams = params[i]

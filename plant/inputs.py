@@ -7,8 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Records
 from bridge.wire.channels import CHANNELS
-from bridge.wire.messages import ANNOUNCE, Records
+from bridge.wire.messages import ANNOUNCE
 from plant.config import RigConfig
 from plant.loop_delay import whole_blocks
 from plant.simulate import held_velocity
@@ -18,7 +19,7 @@ _JITTER = 1  # the second stream of the seed: jitter does not change the noise
 
 
 class Inputs(NamedTuple):
-    """The inputs of some blocks."""
+    """The inputs of consecutive blocks."""
 
     velocity_mps: npt.NDArray[Any]  # velocity of the drive, [blocks]
     noise: npt.NDArray[np.float64]  # standard normal numbers, [blocks, 5, samples]
@@ -27,30 +28,20 @@ class Inputs(NamedTuple):
     announce: Records  # these announcements, in order
 
     def joined(self, later: "Inputs") -> "Inputs":
-        """These blocks and later ones."""
+        """These inputs, continued by the inputs of `later` blocks."""
         if not len(self.noise):
             return later
         announce = ANNOUNCE.blank(len(self.announce) + len(later.announce))
         announce[: len(self.announce)], announce[len(self.announce) :] = self.announce, later.announce
-        return Inputs(
-            np.concatenate([self.velocity_mps, later.velocity_mps]),
-            np.concatenate([self.noise, later.noise]),
-            np.concatenate([self.delay_blocks, later.delay_blocks]),
-            np.concatenate([self.announcements, later.announcements]),
-            announce,
-        )
+        joined: list[Any] = [np.concatenate(pair) for pair in zip(self[:-1], later[:-1], strict=True)]
+        return Inputs(*joined, announce)
 
     def part(self, blocks: slice) -> "Inputs":
         """The blocks of a slice without a step."""
         first, last, _ = blocks.indices(len(self.noise))
         announced = slice(int(self.announcements[:first].sum()), int(self.announcements[:last].sum()))
-        return Inputs(
-            self.velocity_mps[blocks],
-            self.noise[blocks],
-            self.delay_blocks[blocks],
-            self.announcements[blocks],
-            self.announce[announced],
-        )
+        part: list[Any] = [numbers[blocks] for numbers in self[:-1]]
+        return Inputs(*part, self.announce[announced])
 
 
 class RigInputs:

@@ -8,7 +8,7 @@ from bridge.layouts import CommandRow, PlantMemory
 
 LONGEST_DELAY_S: Final = 0.2  # highest loop.delay_s; 50 ms is a slow converter on USB with its driver's queue
 LONGEST_JITTER_S: Final = 0.1  # highest loop.jitter_s
-# most delayed commands: one per block of 0.25 ms over delay and jitter, and the present one
+# length of the queue of commands: one per block of 0.25 ms over delay and jitter, and the present one
 LINE: Final = round((LONGEST_DELAY_S + LONGEST_JITTER_S) / 0.25e-3) + 1
 
 

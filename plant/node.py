@@ -8,10 +8,10 @@ import numpy as np
 
 from bridge.faults import Fault
 from bridge.guard.check import gain_change
+from bridge.guard.core import NO_COMMAND
 from bridge.guard.states import LEAVE, apply_order
 from bridge.kernel_cache import compile_once
 from bridge.wire.channels import CHANNELS
-from bridge.wire.messages import ANNOUNCE as ANNOUNCE_LAYOUT
 from bridge.wire.messages import APPLIED as APPLIED_LAYOUT
 from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
 from bridge.wire.messages import sealed, sensor_block
@@ -19,9 +19,9 @@ from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, SENSORS, Outgoing
 from plant.config import RigConfig
 from plant.faults.schedule import Faults
 from plant.faults.table import FaultTable
-from plant.inputs import Inputs, RigInputs
+from plant.inputs import RigInputs
 from plant.piezo import base_velocity_mps
-from plant.records import NO_COMMAND, TRUTH, build, guard_records
+from plant.records import TRUTH, build, guard_records
 from plant.step import act, report
 
 _VELOCITY = TRUTH.index("true_velocity_mps")
@@ -58,12 +58,9 @@ class PlantNode:
         self._inputs = RigInputs(config, seed)
         samples = config.solver.samples_per_block
         self.faults = Faults(faults, seed, config.solver.block_s, samples, self._params)
-        self._analogue = np.empty((len(CHANNELS), samples))
+        self._analogue = np.zeros((len(CHANNELS), samples))
         self.truth = np.empty((len(TRUTH), samples))  # true quantities in the last block, rows as plant.records.TRUTH
-        nothing = np.zeros(1, np.int64)
-        self._drawn = Inputs(
-            np.zeros(1), np.zeros((1, len(CHANNELS), samples)), nothing, nothing, ANNOUNCE_LAYOUT.blank(0)
-        )
+        self._drawn = self._inputs.draw(0)
         self._announced = 0  # number of the drawn announcements already sent
         self.announcements: list[Outgoing] = []  # to be sent before the samples of the last block
         self._sensors = sensor_block(samples).blank()
@@ -76,10 +73,10 @@ class PlantNode:
     def _step_copies(self) -> None:
         guard = self._guard_state.copy()
         apply_order(guard[0], LEAVE)
-        state, sensors = self._state.copy(), sensor_block(self._drawn.noise.shape[2]).blank()
+        state, sensors, noise = self._state.copy(), sensor_block(self._analogue.shape[1]).blank(), self._analogue.copy()
         act(
             self._params, state, self._guard_params, guard, 0.0, COMMAND_LAYOUT.blank(0), 0, self._drawn.announce,
-            self._drawn.noise[0], self._analogue, self.truth, sensors,
+            noise, self._analogue, self.truth, sensors,
         )  # fmt: skip
         report(self._params, state, self._guard_params, guard, 0, 0, 0, 0, sensors, APPLIED_LAYOUT.blank())
 

@@ -4,12 +4,13 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Records
+from bridge.guard.core import NO_COMMAND
 from bridge.guard.records import ExciterLimits
 from bridge.guard.records import build as build_guard
 from bridge.kernel import record
-from plant.config import RigConfig, SensorsConfig
+from plant.config import PiezoConfig, RigConfig, SensorsConfig
 from plant.effects.library import EFFECTS
 from plant.loop_delay import LINE
 
@@ -28,17 +29,13 @@ PARAMS = np.dtype(
         (name, "f8")
         for name in (
             *("m", "k_d", "h_d", "k_t", "h_t", "h_v", "F_c", "F_s", "v_s", "dt_s"),
-            *("amplitude_max_m", "frequency_min_Hz", "frequency_max_Hz", "amplitude_slew_m_per_s"),
-            *("delivered_ratio", "mount_resonance_Hz", "mount_damping_ratio"),
             *("force_keep", "accel_keep", "accel_highpass_keep", "position_keep"),
             # length of the longer steps while the slide sticks, and the filters' shares over such a step
             *("stick_dt_s", "force_keep_stick", "accel_keep_stick", "accel_highpass_keep_stick", "position_keep_stick"),
-            *("force_gain", "force_range_N", "force_lowest_N", "force_noise_N", "force_resolution_N"),
-            *("accel_range_mps2", "accel_noise_mps2", "accel_resolution_mps2"),
-            *("position_range_m", "position_lowest_m", "position_noise_m"),
-            *("position_linearity", "position_resolution_m"),
+            *PiezoConfig.model_fields,
+            *SensorsConfig.model_fields,
             # numbers of `plant.effects`, then of the contact's extensions; none acts in the nominal rig
-            *(name for effect in EFFECTS.values() for name in effect.numbers),
+            *(name for effect in EFFECTS.values() for name in (*effect.fields.values(), *effect.numbers)),
             *("age_length_m", "roughness_ratio", "roughness_length_m", "roughness_seed"),
             *("elastic_ratio", "stribeck_tail"),
         )
@@ -76,15 +73,13 @@ STATE = np.dtype(
 # the swing is 4.7 % too fast, 2 asin(1/2) / 1. Smaller: stiff rigs take more steps.
 _STICK_STEP_RAD = 1.0
 
-NO_COMMAND = -1  # NO_BLOCK of bridge.wire.messages as a signed number
-
 
 def _keep(bandwidth_Hz: float, period_s: float) -> float:
     """Share of the old value that a first-order low-pass keeps over one period, exact for a held input."""
     return math.exp(-2.0 * math.pi * bandwidth_Hz * period_s)
 
 
-def build(config: RigConfig) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+def build(config: RigConfig) -> tuple[Records, Records]:
     """Derive the parameters and the state at rest, spring unloaded, from a rig configuration."""
     params = record(PARAMS)
     p: Any = params[0]
@@ -98,10 +93,9 @@ def build(config: RigConfig) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     p.dt_s = solver.step_s
     p.samples_per_block = solver.samples_per_block
     p.steps_per_sample = round(solver.block_s / (solver.step_s * solver.samples_per_block))
-    for name in ("amplitude_max_m", "frequency_min_Hz", "frequency_max_Hz", "amplitude_slew_m_per_s"):
-        p[name] = getattr(piezo, name)
-    for name in ("delivered_ratio", "mount_resonance_Hz", "mount_damping_ratio"):
-        p[name] = getattr(piezo, name)
+    for table in (contact, piezo, sensors):
+        for name in {*type(table).model_fields} & {*(PARAMS.names or ())}:
+            p[name] = getattr(table, name)
     p.block_ns = round(solver.block_s * 1e9)
     sample_s = solver.block_s / solver.samples_per_block
     stiffest_per_s = math.sqrt((p.k_t + p.k_d) / p.m)
@@ -114,9 +108,6 @@ def build(config: RigConfig) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
         ("position_keep", sensors.position_bandwidth_Hz),
     ):
         p[name], p[f"{name}_stick"] = _keep(bandwidth_Hz, solver.step_s), _keep(bandwidth_Hz, p.stick_dt_s)
-    for name in PARAMS.names or ():
-        if name in SensorsConfig.model_fields:
-            p[name] = getattr(sensors, name)
     _add_effects(p, config)
     state = record(STATE)
     state[0].g = p.F_s
@@ -125,9 +116,7 @@ def build(config: RigConfig) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     return params, state
 
 
-def guard_records(
-    config: RigConfig, run: int, arm: bool, stop_kept: bool = False
-) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+def guard_records(config: RigConfig, run: int, arm: bool, stop_kept: bool = False) -> tuple[Records, Records]:
     """Parameters and memory of the rig's guard; the other arguments are passed to `bridge.guard.records.build`."""
     piezo, solver = config.piezo, config.solver
     exciter = ExciterLimits(
@@ -146,8 +135,6 @@ def _add_effects(p: Any, config: RigConfig) -> None:
     """Fold effects that only change a number into that number; pass the others to the kernel."""
     contact = config.contact
     p.elasto_plastic = contact.backbone == "elasto-plastic"
-    for name in ("stribeck_tail", "elastic_ratio", "roughness_ratio", "roughness_length_m", "roughness_seed"):
-        p[name] = getattr(contact, name)
     # ten times the bristle's largest deflection: creep before breakaway keeps the age of the contact, any slip resets it
     p.age_length_m = 10.0 * contact.static_force_N / contact.stiffness_N_per_m
     for effect in EFFECTS.values():
@@ -155,8 +142,8 @@ def _add_effects(p: Any, config: RigConfig) -> None:
             p[name] = number
     for name, table in sorted(config.effects.items(), key=lambda item: not EFFECTS[item[0]].first):
         value = {key: float(number) for key, number in table.items() if key != "form"}
-        EFFECTS[name].set_numbers(p, str(table["form"]), value)
-    switches = (name for effect in EFFECTS.values() for name in effect.switches)
+        EFFECTS[name].apply(p, str(table["form"]), value)
+    switches = (name for effect in EFFECTS.values() for name in (*effect.switches, *effect.sizes))
     # Friction that falls below a third within a step needs the guarded step of the disturbed kernel; so does a bristle whose
     # damper could reverse the slide within a step while friction falls: at 6.6 times this limit a slip is 0.37 s late, guarded
     # 0.3 ms.

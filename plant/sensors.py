@@ -18,7 +18,7 @@ def _digital(value: float, low: float, high: float, resolution: float) -> float:
 
 @kernel
 def _position(p: PlantParams, true_m: float, noise: float) -> float:
-    # a bow over the whole range, its largest deviation the stated linearity
+    # nonlinearity: a bow over the whole range, whose largest deviation is position_linearity times the range
     lowest_m, highest_m = p.position_lowest_m, p.position_range_m
     share = (true_m - lowest_m) / (highest_m - lowest_m)
     bow_m = 4.0 * p.position_linearity * (highest_m - lowest_m) * share * (1.0 - share)

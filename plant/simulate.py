@@ -1,12 +1,11 @@
 """A run of the rig without bus, sensors or controller: for the paper's figures, for tests, for benches."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from bridge.arrays import Floats
+from bridge.arrays import Floats, Records
 from bridge.kernel import kernel
 from bridge.wire.channels import CHANNELS
 from plant.config import RigConfig
@@ -28,8 +27,8 @@ class Simulation(NamedTuple):
 
 @kernel
 def run_blocks(
-    params: npt.NDArray[Any],
-    state: npt.NDArray[Any],
+    params: Records,
+    state: Records,
     drive: Floats,
     frequency_Hz: Floats,
     amplitude_m: Floats,
@@ -78,7 +77,7 @@ def simulate(
     block_s = solver.block_s
     blocks = round(duration_s / block_s)
     t_block_s = np.arange(blocks) * block_s
-    velocity_mps = drive_velocity_mps(config, t_block_s)
+    velocity_mps = held_velocity(config)(t_block_s)
     on = np.arange(blocks) >= round(vibration_from_s / block_s)
     samples = solver.samples_per_block
     truth = np.empty((len(TRUTH), blocks * samples))
@@ -88,17 +87,12 @@ def simulate(
     return Simulation(t_s, truth[0], truth[1], truth[2], truth[4], truth[5])
 
 
-def drive_velocity_mps(config: RigConfig, t_s: Floats) -> Floats:
-    """Drive velocity [m/s] held over the blocks that begin at the times `t_s` [s], 0 or later.
+def held_velocity(config: RigConfig) -> Callable[[Floats], Floats]:
+    """The drive's velocity [m/s] as a function: it is held over the blocks that begin at the times given [s], 0 or later.
 
     For a profile that runs once: the velocity at the begin of the block, linear between the points of the profile, constant
     outside them. For moves and repeated motions: the mean over the block, so that a cycle ends where it began.
     """
-    return held_velocity(config)(t_s)
-
-
-def held_velocity(config: RigConfig) -> Callable[[Floats], Floats]:
-    """The function `drive_velocity_mps` of one rig; cheaper for many calls."""
     drive, block_s = config.drive, config.solver.block_s
     if drive.moves or drive.repeat_every_s > 0.0:
         motion = drive.motion()

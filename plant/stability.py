@@ -16,7 +16,6 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import control
 import numpy as np
 from scipy.optimize import brentq
 
@@ -102,25 +101,6 @@ def _system_matrix(config: RigConfig, at: Contact, drive_stiffness_N_per_m: Numb
     return A
 
 
-def linearise(config: RigConfig, drive_velocity_mps: float, vibration_velocity_mps: float = 0.0) -> control.StateSpace:
-    """The slider around steady sliding at `drive_velocity_mps`, for poles, damping and Bode plots.
-
-    Input: deviation of the drive's velocity [m/s]. Outputs: deviation of the drive force [N] and of the
-    slide's velocity [m/s].
-    """
-    k_d, h_d, m = config.drive.stiffness_N_per_m, config.drive.damping_Ns_per_m, config.slide.mass_kg
-    at = contact(config.contact, drive_velocity_mps, vibration_velocity_mps)
-    return control.StateSpace(
-        _system_matrix(config, at, k_d),
-        [[1.0], [h_d / m], [0.0]],
-        [[k_d, -h_d, 0.0], [0.0, 1.0, 0.0]],
-        [[h_d], [0.0]],
-        states=["e_m", "v_mps", "z_m"],
-        inputs=["drive_velocity_mps"],
-        outputs=["drive_force_N", "slide_velocity_mps"],
-    )
-
-
 def stability_map(
     config: RigConfig,
     drive_velocities_mps: Numbers,
@@ -186,10 +166,7 @@ def critical_velocity_mps(config: RigConfig, drive_stiffness_N_per_m: float | No
     furthest = 12.0 if config.contact.stribeck_tail == 0.0 else 1e3
     grid_mps = config.contact.stribeck_velocity_mps * np.geomspace(1e-4, furthest, 600)
 
-    def margin(velocity_mps: Numbers) -> Floats:
-        return hurwitz_margin(config, velocity_mps, drive_stiffness_N_per_m)
-
-    velocity_mps = _last_crossing(margin, grid_mps)
+    velocity_mps = _last_crossing(lambda at_mps: hurwitz_margin(config, at_mps, drive_stiffness_N_per_m), grid_mps)
     return 0.0 if velocity_mps == grid_mps[0] else velocity_mps
 
 
@@ -199,11 +176,7 @@ def stabilising_vibration_mps(config: RigConfig, drive_velocity_mps: float) -> f
     0 where sliding is stable without vibration; None where five times the drive velocity does not suffice.
     """
     grid_mps = drive_velocity_mps * np.linspace(0.0, 5.0, 1001)
-
-    def margin(vibration_mps: Numbers) -> Floats:
-        return hurwitz_margin(config, drive_velocity_mps, None, vibration_mps)
-
-    return _last_crossing(margin, grid_mps)
+    return _last_crossing(lambda at_mps: hurwitz_margin(config, drive_velocity_mps, None, at_mps), grid_mps)
 
 
 def self_sustained_velocity_mps(config: RigConfig, drive_stiffness_N_per_m: Numbers | None = None) -> Floats:

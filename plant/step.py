@@ -1,9 +1,6 @@
 """One block of the rig at its interface: a command in, a sensor block and a message of the applied vibration out."""
 
-from typing import Any
-
-import numpy.typing as npt
-
+from bridge.arrays import Floats, Records
 from bridge.guard.check import write_gain
 from bridge.guard.core import accept, allow, look
 from bridge.guard.estimates import expect_drive
@@ -16,18 +13,18 @@ from plant.sensors import digitise
 
 @shared_kernel
 def act(
-    params: npt.NDArray[Any],
-    state: npt.NDArray[Any],
-    guard_params: npt.NDArray[Any],
-    guard_state: npt.NDArray[Any],
+    params: Records,
+    state: Records,
+    guard_params: Records,
+    guard_state: Records,
     drive_velocity_mps: float,
-    commands: npt.NDArray[Any],
+    commands: Records,
     delay_blocks: int,
-    announce: npt.NDArray[Any],
-    noise: npt.NDArray[Any],
-    analogue: npt.NDArray[Any],
-    truth: npt.NDArray[Any],
-    sensors: npt.NDArray[Any],
+    announce: Records,
+    noise: Floats,
+    analogue: Floats,
+    truth: Floats,
+    sensors: Records,
 ) -> int:
     """Advance `state` by one block, in place, up to the samples of its sensors; return the number of accepted commands.
 
@@ -70,16 +67,16 @@ def act(
 
 @shared_kernel
 def report(
-    params: npt.NDArray[Any],
-    state: npt.NDArray[Any],
-    guard_params: npt.NDArray[Any],
-    guard_state: npt.NDArray[Any],
+    params: Records,
+    state: Records,
+    guard_params: Records,
+    guard_state: Records,
     commands: int,
     commands_late: int,
     round_trip_ns: int,
     late_ns: int,
-    sensors: npt.NDArray[Any],
-    applied: npt.NDArray[Any],
+    sensors: Records,
+    applied: Records,
 ) -> None:
     """Pass the samples to the guard, and end the block that `act` began: fill in the applied vibration.
 

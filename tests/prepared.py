@@ -6,20 +6,21 @@ import numpy as np
 
 from diagnosis.evidence.folder import Evidence, load_evidence
 from diagnosis.fits.gauss_newton import Fitter
-from diagnosis.gap.floor import floor_of, replicates
+from diagnosis.gap.measure import floor_of, replicates
 from diagnosis.gap.prepare import Prepared, prepare
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.model.rig import Roughness
-from diagnosis.synthetic.folder import Case, Numbers
+from diagnosis.synthetic.folder import Numbers
 from tests.made_evidence import made_evidence
+from tests.made_protocols import case_of
 
 
 def prepared(
     protocol: str, effects: Mapping[str, Numbers] | None = None, seed: int = 1
 ) -> tuple[Evidence, list[Prepared]]:
     """A rig that differs from its description by `effects` and by the usual tolerances."""
-    evidence = load_evidence(made_evidence(Case(protocol, effects=effects or {}, drawn=False), seed))
+    evidence = load_evidence(made_evidence(case_of(protocol, effects, drawn=False), seed))
     return evidence, prepare(evidence)
 
 

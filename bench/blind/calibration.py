@@ -9,9 +9,9 @@ import numpy as np
 from bench.blind.intervals import Score, bootstrapped, mean, rate
 from bench.blind.outcomes import Opened
 
-_BINS = 10  # at most
-_FEWEST_IN_BIN = 10  # cases; fewer: chance alone makes the rate of a bin
-_DRAWS = 1000
+_BINS = 10  # most bins
+_FEWEST_IN_BIN = 10  # fewest cases in a bin; with fewer, chance alone makes its rate
+_DRAWS = 1000  # random sets of answers for the error by chance alone
 # Lowest probability in the log score. Smaller: a single certain mistake is the whole score. Larger: such mistakes cost little.
 _LEAST_PROBABILITY = 1e-6
 
@@ -19,7 +19,7 @@ _LEAST_PROBABILITY = 1e-6
 class Bin(NamedTuple):
     """Cases whose leading candidates have about the same probability."""
 
-    probability: float  # mean over the cases
+    probability: float  # mean probability of their leading candidates
     right: Score  # share of the cases whose leading candidate is right
 
 

@@ -1,4 +1,4 @@
-"""`python -m bench blind ...`: diagnose a set of rigs with sealed answers without them, open and score it."""
+"""`python -m bench blind ...`: diagnose a set of cases without their sealed answers, then open and score it."""
 
 import time
 from contextlib import closing
@@ -27,15 +27,15 @@ Report = Annotated[Path | None, typer.Option(metavar="FILE", help="Write a repor
 
 
 class SetDone(NamedTuple):
-    """A set of which every case has a result."""
+    """A set whose every case has a result."""
 
     folder: str
-    diagnosed: int  # cases that had none before
+    diagnosed: int  # number of cases that had no result before
 
 
 @blind_app.command("run")
 def blind_run(folder: SetArgument, jobs: Jobs = None, as_json: Json = None) -> None:
-    """Diagnose every case that has no result yet, without the key. It can be stopped and taken up again."""
+    """Diagnose every case that has no result yet, without the key. A stopped run continues with the next call."""
 
     def work() -> None:
         from joblib import cpu_count
@@ -63,12 +63,12 @@ def blind_score(
     as_json: Json = None,
     report: Report = None,
     baselines: Annotated[
-        bool, typer.Option("--baselines", help="Oracle and tree ensemble too: half a minute a case and core.")
+        bool, typer.Option("--baselines", help="Score oracle and tree ensemble too: half a minute a case.")
     ] = False,
     partial: Annotated[bool, typer.Option("--partial", help="Score although results are missing.")] = False,
     jobs: Jobs = None,
 ) -> None:
-    """Check every hash, open the answers, score. A set that was opened once is development data from then on."""
+    """Check every hash, open the answers, score. Results that change after that count as development data."""
 
     def work() -> None:
         from joblib import cpu_count

@@ -7,13 +7,13 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 T = TypeVar("T")
-_Z_95 = 1.96
+_Z_95 = 1.96  # sigmas that hold 95 % of a normal distribution
 _RESAMPLES = 1000
 _SEED = 1
 
 
 class Score(NamedTuple):
-    """A number over `n` cases."""
+    """A score of `n` cases, with its 95 % interval from `low` to `high`."""
 
     value: float
     low: float

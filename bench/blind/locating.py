@@ -13,8 +13,8 @@ from typing import Any
 from bench.blind.outcomes import Opened
 
 Cell = tuple[str, str, str]
-_LEAST_FLOORS = 2.0
-LEAST_SHARE = 0.05
+_LEAST_FLOORS = 2.0  # difference in noise floors above which a cell may be true
+LEAST_SHARE = 0.05  # least share of the difference in a true cell, and of the gap in a reported cell
 
 
 def true_cells(case: Opened) -> set[Cell]:

@@ -18,13 +18,13 @@ Progress = Callable[[str, float], None]
 
 
 class OpenedSet(NamedTuple):
-    """The opened cases of a set, and all else that its scores need."""
+    """The opened cases of a set, and the other inputs of its scores."""
 
     cases: list[Opened]
     sealed: bool  # True if no answer was known when the results were made
-    tool: str  # version that made the results
-    oracle: Oracle | None = None  # None: not computed
-    trees: dict[str, dict[str, float]] | None = None  # probabilities of the candidates, by case; None: not computed
+    tool: str  # version of the diagnosis that made the results
+    oracle: Oracle | None = None  # share of the gap that the true effects close, by case; None: not computed
+    trees: dict[str, dict[str, float]] | None = None  # the tree ensemble's probabilities, by case; None: not computed
 
 
 def open_set(folder: Path, key: Path, partial: bool) -> OpenedSet:

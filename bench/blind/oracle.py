@@ -1,7 +1,7 @@
 """The oracle: how much of the held-out gap the library closes when the names of the true effects are known.
 
 The oracle has the formulas of the library, which differ from the formulas of the case, so a gap remains. A case takes half a
-minute, so its shrinkage is kept beside the set; another version of the tool computes it again.
+minute, so its shrinkage is kept in SET/oracle; another version of the tool computes it again.
 """
 
 import json
@@ -22,13 +22,13 @@ from diagnosis.fits.screening import screened
 from diagnosis.fits.search import refitted
 from diagnosis.gap.prepare import prepare
 from diagnosis.gap.problem import Problem
-from diagnosis.hypotheses.trials import trials
+from diagnosis.hypotheses.catalogue import trials
 from diagnosis.verdict.held_out import HeldOut
 from diagnosis.version import tool_version
 
 Progress = Callable[[str, float], None]
 KEPT = "oracle"
-_SCORED = ("one-effect", "two-effects")
+_SCORED = ("one-effect", "two-effects")  # kinds of cases whose effects are in the library
 
 
 def oracle(folder: Path, cases: list[Opened], jobs: int, progress: Progress) -> Oracle:
@@ -68,7 +68,7 @@ def shrinkage_with(folder: Path, effects: list[str]) -> float | None:
     evidence = load_evidence(folder)
     runs = prepare(evidence)
     problem = Problem(evidence.rig, [run for run in runs if not run.holdout])
-    fitter, baseline, roughness, _ = retuned_rig(evidence, problem, _untold)
+    fitter, baseline, roughness, _ = retuned_rig(evidence, problem, _no_report)
     tried = trials(problem)
     best: Fit = baseline
     for effect in effects:  # each effect is added to the fit with the effects before it
@@ -81,5 +81,5 @@ def shrinkage_with(folder: Path, effects: list[str]) -> float | None:
     return HeldOut(held_out, fitter.nuisances, best, baseline, roughness).closed_by(best).shrinkage
 
 
-def _untold(_line: str, _share: float) -> None:
+def _no_report(_line: str, _share: float) -> None:
     """Drop the progress within a case: it is reported per case."""

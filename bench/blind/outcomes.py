@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 OTHER_NAMES = ("none", "unexplained")
-_MOST = 0.5  # share of the held-out gap from which "partly" counts as a name, not as "unexplained"
+_MOST = 0.5  # closed share of the held-out gap from which "partly" counts as a name, not as "unexplained"
 # the result of a case that ended in a fault: no answer, so every score counts the case as wrong
 _NOTHING_SAID: dict[str, Any] = {
     "verdict": "fault",
@@ -35,7 +35,7 @@ class Opened(NamedTuple):
 
     @property
     def detectability(self) -> float:
-        """Size of the weakest effect, in detection limits; 0 without effects."""
+        """Size of the case's weakest effect, in detection limits; 0 without effects."""
         return min((effect["detectability"] or 0.0 for effect in self.answer["effects"]), default=0.0)
 
     @property

@@ -24,7 +24,7 @@ _SCORED_OF_GAP = ("shrinkage", "interval_90", "retuned", "with_effect", "compare
 
 
 class BlindScores(NamedTuple):
-    """The input of `pooled`: every score, and for every case its answer and its result."""
+    """Kept scores of one set: every score, and for every case its answer and its result."""
 
     format: Literal["blind-scores/2"]
     sealed: bool
@@ -50,7 +50,7 @@ def pooled(paths: Sequence[Path]) -> OpenedSet:
         files = ", ".join(map(str, paths))
         line = f"{files}: results of the versions {' and '.join(sorted(tools))}: must be of one;"
         raise Fault("BAD_SET", f"{line} score each for itself")
-    seen: dict[int, Path] = {}  # by the seed of a case, as the same case of another making has another name
+    seen: dict[int, Path] = {}  # by the seed of a case, as a case that was made a second time has another name
     for path, opened_set in zip(paths, sets, strict=True):
         for case in opened_set.cases:
             if (other := seen.setdefault(case.answer["counterfactual_seed"], path)) is not path:

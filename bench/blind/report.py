@@ -19,7 +19,7 @@ _DPI = 110.0
 
 
 def write_report(methods: dict[str, Scores], sealed: bool, name: str, path: Path, files: Iterable[Path] = ()) -> None:
-    """Write the page; at its foot are the hashes of `files`, which the scores come from. Raises OSError."""
+    """Write the page, with the hashes of the `files` of the scores at its foot. Raises OSError."""
     tool = methods[TOOL]
     page = filled_page(
         Path(__file__).with_name("report.html.j2"),

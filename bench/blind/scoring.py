@@ -12,13 +12,13 @@ from bench.blind.locating import f1
 from bench.blind.outcomes import OTHER_NAMES, Opened
 from diagnosis.model.sensor_chain import SENSOR_EFFECTS
 
-_SURE = 0.8  # probability beyond which an answer counts as sure
+_SURE = 0.8  # probability above which an answer counts as sure
 _VISIBLE = 2.0  # detection limits from which an effect counts as visible
-_DETECTABILITIES = (0.0, 1.0, 2.0, 4.0, math.inf)
-# Shrinkage of the oracle below which a case is not compared with it. Smaller: noise over noise. Larger: fewer cases.
+_DETECTABILITIES = (0.0, 1.0, 2.0, 4.0, math.inf)  # limits of the groups by size, in detection limits
+# Shrinkage of the oracle below which a case is not compared with it. Smaller: the ratio is noise. Larger: fewer cases.
 _LEAST_SHRINKAGE = 0.1
 
-Oracle = dict[str, float | None]  # by case: shrinkage with the true effects
+Oracle = dict[str, float | None]  # share of the held-out gap that the true effects close, by case
 
 
 class Singles(NamedTuple):
@@ -45,23 +45,19 @@ class Scores(NamedTuple):
 
     cases: int
     faults: int
-    visible: Singles  # of 2 detection limits or more
+    visible: Singles  # cases with one effect of 2 detection limits or more
     singles: Singles
     by_detectability: dict[str, Singles]
     by_effect: dict[str, Singles]
     by_backbone: dict[str, Singles]
     false_alarms: Score | None
-    false_alarms_wide: Score | None  # of rigs whose numbers were drawn from wider tolerances than usual
-    outside_caught: (
-        Score | None
-    )  # effects outside the library whose verdict is unexplained, or partly with less than half
-    outside_caught_visible: Score | None  # of 2 detection limits or more
-    outside_named: Score | None
-    sure_of_wrong_name: (
-        Score | None
-    )  # an effect that the rig lacks has more than 0.8; without real logs, whose effects are unknown
-    sure_of_wrong_answer: Score | None  # a wrong answer has more than 0.8, "none" and "unexplained" included
-    named_wrong: Score | None
+    false_alarms_wide: Score | None  # false alarms of rigs drawn from wider tolerances than usual
+    outside_caught: Score | None  # effect outside the library: "unexplained", or "partly" with less than half closed
+    outside_caught_visible: Score | None  # the same for effects of 2 detection limits or more
+    outside_named: Score | None  # effect outside the library, but the result names an effect
+    sure_of_wrong_name: Score | None  # an effect that the rig lacks has p > 0.8; real logs do not count
+    sure_of_wrong_answer: Score | None  # a wrong answer, "none" and "unexplained" included, has p > 0.8
+    named_wrong: Score | None  # effects are named, and none of the true effects is in the group
     pair_f1: Score | None
     pair_exact: Score | None
     pair_one_right: Score | None
@@ -69,15 +65,15 @@ class Scores(NamedTuple):
     real_logs: Singles  # sensor faults added to measured logs, whose gaps are unknown
     log_score: Score | None
     calibration_error: Score | None
-    calibration_error_of_perfect: Score | None  # expected by chance alone for so many cases
+    calibration_error_of_perfect: Score | None  # error of perfect probabilities by chance, for so many cases
     reliability: tuple[Bin, ...]
-    sensor_or_physics: Score | None
+    sensor_or_physics: Score | None  # the named effect is of the right kind: sensor or rig
     locating_f1: Score | None
-    shrinkage: Score | None  # where an effect is named
+    shrinkage: Score | None  # mean share of the held-out gap that the named effects close
     shrinkage_of_oracle: Score | None
     interval_coverage: Score | None
     seconds: Score | None
-    confusions: tuple[tuple[str, str, int], ...]  # truth, answer, count
+    confusions: tuple[tuple[str, str, int], ...]  # wrong answers: truth, answer, number of cases
 
 
 def score(cases: Sequence[Opened], oracle: Oracle) -> Scores:

@@ -36,7 +36,7 @@ class Sealed(NamedTuple):
 class Secret(NamedTuple):
     """The part of the key for one case."""
 
-    nonce: str  # hexadecimal
+    nonce: str  # random, hexadecimal: without it the answer could be guessed from its hash
     answer: Answer
 
 
@@ -118,10 +118,10 @@ def opened_answers(folder: Path, key: Path) -> dict[str, Answer]:
         )
     for name, hashes in sealed.items():
         if answer_hash(secrets[name]) != hashes.answer_sha256:
-            line = f"{key}: case {name}: the answer is not the one that was sealed: its SHA-256 must be the one in"
+            line = f"{key}: case {name}: the answer was changed after it was sealed: its SHA-256 must be as in"
             raise Fault("SEAL_BROKEN", f"{line} {folder / SET}; the set cannot be scored")
         if evidence_hash(folder / name) != hashes.evidence_sha256:
-            line = f"{folder / name}: the evidence is not the one that was sealed: its SHA-256 must be the one in"
+            line = f"{folder / name}: the evidence was changed after it was sealed: its SHA-256 must be as in"
             raise Fault("SEAL_BROKEN", f"{line} {folder / SET}; the set cannot be scored")
     return {name: secrets[name].answer for name in sealed}
 

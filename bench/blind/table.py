@@ -1,20 +1,21 @@
 """The scores as text: the answer first, then every score of every method, then the cases that went wrong."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 from bench.blind.intervals import Score
 from bench.blind.scoring import Scores, Singles
 
 TOOL = "diagnosis"
-_CONFUSIONS = 30
+_CONFUSIONS = 30  # most wrong answers in the table
 
 
 class ScoreRow(NamedTuple):
     """One score of every method, with its bar."""
 
     name: str
-    bar: str  # such as ">= 0.85" or "0.85-0.95"; empty for a score without a bar
-    scores: tuple[Score | None, ...]  # one a method
+    bar: str  # limits of the score, such as ">= 0.85" or "0.85-0.95"; empty without a bar
+    scores: tuple[Score | None, ...]  # one score for each method
 
     @property
     def missed(self) -> bool:
@@ -27,6 +28,42 @@ class ScoreRow(NamedTuple):
             return first.value < float(bound) if sign == ">=" else first.value > float(bound)
         low, high = map(float, bound.split("-"))
         return not low <= first.value <= high
+
+
+_SCORES: tuple[tuple[str, str, Callable[[Scores], Score | None]], ...] = (  # name, bar and score of each row
+    ("top-1, 2 limits or more", ">= 0.85", lambda scores: scores.visible.top_1),
+    ("top-3, 2 limits or more", ">= 0.97", lambda scores: scores.visible.top_3),
+    ("truth in group, 2 limits or more", ">= 0.95", lambda scores: scores.visible.in_group),
+    ("group size, 2 limits or more", "<= 1.5", lambda scores: scores.visible.group_size),
+    ("top-1, any size", "", lambda scores: scores.singles.top_1),
+    ("top-3, any size", "", lambda scores: scores.singles.top_3),
+    ("truth in group, any size", "", lambda scores: scores.singles.in_group),
+    ("false alarms", "<= 0.05", lambda scores: scores.false_alarms),
+    ("  numbers further off than usual", "", lambda scores: scores.false_alarms_wide),
+    ("outside caught", ">= 0.80", lambda scores: scores.outside_caught),
+    ("  of 2 limits or more", "", lambda scores: scores.outside_caught_visible),
+    ("  outside, but an effect named", "", lambda scores: scores.outside_named),
+    ("sure of a wrong name", "<= 0.05", lambda scores: scores.sure_of_wrong_name),
+    ("sure of any wrong answer", "", lambda scores: scores.sure_of_wrong_answer),
+    ("named, truth not in the group", "", lambda scores: scores.named_wrong),
+    ("two effects: set F1", ">= 0.85", lambda scores: scores.pair_f1),
+    ("  both named, nothing else", "", lambda scores: scores.pair_exact),
+    ("  one right at least", "", lambda scores: scores.pair_one_right),
+    ("inseparable: truth in group", "", lambda scores: scores.unclear.in_group),
+    ("  two or more of them given", "", lambda scores: scores.unclear.group_told),
+    ("  experiment that would separate", "", lambda scores: scores.unclear.experiment),
+    ("fault in a real log: top-1", "", lambda scores: scores.real_logs.top_1),
+    ("  truth in the named group", "", lambda scores: scores.real_logs.in_group),
+    ("log score", "", lambda scores: scores.log_score),
+    ("calibration error", "<= 0.05", lambda scores: scores.calibration_error),
+    ("  if every probability were true", "", lambda scores: scores.calibration_error_of_perfect),
+    ("sensor or physics", "", lambda scores: scores.sensor_or_physics),
+    ("localisation F1", "", lambda scores: scores.locating_f1),
+    ("held-out shrinkage, where named", "", lambda scores: scores.shrinkage),
+    ("  of the oracle's", ">= 0.95", lambda scores: scores.shrinkage_of_oracle),
+    ("  90 % intervals holding it", "0.85-0.95", lambda scores: scores.interval_coverage),
+    ("seconds a case", "", lambda scores: scores.seconds),
+)
 
 
 def headline(scores: Scores, sealed: bool) -> str:
@@ -44,45 +81,7 @@ def headline(scores: Scores, sealed: bool) -> str:
 
 def rows(methods: dict[str, Scores]) -> list[ScoreRow]:
     """All scores, one row each."""
-    every = tuple(methods.values())
-
-    def row(name: str, bar: str, of: list[Score | None]) -> ScoreRow:
-        return ScoreRow(name, bar, tuple(of))
-
-    return [
-        row("top-1, 2 limits or more", ">= 0.85", [scores.visible.top_1 for scores in every]),
-        row("top-3, 2 limits or more", ">= 0.97", [scores.visible.top_3 for scores in every]),
-        row("truth in the named group, same", ">= 0.95", [scores.visible.in_group for scores in every]),
-        row("mean group size, same", "<= 1.5", [scores.visible.group_size for scores in every]),
-        row("top-1, any size", "", [scores.singles.top_1 for scores in every]),
-        row("top-3, any size", "", [scores.singles.top_3 for scores in every]),
-        row("truth in the named group, same", "", [scores.singles.in_group for scores in every]),
-        row("false alarms", "<= 0.05", [scores.false_alarms for scores in every]),
-        row("  numbers further off than usual", "", [scores.false_alarms_wide for scores in every]),
-        row("outside caught", ">= 0.80", [scores.outside_caught for scores in every]),
-        row("  of 2 limits or more", "", [scores.outside_caught_visible for scores in every]),
-        row("  outside, but an effect named", "", [scores.outside_named for scores in every]),
-        row("sure of a wrong name", "<= 0.05", [scores.sure_of_wrong_name for scores in every]),
-        row("sure of any wrong answer", "", [scores.sure_of_wrong_answer for scores in every]),
-        row("named, truth not in the group", "", [scores.named_wrong for scores in every]),
-        row("two effects: set F1", ">= 0.85", [scores.pair_f1 for scores in every]),
-        row("  both named, nothing else", "", [scores.pair_exact for scores in every]),
-        row("  one right at least", "", [scores.pair_one_right for scores in every]),
-        row("inseparable: truth in group", "", [scores.unclear.in_group for scores in every]),
-        row("  two or more of them given", "", [scores.unclear.group_told for scores in every]),
-        row("  experiment that would separate", "", [scores.unclear.experiment for scores in every]),
-        row("fault in a real log: top-1", "", [scores.real_logs.top_1 for scores in every]),
-        row("  truth in the named group", "", [scores.real_logs.in_group for scores in every]),
-        row("log score", "", [scores.log_score for scores in every]),
-        row("calibration error", "<= 0.05", [scores.calibration_error for scores in every]),
-        row("  if every probability were true", "", [scores.calibration_error_of_perfect for scores in every]),
-        row("sensor or physics", "", [scores.sensor_or_physics for scores in every]),
-        row("localisation F1", "", [scores.locating_f1 for scores in every]),
-        row("held-out shrinkage, where named", "", [scores.shrinkage for scores in every]),
-        row("  of the oracle's", ">= 0.95", [scores.shrinkage_of_oracle for scores in every]),
-        row("  90 % intervals holding it", "0.85-0.95", [scores.interval_coverage for scores in every]),
-        row("seconds a case", "", [scores.seconds for scores in every]),
-    ]
+    return [ScoreRow(name, bar, tuple(score(scores) for scores in methods.values())) for name, bar, score in _SCORES]
 
 
 def table(methods: dict[str, Scores], sealed: bool) -> str:

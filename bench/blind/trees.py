@@ -16,19 +16,19 @@ from bridge.arrays import Floats
 from bridge.faults import Fault
 from diagnosis.evidence.folder import load_evidence
 from diagnosis.fits.retuning import FIRST_REPLICATES, ROUGHNESS
-from diagnosis.gap.floor import Floor, compress, floor_of, replicates
+from diagnosis.gap.measure import Floor, compress, floor_of, replicates
 from diagnosis.gap.prepare import prepare
 from diagnosis.gap.problem import Draw, Problem
+from diagnosis.hypotheses.catalogue import trials
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.hypotheses.starts import Trial
-from diagnosis.hypotheses.trials import trials
 from diagnosis.model.rig import Effects
 
 Progress = Callable[[str, float], None]
 Row = dict[str, float]
-_TEMPLATES = 10  # evidences whose commands are used; more: more varied training, and more time
-_EACH = 4  # rigs per template and effect, and four times as many without an effect
-_NONE = "none"
+_TEMPLATES = 10  # number of evidences whose commands are simulated; more: more varied training, and more time
+_EACH = 4  # simulated rigs per template and effect, and four times as many without an effect
+_NONE = "none"  # label of a rig without an effect
 _TREES = 500
 
 
@@ -38,8 +38,8 @@ class _Bench(NamedTuple):
     problem: Problem
     nuisances: Nuisances
     floor: Floor
-    described: Floats  # prediction of the described rig [features]
-    names: list[str]  # [compared]
+    described: Floats  # features of the described rig, predicted [features]
+    names: list[str]  # names of the compared features
 
     def row(self, features: Floats) -> Row:
         floor = self.floor

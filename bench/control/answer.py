@@ -10,24 +10,24 @@ from bench.control.record import BLOCK_RING, CLAIMED, REASONS
 from bridge.kernel import Record, kernel
 from bridge.wire.stickslip_pb2 import EXCITE, PROBE, SLIP, STICK, STICK_SEEN
 
-_SETTLED_S = 10.0  # after the first announcement, from when on the energy is compared
-_EXCITED = 0.05  # v_a / v_d from which the rig is vibrated
-_START_S, _FIRST_LOOP_DELAYS = 0.15, 12.0  # in which v_a may still come up to v_d; the second at the first start alone
-_ABOVE, _TWICE = 1.3, 2.0
-_EXACT = 1.0 - 1e-6  # v_d is a difference of places, with their rounding
-_STIFF_GRACE_S = 0.1  # in which a stick of a stiff axis may be announced by its slip
-_FOLLOWS = 0.5  # of v_d: a slide as fast as this has ended its stick at a change of sign
-_CLAIM_GRACE_S = 0.02  # after drag, in which a claim is late, not false
+_SETTLED_S = 10.0  # time after the first announcement from which the energy is compared with the least possible
+_EXCITED = 0.05  # v_a / v_d above which the rig counts as vibrated
+_START_S, _FIRST_LOOP_DELAYS = 0.15, 12.0  # time after a start for v_a to reach v_d; loop delays added at the first
+_ABOVE, _TWICE = 1.3, 2.0  # limits of v_a over the wanted v_a, and over v_d; the time above them is counted
+_EXACT = 1.0 - 1e-6  # share of v_d that v_a must reach: v_d is a difference of rounded positions
+_STIFF_GRACE_S = 0.1  # time after a stick of a stiff axis in which its slip may announce it
+_FOLLOWS = 0.5  # v_s / v_d above which a slide has ended its stick after a reversal
+_CLAIM_GRACE_S = 0.02  # time after the slide last lagged in which a claimed stick is late, not false
 
 
 @kernel
 def announce(p: Record, s: Record, t: Record, shaking: bool, events: npt.NDArray[np.float64], count: int) -> int:
-    """Write announcements of true sticks and claims of false ones; return the number of events.
+    """Write true sticks with their announcement, and claims of false sticks; return the number of events.
 
     Args:
         p, s: records of `bench.control.record`.
         t: the block's trace.
-        shaking: whether the base moves.
+        shaking: whether the base vibrates.
         events, count: where events are written, and their number.
 
     """
@@ -59,7 +59,7 @@ def add_up(p: Record, s: Record, t: Record, v_a_mps: float, error_m: float) -> N
     """Add a block to the sums over the run.
 
     Args:
-        error_m: how far the slide is behind the drive.
+        error_m: distance by which the slide is behind the drive.
 
     """
     dt, v_d = p.block_s, s.speed_mps
@@ -100,10 +100,10 @@ def _add_moving(p: Record, s: Record, t: Record, v_a_mps: float, v_d: float) -> 
 
 @kernel
 def follow_turn(p: Record, s: Record, error_m: float) -> None:
-    """After a reversal: how long the slide rests, and its largest following error over the mean of the stroke.
+    """Measure, after a reversal, how long the slide rests and by how much its following error exceeds the mean of the stroke.
 
     Args:
-        error_m: how far the slide is behind the drive.
+        error_m: distance by which the slide is behind the drive.
 
     """
     if s.moving == 0:
@@ -131,26 +131,26 @@ def follow_turn(p: Record, s: Record, error_m: float) -> None:
 
 @kernel
 def end_stroke(s: Record) -> None:
-    """Take the quadrant error of the stroke since the last change of sign."""
+    """Update the largest quadrant error by the stroke since the last change of sign."""
     if s.stroke_s > 0.0:
         s.quadrant_m = max(s.quadrant_m, s.turn_peak_m - s.stroke_error / s.stroke_s)
 
 
 @kernel
 def follow_vibration(p: Record, s: Record, t: Record, v_a_mps: float, frequency_Hz: float, gain: float) -> None:
-    """Count blocks in which v_a misses a v_d that the exciter can reach, and time above the wanted v_a.
+    """Count blocks in which v_a is below a v_d that the exciter can reach, and time above the wanted v_a.
 
     Args:
-        gain: v_a for one metre of commanded amplitude.
+        gain: v_a for one metre of commanded amplitude [1/s].
 
     """
     dt, step_mps = p.block_s, p.slew_m_per_s * p.block_s * gain
     ring = s.blocks % BLOCK_RING
-    v_d = min(s.speed_mps, s.drive_now_mps)  # a drive that slows down needs no more than it does now
+    v_d = min(s.speed_mps, s.drive_now_mps)  # for a drive that slows down, its present speed counts
     s.drive_mps[ring], s.wanted_mps[ring] = s.drive_now_mps, t.wanted_velocity_mps
     s.blocks += 1
     known = min(s.blocks, BLOCK_RING)
-    # v_d as it can be known, then as stroke and slew let v_a follow it
+    # the v_d that a command in effect now can have measured, then the v_a that stroke and slew allow for it
     seen_mps = 0.0
     for i in range(min(p.late_blocks, known - 1), min(p.late_blocks + 2, known)):
         seen_mps = max(seen_mps, s.drive_mps[(ring - i) % BLOCK_RING])
@@ -164,7 +164,7 @@ def follow_vibration(p: Record, s: Record, t: Record, v_a_mps: float, frequency_
         s.covered += 1.0
         if v_a_mps < v_d * _EXACT:
             s.uncovered += 1.0
-    # the largest v_a that was wanted since a command that acts now was computed, falling as the slew lets it
+    # largest v_a that was wanted since the command in effect now was computed; it falls no faster than the slew
     wanted_mps = 0.0
     for i in range(min(p.late_blocks + 1, known)):
         wanted_mps = max(wanted_mps, s.wanted_mps[(ring - i) % BLOCK_RING])

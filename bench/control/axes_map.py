@@ -19,24 +19,24 @@ from bridge.provenance import provenance
 from cockpit.run.scenario import load_rig
 from plant.config import RigConfig
 
-_SIGMAS, _HALF = 6.0, 0.5  # of `controller.estimate.contact`: half of v_d exceeds 6 sigma
-_SHORTEST_S, _LONGEST_S = 4e-4, 1.0  # its windows, each twice as long as the one before
-_JUDGED_EVERY_S = 1e-3
-_ROUNDED_UP = math.sqrt(2.0)  # up to the next of them, in the mean
-_RATE_HZ = 2e4
-_DELAYS_S = (0.01, 0.05)
-_STROKE_M, _STROKE_HZ = 1e-7, 4500.0  # of the paper's exciter
-_RATIO = 1.2
+_SIGMAS, _HALF = 6.0, 0.5  # as in `controller.estimate.contact`: half of v_d exceeds 6 sigma in a window
+_SHORTEST_S, _LONGEST_S = 4e-4, 1.0  # shortest and longest window of the estimator; each is twice the one before
+_JUDGED_EVERY_S = 1e-3  # period in which the estimator judges the contact
+_ROUNDED_UP = math.sqrt(2.0)  # mean factor from a needed length to the next longer window
+_RATE_HZ = 2e4  # sample rate
+_DELAYS_S = (0.01, 0.05)  # loop delays that the map shows as lines
+_STROKE_M, _STROKE_HZ = 1e-7, 4500.0  # stroke of the paper's exciter, and the frequency at which it is used up
+_RATIO = 1.2  # v_a / v_d that the stroke must allow
 _FEEDS_MPS, _STIFFNESS_PER_M = (5e-8, 1e-2), (1e3, 1e7)  # ends of the axes; stiffness over the drop of friction
-_LABEL_PER_M = 2e5
+_LABEL_PER_M = 2e5  # stiffness over the drop of friction at which the lines have their labels
 _CROWD_MM_PER_S = 0.4  # most runs have feeds near this value; names go on the emptier side
-_OFF = 10.0  # in place of infinite: far above any border
+_OFF = 10.0  # time to see a stick over its duration, in place of infinity: far above the border at 1
 _MACHINES = ("paper-c45-c45", "pneumatic-seal", "belt-axis", "ball-screw-axis")
 _SEES, _BLIND, _INK = "#dcebd8", "#d5d8dc", "#1f2d3a"
-_CLEAN, _MISSED, _SAYS, _HELPLESS = "clean", "slips or surges", "says BLIND", "says CANNOT_HELP"
+_CLEAN, _MISSED, _REPORTS_BLIND, _HELPLESS = "clean", "slips or surges", "reports BLIND", "reports CANNOT_HELP"
 _MARKS: dict[str, dict[str, Any]] = {
     _CLEAN: {"marker": "o", "color": "#1e8449", "s": 20, "linewidths": 0},
-    _SAYS: {"marker": "s", "facecolors": "none", "color": "#17202a", "s": 70, "linewidths": 1.8},
+    _REPORTS_BLIND: {"marker": "s", "facecolors": "none", "color": "#17202a", "s": 70, "linewidths": 1.8},
     _HELPLESS: {"marker": "D", "facecolors": "none", "color": "#b9770e", "s": 80, "linewidths": 1.8},
     _MISSED: {"marker": "x", "color": "#c0392b", "s": 46, "linewidths": 2.0},
 }
@@ -45,11 +45,11 @@ _MARKS: dict[str, dict[str, Any]] = {
 class Noise(NamedTuple):
     """White noise of a sample."""
 
-    position_m: float  # of the slide's
-    force_share: float  # of the force's, over the drop of friction
+    position_m: float  # noise of the slide position
+    force_share: float  # noise of the force over the drop of friction
 
     def sigma_m(self, stiffness_per_m: Any) -> Any:
-        """Noise of the slide's place, from its position and from the force over k_d, each by its weight.
+        """Noise of the slide's position from two sources: position, and force over k_d, weighted by their noise.
 
         Args:
             stiffness_per_m: k_d over the drop of friction.
@@ -74,30 +74,30 @@ class Point(NamedTuple):
     stiffness_per_m: float
     slowest_mps: float
     fastest_mps: float
-    came: str
+    outcome: str
 
 
 _STIFFNESS, _FEED = Point._fields.index("stiffness_per_m"), Point._fields.index("slowest_mps")
 
 
 def needed_window_s(sigma_m: Any, feed_mps: Any, rate_Hz: float = _RATE_HZ) -> Any:
-    """Time in which half of v_d is 6 sigma of a slope: its variance is 12 sigma^2 / (rate T^3)."""
+    """Length T of a window in which half of v_d is 6 sigma of its slope, whose variance is 12 sigma^2 / (rate T^3)."""
     return (12.0 * (_SIGMAS / _HALF * sigma_m / feed_mps) ** 2 / rate_Hz) ** (1.0 / 3.0)
 
 
 def window_s(sigma_m: Any, feed_mps: Any) -> Any:
-    """The estimator's window that is long enough, as its rounding up makes it in the mean; infinite beyond its longest."""
+    """Mean length of the estimator's shortest window that is long enough; infinite if it exceeds the longest window."""
     needed_s = needed_window_s(sigma_m, feed_mps)
     return np.where(needed_s > _LONGEST_S, np.inf, np.maximum(_ROUNDED_UP * needed_s, _SHORTEST_S))
 
 
 def stick_s(stiffness_per_m: Any, feed_mps: Any) -> Any:
-    """How long a stick lasts: the drive winds up the spring by twice the drop of friction."""
+    """Duration of a stick, in which the drive winds up the spring by twice the drop of friction."""
     return 2.0 / (stiffness_per_m * feed_mps)
 
 
 def points(bank: Sequence[BankScenario], runs: Sequence[Figures]) -> list[Point]:
-    """The runs of the controller on axes whose friction drops, each in the panel whose noise is nearest to its own."""
+    """The runs of the controller on axes whose friction drops, each in the panel with the most similar noise."""
     scenarios = {scenario.name: scenario for scenario in bank}
     return [
         _point(scenarios[run.scenario], run)
@@ -112,15 +112,17 @@ def _point(scenario: BankScenario, run: Figures) -> Point:
     own_m = _noise(rig).sigma_m(stiffness_per_m)
     away = [abs(math.log(own_m / noise.sigma_m(stiffness_per_m))) for noise, _ in _PANELS]
     fastest_mps = max(rig.drive.speeds_mps(), default=scenario.slowest_mps)
-    return Point(scenario.name, away.index(min(away)), stiffness_per_m, scenario.slowest_mps, fastest_mps, _came(run))
+    return Point(
+        scenario.name, away.index(min(away)), stiffness_per_m, scenario.slowest_mps, fastest_mps, _outcome(run)
+    )
 
 
-def _came(run: Figures) -> str:
+def _outcome(run: Figures) -> str:
     if run.expect == "helped":
-        return _MISSED if run.slips + run.surges else _SAYS if run.blind_share > 0.5 else _CLEAN
+        return _MISSED if run.slips + run.surges else _REPORTS_BLIND if run.blind_share > 0.5 else _CLEAN
     if run.expect == "cannot-help":
         return _HELPLESS if "CANNOT_HELP" in run.words else _MISSED
-    return _SAYS if "BLIND" in run.words else _MISSED if run.slips + run.surges else _CLEAN
+    return _REPORTS_BLIND if "BLIND" in run.words else _MISSED if run.slips + run.surges else _CLEAN
 
 
 def _drop_N(rig: RigConfig) -> float:
@@ -182,7 +184,7 @@ def reduce_colours(picture: Path) -> None:
 
 
 def _areas(axes: Any, noise: Noise) -> None:
-    """Where a stick is seen in time, where late commands come too late for the first slip, and where the stroke ends."""
+    """Draw where a stick is seen in time, where late commands miss the first slip, and where the stroke ends."""
     feed_mps = np.geomspace(*_FEEDS_MPS, 300)
     stiffness_per_m = np.geomspace(*_STIFFNESS_PER_M, 240)[:, None]
     seen_s = window_s(noise.sigma_m(stiffness_per_m), feed_mps) + _JUDGED_EVERY_S
@@ -214,7 +216,7 @@ def _areas(axes: Any, noise: Noise) -> None:
 
 
 def _machines(axes: Any) -> None:
-    """The rigs of deploy/rigs at the left edge."""
+    """Draw the stiffness of some rigs of deploy/rigs at the left edge."""
     for name in _MACHINES:
         rig = load_rig(name, [])
         y = rig.drive.stiffness_N_per_m / _drop_N(rig) * 1e-6
@@ -223,11 +225,11 @@ def _machines(axes: Any) -> None:
 
 
 def _runs(axes: Any, shown: list[Point]) -> None:
-    """The runs: one mark with a count for equal results at one place; failed runs by name."""
+    """Draw the runs: one mark with a count for equal results at one place; failed runs by name."""
     places: dict[tuple[float, float], dict[str, list[Point]]] = {}
     for point in shown:
         place = round(math.log10(point.slowest_mps), 1), round(math.log10(point.stiffness_per_m), 1)
-        places.setdefault(place, {}).setdefault(point.came, []).append(point)
+        places.setdefault(place, {}).setdefault(point.outcome, []).append(point)
     for groups in places.values():
         every = [point for group in groups.values() for point in group]
         x, y = (float(np.exp(np.mean(np.log([point[i] for point in every])))) for i in (_FEED, _STIFFNESS))
@@ -235,19 +237,24 @@ def _runs(axes: Any, shown: list[Point]) -> None:
         fastest_mps = max(point.fastest_mps for point in every)
         if 1e3 * fastest_mps > 1.3 * x:
             axes.plot([x, 1e3 * fastest_mps], [y, y], color=_INK, linewidth=0.5, alpha=0.4)
-        for came in (came for came in _MARKS if came in groups):
-            axes.scatter([x], [y], zorder=4, **_MARKS[came])
-            _label(axes, x, y, came, [point.name for point in groups[came]])
+        for outcome in (outcome for outcome in _MARKS if outcome in groups):
+            axes.scatter([x], [y], zorder=4, **_MARKS[outcome])
+            _label(axes, x, y, outcome, [point.name for point in groups[outcome]])
 
 
-def _label(axes: Any, x: float, y: float, came: str, names: list[str]) -> None:
-    """The number of runs of a mark; the names of failed runs, two per line."""
-    style: dict[str, Any] = {"fontsize": 7, "color": _MARKS[came]["color"], "zorder": 5, "textcoords": "offset points"}
-    if came == _MISSED and len(names) > 2:
+def _label(axes: Any, x: float, y: float, outcome: str, names: list[str]) -> None:
+    """Write the number of runs at a mark, or the names of failed runs, two per line."""
+    style: dict[str, Any] = {
+        "fontsize": 7,
+        "color": _MARKS[outcome]["color"],
+        "zorder": 5,
+        "textcoords": "offset points",
+    }
+    if outcome == _MISSED and len(names) > 2:
         line = {"arrowstyle": "-", "color": style["color"], "linewidth": 0.7, "relpos": (1.0, 1.0)}
         lines = [", ".join(names[i : i + 2]) for i in range(0, len(names), 2)]
         axes.annotate("\n".join(lines), (x, y), (-60.0, -20.0), ha="right", va="top", arrowprops=line, **style)
-    elif came == _MISSED:
+    elif outcome == _MISSED:
         place = (
             {"xytext": (-4.0, -9.0), "ha": "right"} if x < _CROWD_MM_PER_S else {"xytext": (4.0, -9.0), "ha": "left"}
         )
@@ -266,6 +273,6 @@ def _legend(figure: Any, axes: Any) -> None:
             0
         ],
         axes.plot([], [], ":", color="#2a6fb5", linewidth=1.0, label="right: the stroke does not reach 1.2 v_d")[0],
-        *(axes.scatter([], [], label=f"run of the bank: {came}", **mark) for came, mark in _MARKS.items()),
+        *(axes.scatter([], [], label=f"run of the bank: {outcome}", **mark) for outcome, mark in _MARKS.items()),
     ]
     figure.legend(handles=handles, loc="lower center", bbox_to_anchor=(0.5, 0.02), ncols=4, frameon=False, fontsize=9)

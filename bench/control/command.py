@@ -18,9 +18,9 @@ def control(
     small: Annotated[bool, typer.Option("--small", help="The small part of the bank alone, some seconds.")] = False,
     drawn: Annotated[
         int | None,
-        typer.Option(metavar="SEED", help="In place of the bank: 60 axes drawn from this seed, so of any that is new."),
+        typer.Option(metavar="SEED", help="In place of the bank: 60 axes that are drawn at random with this seed."),
     ] = None,
-    rivals: Annotated[bool, typer.Option(help="Run the rules that need no controller, too.")] = True,
+    rivals: Annotated[bool, typer.Option(help="Run the rivals of the controller, too.")] = True,
     report: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a report, one .html file.")] = None,
     axes: Annotated[
         Path | None,
@@ -28,7 +28,7 @@ def control(
     ] = None,
     as_json: Json = None,
 ) -> None:
-    """Run the controller on the bank, and judge it by the plant's truth; exit status 3: it misses a bar."""
+    """Run the controller on the bank, and judge it by the plant's truth; exit status 1: it misses a bar."""
 
     def work() -> int:
         from joblib import cpu_count
@@ -58,6 +58,6 @@ def control(
                 draw(result.scenarios, [run.figures for run in result.done if run.figures.subject == OWN], axes)
         written = [f"{name:<11}{path}" for name, path in (("report", report), ("map", axes)) if path is not None]
         print_result(as_json, result, [*in_words(result), *written], indent=1)
-        return 0 if result.passed else 3
+        return 0 if result.passed else 1
 
     carry_out(work, as_json)

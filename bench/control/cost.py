@@ -1,11 +1,10 @@
-"""CPU time of a controller step over the CPU time of a simulated block of the paper's rig."""
+"""Time of a controller step over the time to simulate a block of the paper's rig."""
 
 import time
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Records
 from bridge.kernel import kernel
 from bridge.wire.messages import BLOCK, COMMAND, TRACE
 from cockpit.run.closed_loop import ClosedLoop
@@ -15,24 +14,18 @@ from controller.records import build as controller_records
 from plant.records import build as plant_records
 from plant.simulate import run_blocks
 
-_BLOCKS = 4000  # of the paper's rig, vibrated for most of them
-_TURNS = 25
+_BLOCKS = 4000  # simulated blocks of the paper's rig, which vibrates in most of them
+_TURNS = 25  # measurements of each time, in turns; the shortest counts
 
 
 @kernel
-def _steps(
-    params: npt.NDArray[Any],
-    state: npt.NDArray[Any],
-    sensors: npt.NDArray[Any],
-    command: npt.NDArray[Any],
-    trace: npt.NDArray[Any],
-) -> None:
+def _steps(params: Records, state: Records, sensors: Records, command: Records, trace: Records) -> None:
     for i in range(sensors.shape[0]):
         step(params, state, sensors[i : i + 1], BLOCK, 0, sensors[i].t_ns, command, trace)
 
 
 def step_cost_ratio() -> float:
-    """Time of a step over time of a block of a vibrated rig, the least of several runs of each in turns."""
+    """Time of a controller step over time to simulate a block of a vibrated rig; each is the shortest of 25."""
     scenario = load_scenario("from-the-start", [])
     loop = ClosedLoop(scenario.rig, scenario.seed, scenario.controller, scenario.arm)
     sensors = loop.advance(_BLOCKS).sensors
@@ -52,7 +45,7 @@ def step_cost_ratio() -> float:
         run_blocks(params, state, drive_mps, frequency_Hz, amplitude_m, analogue, truth)
         return time.perf_counter() - begun_s
 
-    of_steps()  # compiled here
+    of_steps()  # the first call of each compiles its kernels
     of_blocks()
     turns = [(of_steps(), of_blocks()) for _ in range(_TURNS)]
     return min(steps_s for steps_s, _ in turns) / min(blocks_s for _, blocks_s in turns)

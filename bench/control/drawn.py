@@ -1,8 +1,7 @@
 """Axes drawn at random: unseen axes judge a controller better than the bank that it was developed with.
 
 Drive stiffness 0.013 to 50 N/um, mass 0.5 to 200 kg and feed 0.1 to 1.5 mm/s, each log-uniform. Only axes with stick-slip
-without control are kept. Every other one goes back and forth; a quarter has late commands, another
-eighth long blocks.
+without control are kept. Every second axis moves back and forth; 25 % have late commands, another 15 % long blocks.
 """
 
 import math
@@ -12,12 +11,12 @@ from typing import Any
 from bench.control.scenario import BankScenario, scenario_of
 
 AXES = 60
-_GIVE_M = 0.22e-6  # of the contact, F_s / k_t, as for the paper's steel
-_RAMP_S = 0.1
+_GIVE_M = 0.22e-6  # elastic deflection of the contact at breakaway, F_s / k_t, as for the paper's steel
+_RAMP_S = 0.1  # duration of each ramp of v_d at the ends of a stroke
 
 
 def drawn_axes(seed: int, count: int = AXES) -> list[BankScenario]:
-    """Scenarios of the family `drawn`; the same seed draws the same."""
+    """Scenarios of the family `drawn`; the same seed draws the same axes."""
     random = Random(seed)  # noqa: S311
     axes: list[BankScenario] = []
     while len(axes) < count:
@@ -38,7 +37,7 @@ def _axis(random: Random, back_and_forth: bool) -> dict[str, Any] | None:
     v_d, drop = _by_factors(random, 1e-4, 1.5e-3), random.uniform(0.1, 0.3)
     static_N = float(f"{mass_kg * random.uniform(2.0, 5.0):.3g}")
     stick_s, load_s = 2.0 * drop * static_N / (k_d * v_d), 2.0 * static_N / (k_d * v_d)
-    fastest = drop * static_N / math.sqrt(k_d * mass_kg) / v_d  # of a slip, over v_d
+    fastest = drop * static_N / math.sqrt(k_d * mass_kg) / v_d  # largest v_s of a slip, over v_d
     if fastest < 1.5 or not 1.5e-3 <= stick_s <= 8.0:
         return None
     words = f"{k_d * 1e-6:.3g} N/um, {mass_kg:.3g} kg, {v_d * 1e3:.3g} mm/s, F_s {static_N:.3g} N"
@@ -86,7 +85,7 @@ def _rig(mass_kg: float, static_N: float, drop: float) -> dict[str, Any]:
 
 
 def _loop(random: Random, rig: dict[str, Any]) -> str:
-    """Make the loop of some rigs worse; in words."""
+    """Give some rigs late commands or long blocks; return this as a text."""
     share = random.random()
     if share < 0.25:
         delay_s = random.choice([0.005, 0.01, 0.02])

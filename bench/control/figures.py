@@ -11,15 +11,13 @@ from bench.control.run import Judged, wrong_from
 from bench.control.scenario import BankScenario
 from bridge.wire import stickslip_pb2 as wire
 
-_SLOWEST_S = 0.012  # announcement that is soon enough whatever the noise
-_LEAST_SETTLED_S, _LEAST_MOVING_S = 45.0, 150.0
-_MOST_EXCITED, _LEAST_COVERED, _MOST_PROBED = 0.02, 0.9995, 0.02
-_BLIND_S, _CANNOT_HELP_S, _CANNOT_HELP_PERIODS = 1.0, 2.0, 3.0
-_ABOVE_S = 0.005
-
-
-_SAYS_SO = {"BLIND", "CANNOT_HELP", "HARMFUL"}
-_LEFT_ALONE = 0.1  # share of the slips without control
+_SLOWEST_S = 0.012  # delay of an announcement that is always allowed; noise allows more
+_LEAST_SETTLED_S, _LEAST_MOVING_S = 45.0, 150.0  # least motion to judge energy; to judge needless vibration
+_MOST_EXCITED, _LEAST_COVERED = 0.02, 0.9995  # bars: share of needless vibration; of blocks with v_a >= v_d
+_BLIND_S, _CANNOT_HELP_S, _CANNOT_HELP_PERIODS = 1.0, 2.0, 3.0  # latest BLIND; CANNOT_HELP, plus periods of stick-slip
+_ABOVE_S = 0.005  # longest time of v_a above 1.3 times the wanted; a block is added
+_SAYS_SO = {"BLIND", "CANNOT_HELP", "HARMFUL"}  # reasons that report that the controller does not help
+_LEFT_ALONE = 0.1  # share of the slips without control from which a run counts as not helped
 SILENT = "neither helps nor reports it"
 
 
@@ -31,35 +29,35 @@ class Figures(NamedTuple):
     subject: str
     expect: str
     duration_s: float
-    sticks: int  # that 5 sigma can see
-    recalled: int
-    delays_s: list[float]  # re-stick to announcement
-    late_ratios: list[float]  # the same over the allowed delay
+    sticks: int  # number of true sticks that 5 sigma of the noise show, or that were announced
+    recalled: int  # number of these sticks that were announced, or began in mode EXCITE
+    delays_s: list[float]  # from the begin of a stick to its announcement
+    late_ratios: list[float]  # these delays over the allowed delay
     false_claims: int
-    slips: int  # after the first announcement, and once the exciter can have come
+    slips: int  # slips after the first announcement, once v_a can have reached v_d
     surges: int
-    slips_on_the_way: int  # after the first announcement, before
-    slips_from_enabling: int
-    energy_ratio: float  # mean v_a^2 over mean v_d^2, moving time from enabling on
-    settled_ratio: float  # the same from 10 s after the first announcement on
-    excited_share: float  # of the moving time without BLIND
-    blind_share: float
+    slips_on_the_way: int  # slips and surges from the first announcement to that time
+    slips_from_enabling: int  # slips and surges from enabling on
+    energy_ratio: float  # mean v_a^2 over mean v_d^2 while the drive moves, from enabling on
+    settled_ratio: float  # mean v_a^2 over mean v_d^2 from 10 s after the first announcement on
+    excited_share: float  # vibrated share of the moving time without BLIND
+    blind_share: float  # share of the moving time with BLIND
     probe_share: float
-    covered: float  # blocks that can be covered
-    uncovered: float
+    covered: float  # number of blocks in EXCITE in which v_a can reach v_d
+    uncovered: float  # number of these blocks in which it does not
     above_s: float  # longest time of v_a above 1.3 times the wanted
     above_limit_s: float
-    twice_share: float  # of the excited time with v_a above 2 v_d
+    twice_share: float  # time with v_a above 2 v_d over the vibrated time
     moving_s: float
     error_rms_m: float
     error_peak_m: float
-    turns: int  # changes of sign of the drive
-    turn_stick_s: float  # the longest stick of the slide after one
-    quadrant_m: float  # the largest following error after one, over its mean over the rest of the stroke
-    words: dict[str, float]  # reason, and the moving time until it was given
-    counted_from_s: float  # from when on slips and surges are counted
+    turns: int  # reversals of the drive
+    turn_stick_s: float  # longest stick of the slide after a reversal
+    quadrant_m: float  # largest following error after a reversal, minus its mean over the rest of the stroke
+    words: dict[str, float]  # reasons of the controller, and the moving time until each was given
+    counted_from_s: float  # time from which slips and surges are counted
     failures: list[str]
-    oracle: Oracle | None  # of a run of the controller with slips or surges, also with such that count as no failure
+    oracle: Oracle | None  # result of the oracle, for a run of the controller with slips or surges, counted or not
 
 
 def refused(scenario: BankScenario, subject: str, why: str) -> Figures:
@@ -71,11 +69,11 @@ def refused(scenario: BankScenario, subject: str, why: str) -> Figures:
     return Figures(**(empty | given | lists | none))  # pyright: ignore[reportArgumentType]
 
 
-def figures(scenario: BankScenario, subject: str, judged: Judged, ours: bool) -> Figures:
+def figures(scenario: BankScenario, subject: str, judged: Judged, is_controller: bool) -> Figures:
     """The figures of a run.
 
     Args:
-        ours: whether the subject is the controller; only its states and words are judged.
+        is_controller: whether the subject is the controller; only its states and reasons are judged.
 
     """
     sums, events = judged.sums, judged.events
@@ -133,11 +131,11 @@ def figures(scenario: BankScenario, subject: str, judged: Judged, ours: bool) ->
         failures=[],
         oracle=None,
     )
-    return result._replace(failures=_failures(scenario, result, judged) if ours else _broken(judged))
+    return result._replace(failures=_failures(scenario, result, judged) if is_controller else _broken(judged))
 
 
 def _broken(judged: Judged) -> list[str]:
-    return [f"the rig cannot be stepped: no number after {judged.duration_s:.3f} s"] if judged.broken else []
+    return [f"the state of the rig is NaN or infinite after {judged.duration_s:.3f} s"] if judged.broken else []
 
 
 def _failures(scenario: BankScenario, run: Figures, judged: Judged) -> list[str]:
@@ -166,12 +164,12 @@ def _failures(scenario: BankScenario, run: Figures, judged: Judged) -> list[str]
     if expect == "not-needed" and run.moving_s >= _LEAST_MOVING_S and run.excited_share > _MOST_EXCITED:
         lines.append(f"vibrated {100 * run.excited_share:.1f} % of {run.moving_s:.0f} s of motion that needs none")
     if run.covered and 1.0 - run.uncovered / run.covered < _LEAST_COVERED:
-        lines.append(f"v_a below v_d in {100 * run.uncovered / run.covered:.2f} % of the blocks that can be covered")
+        lines.append(f"v_a below v_d in {100 * run.uncovered / run.covered:.2f} % of the blocks where it can reach v_d")
     if run.above_s > run.above_limit_s + 1e-9:
         at_s = judged.sums["above_at_s"]
         lines.append(
-            f"v_a above 1.3 times the wanted for {1e3 * run.above_s:.0f} ms from {at_s:.3f} s, not "
-            f"{1e3 * run.above_limit_s:.0f}"
+            f"v_a above 1.3 times the wanted for {1e3 * run.above_s:.0f} ms from {at_s:.3f} s; "
+            f"allowed: {1e3 * run.above_limit_s:.0f} ms"
         )
     if expect == "helped" and not _SAYS_SO & set(words) and _is_left_alone(scenario, run, judged):
         lines.append(
@@ -191,7 +189,7 @@ def _failures(scenario: BankScenario, run: Figures, judged: Judged) -> list[str]
 
 
 def _is_left_alone(scenario: BankScenario, result: Figures, judged: Judged) -> bool:
-    """Whether the last third of a run has a tenth or more of the slips that it would have without control, about."""
+    """Whether the last third of a run has about a tenth or more of the slips that it would have without control."""
     from_s = max(judged.duration_s * 2.0 / 3.0, result.counted_from_s)
     left_s = (judged.duration_s - from_s) * result.moving_s / max(judged.duration_s - scenario.enabled_from_s, 1e-9)
     many = _LEFT_ALONE * left_s / _period_s(scenario)
@@ -199,7 +197,7 @@ def _is_left_alone(scenario: BankScenario, result: Figures, judged: Judged) -> b
 
 
 def _period_s(scenario: BankScenario) -> float:
-    """A period of stick-slip at the slowest feed, roughly: the stick and half a swing of the slide on the drive."""
+    """Approximate period of stick-slip at the slowest feed: the stick and half a swing of the slide on the drive."""
     contact, drive = scenario.rig.contact, scenario.rig.drive
     swing_N = contact.static_force_N - contact.coulomb_force_N
     natural_s = 2.0 * math.pi * math.sqrt(scenario.rig.slide.mass_kg / drive.stiffness_N_per_m)

@@ -6,10 +6,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from bench.control.rules import step as rule_step
-from bridge.arrays import Floats
+from bridge.arrays import Floats, Records
 from bridge.guard.config import Level
 from bridge.kernel import kernel
-from bridge.wire.messages import Records
 from cockpit.run.closed_loop import ClosedLoop, Pair, Stretch, advancing
 from controller.config import ControllerConfig
 from plant.config import RigConfig
@@ -31,7 +30,7 @@ _advance_by_rule = advancing(_rule_answer)
 
 
 class Hum(NamedTuple):
-    """A sine on the force and on both positions, as mains and a carrier make it."""
+    """A sine on the force and on both positions, as from the mains or a carrier."""
 
     frequency_Hz: float
     force_N: float
@@ -43,10 +42,10 @@ class JudgedLoop(ClosedLoop):
 
     Args:
         rig: the rig file.
-        seed: of the sensor noise.
+        seed: seed of the sensor noise.
         subject: configuration of the controller, or parameters and memory of a rule.
-        hum: on the sensors; the noise must not be 0 where it has a size.
-        sees_blocks: first and last block from the present one on of which a rule that knows the truth knows v_d.
+        hum: sine on the sensors; force and position need noise above 0 where it is not 0.
+        sees_blocks: a rule that knows the truth vibrates for the largest |v_d| from first to last, in blocks from now.
 
     """
 
@@ -54,7 +53,7 @@ class JudgedLoop(ClosedLoop):
         self, rig: RigConfig, seed: int, subject: ControllerConfig | Pair, hum: Hum, sees_blocks: tuple[int, int]
     ) -> None:
         self._rule = None if isinstance(subject, ControllerConfig) else subject
-        if self._rule is not None:  # the guard must not limit a rival
+        if self._rule is not None:  # the guard must not end the vibration of a rival
             guard = rig.guard.model_copy(update={"loud_ratio": Level(alarm=1e12, abort=1e12)})
             rig = rig.model_copy(update={"guard": guard})
         config = subject if isinstance(subject, ControllerConfig) else ControllerConfig()
@@ -62,7 +61,7 @@ class JudgedLoop(ClosedLoop):
         self._hum, self._sees_blocks, self._velocity_mps = hum, sees_blocks, held_velocity(rig)
 
     def advance(self, blocks: int, operator_events: int = 0) -> Stretch:
-        """Advance by `blocks`; fewer come back where the rig's state became NaN or infinite."""
+        """Advance by `blocks`; fewer are returned if the rig's state became NaN or infinite."""
         if self._rule is None:
             return super().advance(blocks, operator_events)
         return self._advance(_advance_by_rule, (*self._rule, self._known_mps(blocks)), self._draw(blocks))
@@ -80,7 +79,7 @@ class JudgedLoop(ClosedLoop):
         return inputs
 
     def _known_mps(self, blocks: int) -> Floats:
-        """Speed of the drive that the rules which know the truth vibrate for, [blocks]."""
+        """Largest |v_d| in `sees_blocks` of each block, for the rules that know the truth [m/s], [blocks]."""
         first, last = self._sees_blocks
         velocity_mps = self._velocity_mps((self.block + np.arange(blocks + last)) * self._rig.solver.block_s)
         return sliding_window_view(np.abs(velocity_mps[first:]), last - first + 1).max(axis=1)

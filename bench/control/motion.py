@@ -9,12 +9,12 @@ from bench.control.record import BINS, RING, SLIPPED, STUCK, SURGED
 from bridge.kernel import Record, kernel
 from bridge.wire.stickslip_pb2 import EXCITE
 
-_STICKS, _SLIDES = 0.1, 0.5  # of v_d: below, a stick begins; above, it ends
-_SETTLED = 1.1  # of v_d: below, a slip or surge has ended
-_SLOWING, _FASTER = 0.9, 1.2  # of the drive's largest speed; of the speed at which the slide was left behind
-_LEAST_STICK_S = 2e-3
-_REST_S = 0.02  # without drag; then a stick under a resting drive has ended
-_AFTERWARDS_S = 0.05  # after a stick's end; fast motion within it is the stick's slip
+_STICKS, _SLIDES = 0.1, 0.5  # sliding velocity over v_d: below the first a stick begins, above the second it ends
+_SETTLED = 1.1  # v_s over the recent largest v_d below which a slip or surge has ended
+_SLOWING, _FASTER = 0.9, 1.2  # v_d over its recent largest: below, it slows down; v_s over `late_mps`: above, it slips
+_LEAST_STICK_S = 2e-3  # shortest stick; shorter on a stiff axis, whose natural sticks are short
+_REST_S = 0.02  # time without drag after which a stick has ended because the drive rests
+_AFTERWARDS_S = 0.05  # time after a stick's end in which fast motion is the stick's slip
 _NO_EVENT, _SLIP, _SURGE, _SWING = range(4)  # _SWING: the slide's motion after an event; not counted
 
 
@@ -37,7 +37,7 @@ def put_stick(s: Record, events: npt.NDArray[np.float64], count: int) -> int:
 
 @kernel
 def natural_stick_s(p: Record, speed_mps: float) -> float:
-    """How long a stick of this rig lasts when nothing vibrates, about."""
+    """Approximate duration of a stick of this rig without vibration [s]."""
     return 2.0 * p.swing_N / (p.k_d * max(speed_mps, p.moves_mps))
 
 
@@ -64,9 +64,9 @@ def follow(
 
     Args:
         p, s: records of `bench.control.record`.
-        x_m, bristle_m, drive_m: place of the slide, deflection of the bristles, place of the drive.
+        x_m, bristle_m, drive_m: position of the slide, deflection of the bristles, position of the drive.
         whole_periods_s: the shortest window that holds whole periods of the exciter.
-        v_a_mps: of the base.
+        v_a_mps: true v_a of the base.
         events, count: where events are written, and their number.
 
     """
@@ -78,7 +78,7 @@ def follow(
     s.now_s = s.count * p.sample_s
     if s.count < 3:
         return count
-    # at a creep feed the window is as long as the contact's own give lasts
+    # at a creep feed the window is as long as the contact deflects elastically before it slides
     s.drive_now_mps = math.fabs(drive_m - before_m) / p.sample_s
     give_s = p.breakaway_m / max(s.drive_now_mps, p.moves_mps)
     window_s = whole_periods_s * max(math.ceil(give_s / whole_periods_s), 1.0)
@@ -95,7 +95,7 @@ def follow(
 
 @kernel
 def _drive(p: Record, s: Record, u_mps: float, events: npt.NDArray[np.float64], count: int) -> int:
-    """Direction and speed of the drive, and its largest speed within the natural period of the slide on it."""
+    """Update direction and speed of the drive, and its largest speed within a natural period of the slide."""
     s.speed_mps = math.fabs(u_mps)
     was_moving = s.moving
     s.moving = 1 if s.speed_mps > p.moves_mps else 0
@@ -127,7 +127,7 @@ def _drive(p: Record, s: Record, u_mps: float, events: npt.NDArray[np.float64], 
 def _stick(
     p: Record, s: Record, sliding_mps: float, window_s: float, newest: int, events: npt.NDArray[np.float64], count: int
 ) -> int:
-    """Begin and end of sticks, by the sliding velocity: the slide's without the bristles' deflection."""
+    """Detect begin and end of sticks, by the sliding velocity: v_s minus the rate of the bristles' deflection."""
     # at the end of a stroke, a drive below the motion threshold still drags its slide
     if s.speed_mps > 0.0 and sliding_mps < _SLIDES * s.speed_mps:
         s.dragged_s = s.now_s
@@ -152,7 +152,7 @@ def _stick(
         s.stick_mps = max(s.stick_mps, s.speed_mps)
         way_m, since_s = s.drive_m[newest] - s.stick_from_m, s.now_s - s.stick_s
         if s.needs_s < 0.0 and way_m * way_m * since_s >= p.seen_m2s:
-            # before the stick was known as one, at the mean speed since its begin
+            # time that 5 sigma need from the stick's begin, at the mean speed since then
             mean_mps = math.fabs(way_m) / since_s
             s.needs_s = (p.seen_m2s / (mean_mps * mean_mps)) ** (1.0 / 3.0) + 2.0 * p.block_s
     return count
@@ -160,8 +160,8 @@ def _stick(
 
 @kernel
 def _fast(p: Record, s: Record, v_a_mps: float, events: npt.NDArray[np.float64], count: int) -> int:
-    """Slips, which follow a stick, and surges, which do not."""
-    # a slide that is late to slow down with its drive is fast and becomes no faster
+    """Detect slips, which follow a stick, and surges, which do not."""
+    # a slide that slows down later than its drive is faster than v_d, but becomes no faster: not a slip
     if s.v_mps < p.slip_ratio * max(s.speed_mps, p.floor_mps):
         s.late_mps = 0.0
     elif s.late_mps == 0.0:

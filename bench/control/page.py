@@ -1,4 +1,4 @@
-"""The bench as one HTML page that needs nothing else: the table first, then each failure with its picture and its reason."""
+"""The bench as one HTML page without other files: the table first, then each failure with its picture and its reason."""
 
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from bridge.provenance import provenance
 
 
 def write_page(result: BankResult, path: Path) -> None:
-    """Write the page. Raises OSError where it cannot be."""
+    """Write the page. Raises OSError where it cannot be written."""
     about = {scenario.name: scenario.description for scenario in result.scenarios}
     failures = [_shown(run, about, run.figures.failures) for run in result.failed]
     explained = [
@@ -27,7 +27,7 @@ def write_page(result: BankResult, path: Path) -> None:
     subjects = list(dict.fromkeys(run.figures.subject for run in result.done))
     text = filled_page(
         Path(__file__).with_name("page.html.j2"),
-        f"The controller on {len(result.scenarios)} made scenarios",
+        f"The controller on {len(result.scenarios)} simulated scenarios",
         provenance().footer(),
         result=result,
         missed=sum(bar.holds is False for bar in result.bars),
@@ -45,7 +45,7 @@ def write_page(result: BankResult, path: Path) -> None:
 
 
 def _shown(run: Done, about: dict[str, str], lines: list[str]) -> dict[str, Any]:
-    """A run with its reasons and its picture."""
+    """A run with its lines of text and its picture, for the template."""
     return {
         "name": run.figures.scenario,
         "family": run.figures.family,
@@ -58,7 +58,7 @@ def _shown(run: Done, about: dict[str, str], lines: list[str]) -> dict[str, Any]
 
 
 def _first_wrong_s(run: Done) -> tuple[float, float]:
-    """When the run first missed a bar that has a time, and for how long; else the middle of it."""
+    """Begin and duration of the run's first failure that has a time [s]; without one, the middle of the run."""
     judged: Judged | None = run.judged
     if judged is None:
         return 0.0, 0.0

@@ -13,16 +13,17 @@ from bridge.wire.stickslip_pb2 import EXCITE, PROBE, STICK
 _INK, _RED, _BLUE, _GREEN, _PURPLE = "#1f2d3a", "#b5402a", "#2a6fb5", "#2e7d32", "#8e44ad"
 _SHADES: dict[int, str] = {EXCITE: "#dcebd8", PROBE: "#d5e3f0"}
 _FORCE, _SPEED, _DRIVE, _V_A, _STATE, _MODE = range(len(BLOCK_ROWS))
-_DETAIL_S, _LEAST_DETAIL_S, _DETAIL_LENGTHS = 0.5, 0.1, 12.0  # shown around the failure
+# Time shown around a failure: longest, shortest, and as a multiple of the failure's duration.
+_DETAIL_S, _LEAST_DETAIL_S, _DETAIL_LENGTHS = 0.5, 0.1, 12.0
 
 
 def picture(judged: Judged, at_s: float, length_s: float, oracle: Curves | None) -> str:
     """A PNG of a run, in base64.
 
     Args:
-        at_s: when it first went wrong.
-        length_s: for how long.
-        oracle: of the oracle at that time, if it was asked.
+        at_s: begin of the first failure, which the right side shows.
+        length_s: its duration.
+        oracle: curves of the oracle at that time; None: it was not run.
 
     """
     from matplotlib.figure import Figure
@@ -41,15 +42,15 @@ def picture(judged: Judged, at_s: float, length_s: float, oracle: Curves | None)
             each.spines[["top", "right"]].set_visible(False)
         upper.plot(t_s, curves.rows[:, _FORCE], color=_INK, linewidth=0.9)
         stuck = np.where(curves.rows[:, _STATE] == STICK, curves.rows[:, _FORCE], np.nan)
-        upper.plot(t_s, stuck, color=_RED, linewidth=1.6, label="called STICK")
+        upper.plot(t_s, stuck, color=_RED, linewidth=1.6, label="reported STICK")
         lower.plot(t_s, 1e3 * curves.rows[:, _SPEED], color=_INK, linewidth=0.8, label="slide")
         lower.plot(t_s, 1e3 * curves.rows[:, _DRIVE], color=_GREEN, linewidth=1.0, label="drive")
         lower.plot(t_s, 1e3 * curves.rows[:, _V_A], color=_BLUE, linewidth=1.0, label="v_a")
         if column == 1 and oracle is not None:
-            beside = _around(oracle, at_s, shown_s)
-            beside_s = beside.begin_s + beside.step_s * (np.arange(len(beside.rows)) + 1)
+            oracle_curves = _around(oracle, at_s, shown_s)
+            oracle_s = oracle_curves.begin_s + oracle_curves.step_s * (np.arange(len(oracle_curves.rows)) + 1)
             style = {"color": _PURPLE, "linewidth": 1.2, "linestyle": "--", "label": "slide, oracle"}
-            lower.plot(beside_s, 1e3 * beside.rows[:, _SPEED], **style)
+            lower.plot(oracle_s, 1e3 * oracle_curves.rows[:, _SPEED], **style)
         for each in (upper, lower):
             each.axvline(at_s, color=_RED, linewidth=0.8, linestyle=":")
         lower.set_xlabel("time [s]")
@@ -61,7 +62,7 @@ def picture(judged: Judged, at_s: float, length_s: float, oracle: Curves | None)
 
 
 def _around(curves: Curves, at_s: float, length_s: float) -> Curves:
-    """The part of the curves around a time."""
+    """The part of the curves around a time, `length_s` long."""
     first = max(int((at_s - 0.5 * length_s - curves.begin_s) / curves.step_s), 0)
     rows = curves.rows[first : first + max(int(length_s / curves.step_s), 20)]
     return Curves(curves.begin_s + first * curves.step_s, curves.step_s, rows)

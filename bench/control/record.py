@@ -1,17 +1,17 @@
-"""The numbers that the judge of a run works with, and its memory."""
+"""Parameters and memory of the judge of a run."""
 
 import math
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Records
 from bridge.kernel import record
 from plant.config import RigConfig
 
 # Kinds of events, and the columns after the kind:
-# STUCK: begin, end, largest |v_d|, time that 5 sigma need (-1: longer than it lasted), announcement (-1: none), 1 under EXCITE
-# SLIPPED, SURGED: begin, end, peak over v_d, v_a over v_d at the begin, mode, peak [m/s]
+# STUCK: begin, end, largest |v_d|, time in which 5 sigma show it (-1: never), announcement (-1: none), 1 if begun in EXCITE
+# SLIPPED, SURGED: begin, end, peak v_s over v_d, v_a over v_d at the begin, mode, peak v_s [m/s]
 # CLAIMED, a false stick: time, state, mode, reason, |v_d|, 0
 STUCK, SLIPPED, SURGED, CLAIMED = range(4)
 EVENT_COLUMNS: Final = 7
@@ -19,14 +19,14 @@ BLOCK_ROWS: Final = ("force_N", "velocity_mps", "drive_mps", "v_a_mps", "state",
 
 RING = 8192  # samples of the longest window: 0.4 s at 20 kHz
 BLOCK_RING = 512  # blocks of the longest loop delay
-BINS = 16  # in the time over which the drive's largest speed counts
-REASONS = 64  # more than there are
-# v_s / v_d that a pair without a drop of friction may reach at a start: the spring alone makes it 2
+BINS = 16  # bins of the time over which the drive's largest speed is kept
+REASONS = 64  # room for the reasons of the controller; it has fewer
+# v_s / v_d above which a pair without a drop of friction slips: at a start its spring alone causes 2
 _BESIDE_SPRING = 2.2
-_SLIP = 1.5
-_SIGMAS = 5.0
-_STIFF_BLOCKS = 20.0  # natural stick below which a controller may announce by the first slip that it sees
-_MOVES, _FLOOR = 0.02, 0.5  # of the slowest feed: above, the drive moves; below, v_d counts as this much in v_s / v_d
+_SLIP = 1.5  # v_s / v_d above which a pair with a drop of friction slips
+_SIGMAS = 5.0  # sigmas of the noise by which a stick must differ from smooth motion to be seen
+_STIFF_BLOCKS = 20.0  # natural stick, in blocks, below which its slip may announce it: a stiff axis
+_MOVES, _FLOOR = 0.02, 0.5  # over the slowest feed: speed above which the drive moves; least v_d in v_s / v_d
 
 SUMS: Final = (
     *("moving_s", "standing_s", "enabled_moving_s", "excited_s", "blind_s", "blind_excited_s", "probe_s", "twice_s"),
@@ -34,7 +34,7 @@ SUMS: Final = (
     *("covered", "uncovered"),  # blocks in EXCITE in which v_a can reach v_d, and the part of them in which it does not
     *("above_s", "above_at_s"),  # longest time of v_a above 1.3 times the wanted, and its begin
     *("first_s", "error_square", "error_peak_m"),
-    *("turns", "turn_stick_s", "quadrant_m"),  # reversals; the longest stick at one, the largest quadrant error
+    *("turns", "turn_stick_s", "quadrant_m"),  # number of reversals; longest stick and largest quadrant error after one
 )
 PARAMS = np.dtype(
     [
@@ -100,13 +100,13 @@ def seen_m2s(rig: RigConfig) -> float:
 
 def build(
     rig: RigConfig, slowest_mps: float, enabled_from_s: float, velocity_max_mps: float, blind: int
-) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+) -> tuple[Records, Records]:
     """Parameters and empty memory of the judge of one run.
 
     Args:
-        slowest_mps: the slowest feed of the run.
-        enabled_from_s: from when on the controller may vibrate.
-        velocity_max_mps: largest v_a that it may command.
+        slowest_mps: slowest feed of the run.
+        enabled_from_s: time from which the controller may vibrate.
+        velocity_max_mps: largest v_a that the controller may command.
         blind: number of the reason BLIND; -1 where the controller has none.
 
     """
@@ -128,9 +128,7 @@ def build(
     p.hold_s = max(0.01, p.natural_s)
     p.seen_m2s = seen_m2s(rig)
     p.enabled_from_s = enabled_from_s
-    p.late_blocks = (
-        round(rig.loop.longest_s(p.block_s) / p.block_s) + 1
-    )  # from a measurement to the block that it acts on
+    p.late_blocks = round(rig.loop.longest_s(p.block_s) / p.block_s) + 1  # from a measurement to the block it acts on
     p.stiff_stick_s = _STIFF_BLOCKS * p.block_s
     p.amplitude_max_m, p.velocity_max_mps = piezo.amplitude_max_m, velocity_max_mps
     p.slew_m_per_s = piezo.amplitude_slew_m_per_s if piezo.amplitude_slew_m_per_s > 0.0 else math.inf

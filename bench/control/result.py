@@ -16,15 +16,15 @@ from bridge.results import in_json
 from bridge.units import counted
 
 OWN = rules.NAMES[rules.CONTROLLER]
-_WIDTH = 2 + max(map(len, rules.NAMES.values()))  # of the column with the names of controller and rivals
+_WIDTH = 2 + max(map(len, rules.NAMES.values()))  # width of the column with the names of controller and rivals
 
 
 class BankResult(NamedTuple):
-    """The table, every run, and how long it took."""
+    """The table of bars, every run, and the elapsed time."""
 
     bars: list[Bar]
     done: list[Done]
-    least: dict[str, Least]  # of the long scenarios, by name
+    least: dict[str, Least]  # least constant v_a / v_d of the long scenarios, by name
     step_cost_ratio: float
     scenarios: list[BankScenario]
     elapsed_s: float

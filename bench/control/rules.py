@@ -1,7 +1,7 @@
 """The rivals of the controller: rules of a few lines that a machine builder would try first.
 
 They have the controller's interface without its estimator. v_d is the plain slope of the drive position, in both directions; a
-rule that needs the exciter's gain takes 1, the model's. Only `CONSTANT` and `ORACLE` know the truth: they hold a ratio of the
+rule that needs the exciter's gain assumes 1. Only `CONSTANT` and `ORACLE` know the truth: they hold a ratio of the
 true v_d with the true gain, `CONSTANT` for the search of the least ratio without slips, `ORACLE` for the limit of any controller
 (`bench.control.oracle`).
 """
@@ -10,8 +10,8 @@ import math
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Records
 from bridge.kernel import Record, kernel, record
 from bridge.wire.stickslip_pb2 import EXCITE, HELD, NOTHING_TO_DO, SMOOTH, WATCH
 from plant.config import RigConfig
@@ -31,15 +31,15 @@ NAMES: Final = {
 }
 RIVALS: Final = (NONE, MOVING, ALWAYS, FIXED, BURST)
 
-_RATIO = 1.2
-_WINDOW_S, _LONGEST_WINDOW = 0.04, 64  # of the slope of the drive position; blocks
-_PAPER_HZ, _PAPER_M = 4000.0, 2e-8
-_BURST_SIGMA, _LEAST_BURST_MPS2 = 8.0, 0.2  # of the rms of a block
-_BURST_HOLD_S, _BURST_BLANK_S = 10.0, 0.2  # how long one makes it vibrate; after that none counts, as the exciter fades
-_SIGMAS = 5.0  # of the measured v_d that count as motion
-_ABOVE_RESONANCE = 2.2  # of the contact: below it the v_a / v_d that stops stick-slip hangs on the damping
-_STROKE_SHARE = 0.8
-_CANDIDATES = 128
+_RATIO = 1.2  # v_a / v_d of the rules that follow v_d
+_WINDOW_S, _LONGEST_WINDOW = 0.04, 64  # window of the slope of the drive position [s]; its limit in blocks
+_PAPER_HZ, _PAPER_M = 4000.0, 2e-8  # frequency and amplitude of FIXED, as in the paper
+_BURST_SIGMA, _LEAST_BURST_MPS2 = 8.0, 0.2  # threshold of a block's rms acceleration: over its noise, least
+_BURST_HOLD_S, _BURST_BLANK_S = 10.0, 0.2  # vibration after a burst; then time without bursts, as the exciter fades
+_SIGMAS = 5.0  # sigmas of the noise of the measured v_d from which the drive moves
+_ABOVE_RESONANCE = 2.2  # frequency over contact resonance; below, the v_a / v_d needed depends on the damping
+_STROKE_SHARE = 0.8  # largest share of the stroke that a chosen frequency may need for the wanted v_a
+_CANDIDATES = 128  # most frequencies to choose from
 TWO_PI = 2.0 * math.pi
 
 PARAMS = np.dtype(
@@ -74,10 +74,10 @@ def frequencies_Hz(rig: RigConfig, forbidden_Hz: list[tuple[float, float]]) -> l
 
 
 def frequency_Hz(rig: RigConfig, candidates_Hz: list[float], ratio: float = _RATIO) -> float:
-    """The lowest candidate at which the stroke truly suffices at the highest speed of the profile; else the strongest.
+    """The lowest candidate whose true v_a suffices at the highest speed of the profile; else the candidate of largest v_a.
 
     Args:
-        ratio: of v_a over v_d that the stroke must suffice for.
+        ratio: v_a / v_d that the stroke must allow.
 
     """
     p: Any = plant_records(rig)[0][0]
@@ -95,12 +95,12 @@ def build(
     velocity_max_mps: float,
     candidates_Hz: list[float],
     ratio: float = _RATIO,
-) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+) -> tuple[Records, Records]:
     """Parameters and empty memory of a rule.
 
     Args:
-        candidates_Hz: the frequencies it may choose from, lowest first.
-        ratio: of v_a over v_d, for the rules that have one.
+        candidates_Hz: the frequencies that the rule may choose from, lowest first.
+        ratio: v_a / v_d, for the rules that follow v_d.
 
     """
     params, solver, sensors = record(PARAMS), rig.solver, rig.sensors
@@ -125,7 +125,7 @@ def build(
 
 @kernel
 def _velocity_mps(p: Record, s: Record, position_m: float) -> float:
-    """Least-squares slope of the last positions, means of a block each."""
+    """Least-squares slope of the mean positions of the last blocks [m/s]; 0 with fewer than 4."""
     s.position_m[s.at] = position_m
     s.at = (s.at + 1) % _LONGEST_WINDOW
     s.count = min(s.count + 1, p.window_blocks)
@@ -149,22 +149,22 @@ def _burst_mps2(mass_accel_mps2: Record) -> float:
 
 @kernel
 def step(
-    params: npt.NDArray[Any],
-    state: npt.NDArray[Any],
-    sensors: npt.NDArray[Any],
+    params: Records,
+    state: Records,
+    sensors: Records,
     t_ns: int,
     known_mps: float,
     gain: float,
-    command: npt.NDArray[Any],
-    trace: npt.NDArray[Any],
+    command: Records,
+    trace: Records,
 ) -> None:
     """Answer one sensor block by a rule, in place of `controller.core.step`.
 
     Args:
         params, state: one record each of `PARAMS` and `STATE`, the state is advanced.
         sensors, command, trace: one message record each; the last two are filled.
-        known_mps: true speed of the drive that the command is for, read by `CONSTANT` and `ORACLE` alone.
-        gain: v_a for one metre of commanded amplitude, true, read by these two alone.
+        known_mps: true |v_d| for which to vibrate, used by `CONSTANT` and `ORACLE` alone.
+        gain: true v_a for one metre of commanded amplitude [1/s], used by these two alone.
 
     """
     p: Record = params[0]

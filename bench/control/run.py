@@ -16,11 +16,11 @@ from cockpit.run.closed_loop import Pair
 from plant.config import RigConfig
 from plant.loop_delay import whole_blocks
 
-_STRETCH_S = 1.0
-_MOST_EVENTS = 20_000  # of a stretch
-_KEPT_STRETCHES = 4  # in which something went wrong, as curves
-_COARSE_S = 0.05  # between the points of the curve of the whole run
-_MOST_COARSE = 4000
+_STRETCH_S = 1.0  # length of a stretch
+_MOST_EVENTS = 20_000  # most events of a stretch; further events overwrite the last
+_KEPT_STRETCHES = 4  # most stretches with a failure that are kept as curves
+_COARSE_S = 0.05  # least time between the points of the curve of the whole run
+_MOST_COARSE = 4000  # most points of this curve
 
 
 class Subject(NamedTuple):
@@ -28,16 +28,16 @@ class Subject(NamedTuple):
 
     rule: int
     ratio: float = 1.2
-    ahead_s: float = 0.0  # how long before its command acts an oracle knows v_d; below 0: it sees the present v_d alone
+    ahead_s: float = 0.0  # time by which an oracle knows v_d before its command acts; below 0: it knows the present v_d
 
     @property
     def name(self) -> str:
-        """Of the table."""
+        """Name of the subject in the table."""
         return rules.NAMES[self.rule]
 
 
 class Curves(NamedTuple):
-    """Truth and traces of a part of a run, one row a block (or a mean of several); columns as `record.BLOCK_ROWS`."""
+    """Truth and traces of a part of a run, one row for each block, or for every n-th; columns as `record.BLOCK_ROWS`."""
 
     begin_s: float
     step_s: float
@@ -50,7 +50,7 @@ class Judged(NamedTuple):
     duration_s: float
     events: npt.NDArray[np.float64]
     sums: dict[str, float]
-    reasons: dict[str, tuple[float, float, float]]  # time of the run, moving time, excited time by then
+    reasons: dict[str, tuple[float, float, float]]  # time of run, motion, vibration until each reason
     loop_delay_s: float
     coarse: Curves
     kept: list[Curves]
@@ -60,11 +60,11 @@ class Judged(NamedTuple):
 def judge(
     scenario: BankScenario, subject: Subject, ends_at_slip_from_s: float = math.inf, keep_at_s: float = -1.0
 ) -> Judged:
-    """Run and judge. Raises Fault CONFIG where the controller refuses the scenario.
+    """Run a scenario and judge it. Raises Fault CONFIG where the controller refuses the scenario.
 
     Args:
         ends_at_slip_from_s: the run ends at the first slip or surge after this time.
-        keep_at_s: a time whose curves are kept, whatever happens then.
+        keep_at_s: time whose curves are kept in any case; below 0: none.
 
     """
     rig, bank = scenario.rig, scenario.bank
@@ -87,7 +87,7 @@ def judge(
 
 
 def _sees_blocks(rig: RigConfig, subject: Subject) -> tuple[int, int]:
-    """First and last block, from the present one on, whose largest |v_d| a rule that knows the truth vibrates for."""
+    """First and last block, in blocks from now: a rule that knows the truth vibrates for the largest |v_d| in them."""
     acts = 1 + whole_blocks(rig.loop.delay_s, rig.solver.block_s)
     if subject.rule != rules.ORACLE:
         return acts, acts

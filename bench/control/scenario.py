@@ -14,7 +14,7 @@ from cockpit.run.scenario_file import merged, with_rig
 from plant.config import RigConfig
 
 NotNegative = Annotated[float, Field(ge=0)]
-_AT_REST_MPS = 1e-5
+_AT_REST_MPS = 1e-5  # in place of the slowest feed of a drive that rests
 Expect = Literal["helped", "not-needed", "blind", "cannot-help"]
 
 
@@ -26,7 +26,7 @@ class HumConfig(Strict):
     position_m: NotNegative = 0.0
 
 
-class ToldConfig(Strict):
+class AssumedConfig(Strict):
     """The controller's settings of the rig, as ratios to the true values."""
 
     drive_stiffness_ratio: Annotated[float, Field(gt=0)] = 1.0
@@ -36,9 +36,9 @@ class BankConfig(Strict):
     """The keys of the bank, in addition to the tables of a scenario."""
 
     expect: Expect = "helped"
-    small: bool = Field(default=False, description="In `make test`.")
+    small: bool = Field(default=False, description="Part of the small bank, which `make test` runs.")
     hum: HumConfig = HumConfig()
-    told: ToldConfig = ToldConfig()
+    told: AssumedConfig = AssumedConfig()
 
 
 class BankScenario(NamedTuple):
@@ -49,32 +49,32 @@ class BankScenario(NamedTuple):
     description: str
     bank: BankConfig
     rig: RigConfig
-    table: dict[str, Any]  # of the whole scenario, with the controller's settings
+    table: dict[str, Any]  # tables of the whole scenario, with the controller's settings
     source: str
 
     @property
     def duration_s(self) -> float:
-        """Of the run."""
+        """Duration of the run."""
         return float(self.table.get("duration_s", 16.0))
 
     @property
     def seed(self) -> int:
-        """Of the sensor noise."""
+        """Seed of the sensor noise."""
         return int(self.table.get("seed", 1))
 
     @property
     def enabled_from_s(self) -> float:
-        """From when on the controller may vibrate."""
+        """Time from which the controller may vibrate."""
         return float(self.table["controller"].get("policy", {}).get("enabled_from_s", 0.0))
 
     @property
     def ever_enabled(self) -> bool:
-        """Whether the controller may vibrate at all; rivals that may not have nothing to show."""
+        """Whether vibration is allowed at any time of the run; without it rivals are not run."""
         return self.enabled_from_s < self.duration_s
 
     @property
     def slowest_mps(self) -> float:
-        """The slowest feed of the run; for a resting drive 1e-5 m/s, which a sensor sees at once."""
+        """The slowest feed of the run; for a resting drive 1e-5 m/s, which a sensor shows at once."""
         return min(self.rig.drive.speeds_mps(), default=_AT_REST_MPS)
 
     def scenario(self) -> Scenario:
@@ -117,11 +117,11 @@ def scenario_of(family: str, source: str, table: dict[str, Any]) -> BankScenario
     bank = validate(BankConfig, table.get("bank", {}), source)
     table = {key: value for key, value in table.items() if key != "bank"}
     rig = validate(RigConfig, table["rig"], source)
-    table |= {"controller": merged(_told(rig, bank.told), table.get("controller", {}))}
+    table |= {"controller": merged(_controller_table(rig, bank.told), table.get("controller", {}))}
     return BankScenario(family, str(table["name"]), str(table["description"]), bank, rig, table, source)
 
 
-def _told(rig: RigConfig, assumed: ToldConfig) -> dict[str, Any]:
+def _controller_table(rig: RigConfig, assumed: AssumedConfig) -> dict[str, Any]:
     """The controller's table that follows from the rig."""
     piezo = rig.piezo
     limits = {

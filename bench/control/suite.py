@@ -14,20 +14,20 @@ from bridge.faults import Fault
 from bridge.kernel_cache import compile_once
 
 R = TypeVar("R")
-_ASKED = {"helped", "cannot-help"}  # for these the oracle shows whether any controller could do better
+_ASKED = {"helped", "cannot-help"}  # the oracle shows whether any controller could slip less there
 
 
 class Done(NamedTuple):
     """One run of the bank."""
 
     figures: Figures
-    judged: Judged | None  # with curves, of a run of the controller that fails or slips
-    oracle: Curves | None = None  # of the oracle when the run first slips; None where it never does
-    first_s: tuple[float, float] | None = None  # when that slip or surge begins, and how long it lasts
+    judged: Judged | None  # events and curves of a run that fails or slips; None for the other runs
+    oracle: Curves | None = None  # the oracle's, at the first slip or surge of the run; None if not run
+    first_s: tuple[float, float] | None = None  # begin and duration of that slip or surge
 
 
 def warm_up(scenario: BankScenario) -> None:
-    """Compile or load the kernels before the processes begin, each of which would."""
+    """Compile or load the kernels once, before the processes begin: each process would compile them."""
     short = scenario._replace(table=scenario.table | {"duration_s": 2.0 * scenario.rig.solver.block_s})
     compile_once("the bench of the controller", lambda: judge(short, Subject(rules.NONE)))
 
@@ -44,26 +44,26 @@ def run_one(scenario: BankScenario, rule: int) -> Done:
         return Done(refused(scenario, subject.name, fault.line), None)
     result = figures(scenario, subject.name, judged, by_controller)
     if by_controller and result.expect in _ASKED and result.slips_from_enabling:
-        return _beside_oracle(scenario, result, judged)
+        return _with_oracle(scenario, result, judged)
     return Done(result, judged if result.failures else None)
 
 
-def _beside_oracle(scenario: BankScenario, result: Figures, judged: Judged) -> Done:
-    """A run with slips or surges, and whether any controller could be without: those that count, else all from enabling on."""
+def _with_oracle(scenario: BankScenario, result: Figures, judged: Judged) -> Done:
+    """A run with slips or surges and the oracle's result for them: for those that count, else for all from enabling on."""
     fails = result.expect == "helped" and result.slips + result.surges > 0
     from_s = result.counted_from_s if fails else scenario.enabled_from_s
     wrong = judged.events[wrong_from(judged.events, from_s)]
     first_s = float(wrong[0, 1]), float(wrong[0, 2] - wrong[0, 1])
     oracle, curves = ask(scenario, len(wrong), from_s, first_s[0])
     verdicts = [oracle.in_words(len(wrong))] if fails else []
-    failures = [*result.failures[:1], *verdicts, *result.failures[1:]]  # the first counts the slips
+    failures = [*result.failures[:1], *verdicts, *result.failures[1:]]  # the first line counts the slips
     return Done(result._replace(failures=failures, oracle=oracle), judged, curves, first_s)
 
 
 def run_bank(
     bank: Sequence[BankScenario], subjects: Sequence[int], jobs: int, progress: Callable[[float, str], None]
 ) -> list[Done]:
-    """All runs, scenario by scenario with every subject of it.
+    """Run every scenario with every subject; rivals only where vibration is ever allowed.
 
     Args:
         subjects: rules of `bench.control.rules`.

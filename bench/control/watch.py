@@ -1,7 +1,6 @@
 """Judge a stretch of a run: the true motion, and the controller's response to it."""
 
 import math
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -9,25 +8,25 @@ import numpy.typing as npt
 from bench.control.answer import add_up, announce, follow_turn, follow_vibration
 from bench.control.motion import follow
 from bench.control.record import RING
-from bridge.arrays import Floats
+from bridge.arrays import Floats, Records
 from bridge.kernel import Record, unlocked_kernel
 from plant.records import TRUTH
 
 _FORCE, _BRISTLE, _PLACE, _DRIVE = (
     TRUTH.index(f"true_{name}") for name in ("drive_force_N", "bristle_m", "position_m", "drive_position_m")
 )
-_SHAKING_MPS = 1e-9
+_SHAKING_MPS = 1e-9  # v_a above which the base counts as vibrating
 
 
 @unlocked_kernel
 def watch(
-    params: npt.NDArray[Any],
-    state: npt.NDArray[Any],
+    params: Records,
+    state: Records,
     truth: Floats,
     v_a_mps: Floats,
     frequency_Hz: Floats,
     gain: Floats,
-    traces: npt.NDArray[Any],
+    traces: Records,
     events: npt.NDArray[np.float64],
     rows: npt.NDArray[np.float32],
 ) -> int:
@@ -36,9 +35,9 @@ def watch(
     Args:
         params, state: one record each of `bench.control.record`; the state is advanced.
         truth: rows as `plant.records.TRUTH`, [blocks, 6, samples].
-        v_a_mps, frequency_Hz: of the base at the end of each block, true, [blocks].
+        v_a_mps, frequency_Hz: true v_a and frequency of the base at the end of each block, [blocks].
         gain: v_a for one metre of commanded amplitude at that frequency, [blocks].
-        traces: of the controller, [blocks].
+        traces: traces of the controller, [blocks].
         events: filled from the first row, [most, 7]; columns as in `bench.control.record`.
         rows: filled, [blocks, 6], columns as `BLOCK_ROWS`.
 

@@ -1,4 +1,4 @@
-"""One entry of the catalogue, from the truth of its run: safe, SILENT or UNSAFE.
+"""Judges one entry of the catalogue by the truth of its run: safe, SILENT or UNSAFE.
 
 The truth is the rig's: v_a of its base, the velocity of its drive and of its slide, and nothing that the controller measures.
 """
@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from bench.faults.truth import Truth, TruthRun
 from bridge.faults import Fault
 from bridge.log.in_charge import WEAK_S
 from bridge.wire import stickslip_pb2 as wire
@@ -22,23 +23,22 @@ from bridge.wire.topics import SENSORS, TRACE
 from cockpit.faults.catalogue import CatalogueEntry
 from cockpit.run.in_process import TimedAction
 from cockpit.run.scenario import load_scenario
-from cockpit.run.simulated.run import SimulatedRun, Truth
 from plant.faults.schedule import BEGAN, ENDED
 
 SAFE, SILENT, UNSAFE = "safe", "SILENT", "UNSAFE"
-MOST_RATIO, MOST_S = 1.5, 0.2  # v_a over its set point, and for how long in all
-_ARM_S = 0.02
+MOST_RATIO, MOST_S = 1.5, 0.2  # largest v_a over its set point, and longest total time above it
+_ARM_S = 0.02  # time of the operator's command ARM
 _MEMORY_S = 1.0  # the set point follows the fastest drive of this time: a vibration may outlast its move
-_AT_REST_MPS = 1e-9  # of v_a; the rounding error at the end of a ramp is far below
-_SLOWEST_MPS = 2e-5  # a set point below it is noise
-_SLIP_MPS = 0.01  # a slip of the paper's rig reaches 22 mm/s
-_LESS = 0.9  # of the vibration that the run has without the fault: less is an effect
-# events and causes of the guard that name no fault
+_AT_REST_MPS = 1e-9  # v_a up to which the base is at rest; the rounding error at the end of a ramp is far below
+_SLOWEST_MPS = 2e-5  # least set point of v_a; a smaller one would be noise
+_SLIP_MPS = 0.01  # v_s from which the slide slips; in a slip of the paper's rig it reaches 22 mm/s
+_LESS = 0.9  # share of the vibration without the fault below which the fault has an effect
+# codes of events and causes of the guard that do not report a fault
 _NOT_TOLD = {BEGAN, ENDED, "START", "END", "OPERATOR", "FRESH", "VIBRATION_BEGAN", "VIBRATION_ENDED", "RUN_ENDED"}
 
 
 class Told(NamedTuple):
-    """An event or reason, and its first time after the fault began [s]."""
+    """An event or reason, and the time from the begin of the fault to its first report [s]."""
 
     word: str
     after_s: float
@@ -53,12 +53,12 @@ class Outcome(NamedTuple):
     verdict: str
     why: str
     peak_ratio: float  # largest v_a over its set point
-    above_s: float  # time above 1.5 in all
-    zero_after_s: float | None  # from the begin until nothing vibrates any more; None: it vibrates to the end
-    slips: int  # from the begin
+    above_s: float  # total time above 1.5 times its set point
+    zero_after_s: float | None  # from the fault's begin to the end of the vibration; None: it does not end
+    slips: int  # number of slips after the fault's begin
     told: list[Told]
-    told_as: Told | None  # the first word that names the fault
-    open: str  # the known verdict, if not safe
+    told_as: Told | None  # first event or reason that names the fault, if in time
+    open: str  # known verdict of the entry, if not safe
 
     @property
     def as_known(self) -> bool:
@@ -68,7 +68,7 @@ class Outcome(NamedTuple):
 
 
 class Happened(NamedTuple):
-    """One run, from the begin of its fault."""
+    """Figures of one run, from the begin of its fault."""
 
     truth: Truth
     told: list[Told]
@@ -124,7 +124,7 @@ def _verdict(case: CatalogueEntry, ran: Happened, told_as: Told | None) -> tuple
 
 
 def _key(row: CatalogueEntry) -> Any:
-    """The inputs of a run without the fault."""
+    """The entry without its fault: the key of the run for comparison, which several entries share."""
     return row.entry.model_copy(update={"name": "", "about": "", "fault": [], "told": None, "open": "", "zero_s": None})
 
 
@@ -137,18 +137,22 @@ def _run(case: CatalogueEntry, with_faults: bool) -> Happened:
     entry = case.entry
     seconds = entry.begin_s + entry.watch_s
     scenario = load_scenario(entry.scenario, [*case.settings, f"duration_s={seconds}"])
-    if with_faults:
-        scenario = scenario.model_copy(update={"fault": case.faults})
+    faults = [
+        table.model_copy(update={"name": table.name or entry.name, "from_s": entry.begin_s + table.from_s})
+        for table in entry.fault
+    ]
+    scenario = scenario.model_copy(update={"arm": not entry.checked} | ({"fault": faults} if with_faults else {}))
     words = [
         TimedAction(round((entry.begin_s + word.at_s) * 1e9), wire.Operator.Action.Value(word.word))
         for word in entry.said
     ]
     if entry.checked:
         words.append(TimedAction(round(_ARM_S * 1e9), wire.Operator.ARM))
-    run = SimulatedRun(scenario, words, arm=not entry.checked)
+    run = TruthRun(scenario, words)
     ear = _Ear(entry.begin_s, scenario.controller.block_s)
     run.listen(ear)
-    truth = run.play()
+    run.play()
+    truth = run.truth
     words_heard = ear.told()
     words_heard += [Told(fault.kind.code, 0.0) for fault in run.ended.values()]
     after = truth.t_s > entry.begin_s
@@ -173,13 +177,13 @@ def _run(case: CatalogueEntry, with_faults: bool) -> Happened:
 
 
 def _fastest(values: npt.NDArray[np.float64], width: int) -> npt.NDArray[np.float64]:
-    """Largest of the last `width` values, at each."""
+    """Largest of each value and the `width` - 1 values before it."""
     padded = np.concatenate([np.zeros(width - 1), values])
     return np.lib.stride_tricks.sliding_window_view(padded, width).max(axis=1)
 
 
 class _Ear:
-    """Hears the words of a run from the begin of its fault: events, the causes in them, and reasons that last."""
+    """Collects reports of a run from the begin of its fault: events, the causes in them, and reasons that last."""
 
     def __init__(self, begin_s: float, block_s: float) -> None:
         self._begin_ns = round(begin_s * 1e9)
@@ -215,7 +219,7 @@ class _Ear:
                 self._first.setdefault(word, after_s)
 
     def told(self) -> list[Told]:
-        """Each word once, in the order in which they came."""
+        """Each event, cause or reason once, with the time of its first report, in this order."""
         return [Told(word, after_s) for word, after_s in self._first.items()]
 
 
@@ -228,7 +232,7 @@ def _word(event: wire.Event) -> str:
 
 
 def refused(case: CatalogueEntry, fault: Fault) -> Outcome:
-    """Of an entry that no run could be made of."""
+    """The outcome of an entry whose run could not be made."""
     entry = case.entry
     why = f"not run: {fault.line}"
     return Outcome(case.group, entry.name, entry.about, UNSAFE, why, 0.0, 0.0, None, 0, [], None, entry.open)

@@ -16,7 +16,7 @@ rig itself, not from the controller's measurements.
 * **safe**: v_a is above {MOST_RATIO:g} times its set point for {MOST_S:g} s at most in all, at zero in time where a stop is due,
   and an event or reason reports the fault in time; or no report is needed, and the run equals the run without the fault.
 * **SILENT**: bounded, but control, data or protection is lost without a report.
-* **UNSAFE**: more vibration, or a longer one.
+* **UNSAFE**: more or longer vibration than that.
 
 The set point is `limits.v_ratio` times the true velocity of the drive. Columns: largest v_a over its set point; time above
 {MOST_RATIO:g} times; time until nothing vibrates any more, where it ends; slips after the begin; the first report of

@@ -21,7 +21,7 @@ class FaultBench(NamedTuple):
 
     @in_json
     def counts(self) -> dict[str, int]:
-        """How many of each verdict."""
+        """Number of entries by verdict."""
         counts = Counter(outcome.verdict for outcome in self.outcomes)
         return {verdict: counts[verdict] for verdict in (SAFE, SILENT, UNSAFE)}
 
@@ -32,7 +32,7 @@ class FaultBench(NamedTuple):
 
     @in_json
     def worse_than_known(self) -> list[str]:
-        """Names of these entries."""
+        """Names of the entries that are worse than their known verdict."""
         return [outcome.name for outcome in self.worse]
 
     def in_words(self) -> list[str]:
@@ -69,7 +69,7 @@ def bench(catalogue: Sequence[CatalogueEntry], jobs: int, progress: Callable[[fl
 
     Args:
         catalogue: the entries.
-        jobs: processes.
+        jobs: number of processes.
         progress: called with the share done and a line on the last entry.
 
     """

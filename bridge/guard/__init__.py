@@ -9,9 +9,8 @@ It is a process stop and no safety function: an emergency stop belongs in the su
     estimates  drive velocity and vibration velocity, from the rig's own samples
     check    the loop check: sensors live, exciter answers, its gain
     core     `accept` a command, `look` at a block, `allow` a vibration
-    latch    the operator's stop, kept over restarts
+    kept     the operator's stop and the accepted exciter gain, kept over restarts
     events   events of a rig's guard
-    kept_gain  the accepted exciter gain of a rig's loop check, kept over restarts
     received valid commands of the bus, in order
 
 `core` and its callees are pure: no clock, no file, no bus. A device adapter calls them as `plant.step` does.

@@ -5,29 +5,19 @@ import math
 from bridge.guard.states import enter, trip
 from bridge.kernel import Record, kernel
 from bridge.layouts import GuardMemory, GuardParams, SensorRow
-from bridge.wire.stickslip_pb2 import (
-    ARMED,
-    CHECK_PASSED,
-    EXCITER_SILENT,
-    EXCITER_WILD,
-    FIRST_CHECK,
-    GAIN_CHANGED,
-    READY,
-    SENSOR_FROZEN,
-    SENSOR_NOT_FINITE,
-)
+from bridge.wire import stickslip_pb2 as wire
 
 _TWO_PI = 2.0 * math.pi
 _QUIET_S = 0.5  # time before the first tone, at rest; long enough for a 16-bit converter to show some noise
 _TONE_S = 0.2  # time per tone; its first half, the start of the exciter, is not measured
-_NOISY = 3  # number of channels, the first ones, that must show noise; an encoder at rest repeats its number
-_ANSWERS = 4.0  # power of the tone over power of the noise from which the exciter counts as answering
-_WILD = 20.0  # largest factor, either way, from the gain of a rigid mount; a mount may resonate tenfold
+_NOISY = 3  # the first 3 channels, force and accelerations, must show noise; an encoder at rest repeats its number
+_ANSWERS = 4.0  # power at the tone over power of the noise, from which the exciter counts as answering
+_WILD = 20.0  # largest plausible gain, and 1 over the smallest; a rigid mount has 1, a resonant one up to 10
 
 
 @kernel
 def check_tone(p: GuardParams, s: GuardMemory) -> tuple[float, float]:
-    """Frequency and amplitude of the check's present tone; amplitude 0 before the first and after the last tone."""
+    """Frequency [Hz] and amplitude [m] of the check's present tone; amplitude 0 before the first and after the last tone."""
     at = _tone(p, s.check_blocks)
     if at < 0 or at >= p.tones:
         return s.frequency_Hz, 0.0
@@ -66,7 +56,7 @@ def follow_check(p: GuardParams, s: GuardMemory, block: SensorRow, square_mps2: 
         or not _note(s, 3, block.mass_position_m)
         or not _note(s, 4, block.drive_position_m)
     ):
-        trip(s, SENSOR_NOT_FINITE)
+        trip(s, wire.SENSOR_NOT_FINITE)
     at = _tone(p, s.check_blocks)
     s.check_blocks += 1
     if at >= p.tones:
@@ -80,7 +70,7 @@ def follow_check(p: GuardParams, s: GuardMemory, block: SensorRow, square_mps2: 
             for channel in range(_NOISY):
                 if s.lowest[channel] == s.highest[channel]:
                     s.frozen_channel = channel
-                    trip(s, SENSOR_FROZEN)
+                    trip(s, wire.SENSOR_FROZEN)
         return
     done = (s.check_blocks - 1 - quiet_blocks) % tone_blocks
     if done == 0:
@@ -96,11 +86,11 @@ def _end(p: GuardParams, s: GuardMemory) -> None:
     """Compare the gain with the last accepted gain; arm if it is the same, or if none was accepted."""
     if s.accepted[0] == 0.0:
         s.accepted[:] = s.gain
-        enter(s, ARMED, FIRST_CHECK)
+        enter(s, wire.ARMED, wire.FIRST_CHECK)
     elif gain_change(p, s) > p.gain_change:
-        enter(s, READY, GAIN_CHANGED)
-    else:  # the accepted gain is kept, or small changes would add up
-        enter(s, ARMED, CHECK_PASSED)
+        enter(s, wire.READY, wire.GAIN_CHANGED)
+    else:  # the accepted gain is not updated: small changes would add up unnoticed
+        enter(s, wire.ARMED, wire.CHECK_PASSED)
 
 
 @kernel
@@ -118,9 +108,9 @@ def _judge(p: GuardParams, s: GuardMemory, at: int) -> None:
     omega = _TWO_PI * p.tone_Hz[at]
     s.gain[at] = math.sqrt(max(s.tone_mps2 - s.quiet_mps2, 0.0)) / (omega * omega * p.check_m)
     if s.tone_mps2 < _ANSWERS * s.quiet_mps2:
-        trip(s, EXCITER_SILENT)
+        trip(s, wire.EXCITER_SILENT)
     elif not 1.0 / _WILD < s.gain[at] < _WILD:
-        trip(s, EXCITER_WILD)
+        trip(s, wire.EXCITER_WILD)
     elif at == p.tones - 1:
         s.verified = 1
 

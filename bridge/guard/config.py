@@ -7,14 +7,14 @@ from pydantic import Field, model_validator
 from bridge.config import Strict, Two
 
 Positive = Annotated[float, Field(gt=0)]
-_LONGEST_S = 1e9  # 30 years; a far longer time overflows the count of blocks
+_LONGEST_S = 1e9  # longest time: 30 years; a far longer one overflows the count of blocks
 HoldTime = Annotated[float, Field(ge=0, le=_LONGEST_S)]
 Share = Annotated[float, Field(gt=0, le=1)]
 MOST_BANDS = 8  # most forbidden bands
 
 
 class Level(Strict):
-    """A limit: the command is held at `alarm`; above `abort` for `hold_s` the rig goes to FAULT."""
+    """A limit: a command is held at `alarm`, a measured value reported; above `abort` for `hold_s` the rig goes to FAULT."""
 
     alarm: Positive
     abort: Positive
@@ -28,62 +28,57 @@ class Level(Strict):
 
 
 class HeatConfig(Strict):
-    """The exciter's warming: losses pi tan(d) C f (u0 / s)^2, one thermal resistance, one time constant."""
+    """The exciter's warming: losses pi tan(d) C f (u0 / s)^2 of amplitude u0 at f, one thermal resistance, one time constant."""
 
-    capacitance_F: Positive = Field(default=8e-7, description="C of the stack.")
-    stroke_m_per_V: Positive = Field(default=7.8e-8, description="s of the stack.")
-    loss_tangent: Positive = Field(default=0.2, description="At large signal, ten times the data sheet's.")
-    resistance_K_per_W: Positive = Field(default=20.0, description="From the stack to its surroundings.")
-    time_s: Positive = Field(default=60.0, description="Time constant.")
-    rise_max_K: Positive = Field(default=30.0, description="Largest rise above the surroundings.")
-    alarm_share: Share = Field(default=0.8, description="Share of rise_max_K that is reported; at 1 the guard trips.")
+    capacitance_F: Positive = Field(8e-7, description="Capacitance C of the stack.")
+    stroke_m_per_V: Positive = Field(7.8e-8, description="Stroke per volt s of the stack.")
+    loss_tangent: Positive = Field(0.2, description="tan(d) at large signal, ten times the data sheet's.")
+    resistance_K_per_W: Positive = Field(20.0, description="Thermal resistance from the stack to its surroundings.")
+    time_s: Positive = Field(60.0, description="Time constant of the warming.")
+    rise_max_K: Positive = Field(30.0, description="Temperature rise above the surroundings at which the guard trips.")
+    alarm_share: Share = Field(0.8, description="Share of rise_max_K from which the warming is reported.")
 
 
 class GuardConfig(Strict):
-    """The guard of one rig. Stroke, frequencies and slew default to `[piezo]`; a value here may be narrower."""
+    """The guard of one rig. `[piezo]` gives its frequencies and slew, and its stroke and velocity if they are not set here."""
 
     stroke_m: Level | None = Field(
-        default=None, description="Commanded stroke. Not given: piezo.amplitude_max_m, abort at 1.5 times that."
+        None, description="Commanded stroke. Not given: piezo.amplitude_max_m, abort at 1.5 times that."
     )
     velocity_mps: Level | None = Field(
-        default=None, description="Commanded v_a. Not given: the v_a of the stroke at the highest frequency."
+        None, description="Commanded v_a. Not given: the v_a of the stroke at the highest frequency."
     )
     velocity_ratio: Level = Field(
-        default=Level(alarm=3.0, abort=4.0, hold_s=0.1),
-        description="Commanded v_a, by the checked gain, over the drive's velocity.",
+        Level(alarm=3.0, abort=4.0, hold_s=0.1),
+        description="Commanded v_a, times the gain of the loop check, over the drive's velocity.",
     )
     loud_ratio: Level = Field(
-        default=Level(alarm=3.0, abort=4.0, hold_s=0.1), description="Measured v_a over the drive's velocity."
+        Level(alarm=3.0, abort=4.0, hold_s=0.1), description="Measured v_a over the drive's velocity."
     )
     forbidden_Hz: Annotated[list[Two], Field(max_length=MOST_BANDS)] = Field(
-        default=[], description="Bands [low, high] without vibration."
+        [], description="Bands [low, high] without vibration."
     )
-    band_hold_s: HoldTime = Field(
-        default=0.2, description="Time of commands in a forbidden band until the guard trips."
-    )
-    duty: Level = Field(
-        default=Level(alarm=1.0, abort=1.0), description="Share of the time with vibration; 1: no limit."
-    )
-    duty_window_s: Positive = Field(default=60.0, description="Time constant of the duty.")
+    band_hold_s: HoldTime = Field(0.2, description="Time of commands at forbidden frequencies until the guard trips.")
+    duty: Level = Field(Level(alarm=1.0, abort=1.0), description="Share of the time with vibration; 1: no limit.")
+    duty_window_s: Positive = Field(60.0, description="Time constant of the duty.")
     heat: HeatConfig = HeatConfig()
     drive_memory_s: Positive = Field(
-        default=0.5,
-        description="Time constant of the memory of the drive's velocity: a vibration outlasts its move.",
+        0.5, description="Time constant of the memory of the drive's velocity: a vibration outlasts its move."
     )
     # The vibration is ramped to zero after 50 ms without a command; after this time it does not resume by itself. Smaller: with
     # 0.5 s a computer that stalls for 0.5 s leaves the axis without its controller until an operator arms it. Larger: with 1 s a
-    # controller restarted 1 s later (`controller-restarted` in deploy/faults) vibrates again, above 1.5 set points for 1.6 s.
+    # controller restarted 1 s later (`controller-restarted` in deploy/faults) vibrates again, v_a above 1.5 set points for 1.6 s.
     command_lost_s: Annotated[HoldTime, Field(gt=0)] = Field(
-        default=0.75, description="Time without a fresh command until the rig is DISARMED."
+        0.75, description="Time without a fresh command until the rig is DISARMED."
     )
     check_Hz: Annotated[list[Positive], Field(max_length=8)] = Field(
-        default=[], description="Frequencies of the loop check, rising. Not given: five over piezo's range."
+        [], description="Frequencies of the loop check, rising. Not given: five over piezo's range, none forbidden."
     )
     gain_change: Annotated[float, Field(ge=1.05, le=2.0)] = Field(
-        default=1.25,
+        1.25,
         description="Largest factor either way from the last accepted gain; beyond it the operator must accept the gain.",
     )
-    check_share: Share = Field(default=0.1, description="Amplitude of the loop check, as a share of the stroke.")
+    check_share: Share = Field(0.1, description="Amplitude of the loop check, as a share of the stroke.")
 
     @model_validator(mode="after")
     def _in_order(self) -> "GuardConfig":

@@ -8,16 +8,7 @@ from bridge.guard.limits import held, watch
 from bridge.guard.states import enter, note_vibration
 from bridge.kernel import kernel
 from bridge.layouts import CommandRow, GuardMemory, GuardParams, SensorRow
-from bridge.wire.stickslip_pb2 import (
-    ACTIVE,
-    ARMED,
-    ARMED_BY_SCENARIO,
-    CHECKING,
-    COMMAND_LOST,
-    DISARMED,
-    NO_CAUSE,
-    SLEW_RATE,
-)
+from bridge.wire import stickslip_pb2 as wire
 
 NO_COMMAND = -1  # NO_BLOCK of bridge.wire.messages as a signed number
 
@@ -48,30 +39,30 @@ def allow(p: GuardParams, s: GuardMemory, command_block: int, frequency_Hz: floa
         frequency_Hz, amplitude_m: the commanded vibration.
 
     """
-    s.limit = NO_CAUSE
+    s.limit = wire.NO_CAUSE
     s.fresh = 1 if command_block != NO_COMMAND and 0 <= s.block - command_block <= p.timeout_blocks else 0
     target_Hz, target_m = s.frequency_Hz, 0.0
-    if s.state in (ARMED, ACTIVE):
+    if s.state in (wire.ARMED, wire.ACTIVE):
         if s.fresh == 1:
             s.heard, s.lost_blocks = 1, 0
             target_Hz, target_m = frequency_Hz, held(p, s, frequency_Hz, amplitude_m)
         elif (
-            s.heard == 1 or s.cause != ARMED_BY_SCENARIO
-        ):  # an operator arms only with a controller; a simulated rig may wait for its controller
-            s.limit = COMMAND_LOST
+            s.heard == 1 or s.cause != wire.ARMED_BY_SCENARIO
+        ):  # not while a rig armed by its scenario waits for its controller; an operator arms only with one
+            s.limit = wire.COMMAND_LOST
             s.lost_blocks += 1
             if s.lost_blocks > p.lost_blocks:
-                enter(s, DISARMED, COMMAND_LOST)
+                enter(s, wire.DISARMED, wire.COMMAND_LOST)
         watch(p, s)
-        if s.state not in (ARMED, ACTIVE):
+        if s.state not in (wire.ARMED, wire.ACTIVE):
             target_m = 0.0
-    elif s.state == CHECKING:
+    elif s.state == wire.CHECKING:
         target_Hz, target_m = check_tone(p, s)
     if target_m > 0.0:
         s.frequency_Hz = target_Hz  # a fading vibration keeps its frequency
     slewed_m = min(max(target_m, s.amplitude_m - p.slew_m_per_block), s.amplitude_m + p.slew_m_per_block)
-    if slewed_m != target_m and s.limit == NO_CAUSE:
-        s.limit = SLEW_RATE
+    if slewed_m != target_m and s.limit == wire.NO_CAUSE:
+        s.limit = wire.SLEW_RATE
     s.amplitude_m = slewed_m
     note_vibration(s)
 
@@ -81,6 +72,6 @@ def look(p: GuardParams, s: GuardMemory, block: SensorRow) -> None:
     """Process the samples of the block that vibrated as `allow` set; the next block begins."""
     see_drive(p, s, block)
     see_vibration(p, s, block)
-    if s.state == CHECKING:
+    if s.state == wire.CHECKING:
         follow_check(p, s, block, s.square_mps2)
     s.block += 1

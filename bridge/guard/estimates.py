@@ -14,7 +14,7 @@ _PARTS = 5  # parts of the window for the drive's velocity
 def see_drive(p: GuardParams, s: GuardMemory, block: SensorRow) -> None:
     """Update the largest recent velocity of the drive [m/s], over 50 ms of its positions; it decays slowly.
 
-    A position jump affects at most two of five parts of the 50 ms, so the velocity is at most the median of the parts.
+    A position jump affects at most two of five parts of the 50 ms, so the velocity is limited to the median of the parts.
     """
     samples = block.drive_position_m.shape[0]
     mean_m = 0.0

@@ -5,16 +5,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Records
 from bridge.guard.records import LIMITS
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.stickslip_pb2 import FAULT, GAIN_CHANGED, READY, STOP_BY_PERSON, STOP_KEPT
 from bridge.wire.words import words
 
 _AGAIN_S = 1.0  # shortest time between two reports of the same limit
 _WATCHED = ("guard_state", "guard_limit", "fallback")
 
 
-def changes(applied: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+def changes(applied: Records) -> npt.NDArray[np.int64]:
     """Rows of `Applied` that may hold an event: the first, and each that differs from the row before."""
     new = np.zeros(len(applied), bool)
     new[:1] = True
@@ -30,7 +30,7 @@ class GuardEvents:
         self._help = {(word.column, word.number): f"{word.word}: {word.help}" for word in words()}
         self._state = -1
         self._limit = 0
-        self._missing = 1  # no event before the first command
+        self._missing = 1  # commands count as missing from the start: no event before the first one
         self._fallback = False
         self._reported_s: dict[int, float] = {}
 
@@ -50,10 +50,10 @@ class GuardEvents:
         if state != self._state:
             before = f"{wire.GuardState.Name(self._state)} -> " if self._state >= 0 else ""
             text = f"{before}{wire.GuardState.Name(state)}: {self._help[('cause', int(applied.cause))]}"
-            tripped = state == FAULT and int(applied.cause) not in (STOP_BY_PERSON, STOP_KEPT)
+            tripped = state == wire.FAULT and int(applied.cause) not in (wire.STOP_BY_PERSON, wire.STOP_KEPT)
             events.append(("FAULT" if tripped else "GUARD", text))
-            if (state, int(applied.cause)) == (READY, GAIN_CHANGED):
-                events.append(("GAIN_CHANGED", self._help[("cause", GAIN_CHANGED)].partition(": ")[2]))
+            if (state, int(applied.cause)) == (wire.READY, wire.GAIN_CHANGED):
+                events.append(("GAIN_CHANGED", self._help[("cause", wire.GAIN_CHANGED)].partition(": ")[2]))
         t_s = int(applied.t_ns) * 1e-9
         if limit != self._limit and limit in LIMITS and t_s - self._reported_s.get(limit, -_AGAIN_S) >= _AGAIN_S:
             self._reported_s[limit] = t_s

@@ -1,4 +1,4 @@
-"""The limits: each holds the command at its alarm level, and trips after too long a time above its abort level."""
+"""The limits: commands are held at the alarm level, measured values reported above it; too long above the abort level trips."""
 
 import math
 

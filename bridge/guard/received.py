@@ -26,15 +26,13 @@ class CommandQueue:
     def __init__(self, complaints: Complaints) -> None:
         self._complaints = complaints
         self._waiting: collections.deque[Received] = collections.deque(maxlen=WAITING)
-        self._pushed = 0  # written by the receiving thread alone
-        self._read = 0
-        self._lost = 0
+        self._lost = self._reported = 0  # the first is written by the receiving thread alone
         self._newest = 0  # block answered by the newest command
 
     def push(self, received: Received) -> None:
         """Add a command."""
+        self._lost += len(self._waiting) == WAITING  # the oldest drops out
         self._waiting.append(received)
-        self._pushed += 1
 
     def take(self, block: int) -> list[tuple[Received, int]]:
         """The commands since the last call, each with the block that it answers.
@@ -44,14 +42,11 @@ class CommandQueue:
         commands: list[tuple[Received, int]] = []
         for _ in range(len(self._waiting)):
             received = self._waiting.popleft()
-            self._read += 1
             answered = self.answered(received, block)
             if answered is not None:
                 commands.append((received, answered))
-        # received commands that were neither read nor wait; a command being added now counts at the next call
-        lost = self._pushed - self._read - len(self._waiting) - self._lost
-        if lost > 0:
-            self._lost += lost
+        if lost := self._lost - self._reported:
+            self._reported += lost
             self._complaints.note(FLOOD, COMMAND.name, "too many for one block: the oldest were dropped", lost)
         return commands
 

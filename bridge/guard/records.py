@@ -4,32 +4,18 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Records
 from bridge.guard.config import MOST_BANDS, GuardConfig, Level
 from bridge.kernel import record
+from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.channels import CHANNELS
-from bridge.wire.stickslip_pb2 import (
-    ARMED,
-    ARMED_BY_SCENARIO,
-    BAND,
-    DISARMED,
-    DRIVE_MAX,
-    DRIVE_RATIO,
-    DUTY,
-    FAULT,
-    HEAT,
-    LOUD,
-    OVERTRAVEL,
-    POWER_UP,
-    STOP_KEPT,
-)
 
-LIMITS = OVERTRAVEL, DRIVE_MAX, DRIVE_RATIO, LOUD, BAND, HEAT, DUTY  # limits with a level and a hold time
-FIRST = min(LIMITS)  # arrays with an entry per limit begin with this limit
+FIRST = wire.OVERTRAVEL  # arrays with an entry per limit begin with this limit
+LIMITS = range(FIRST, wire.DUTY + 1)  # limits with a level and a hold time
 MOST_TONES = 8  # most tones of a loop check
-RING = 256  # kept block means of the drive's position: more than 50 ms of blocks of 0.25 ms
-# Window of the drive's velocity. Shorter: noise; longer: a delay, which loosens a limit while braking.
+RING = 256  # stored block means of the drive's position: 64 ms of the shortest blocks, 0.25 ms; the window needs 50 ms
+# Window of the drive's velocity. Shorter: more noise. Longer: the velocity lags, so limits are too loose while the drive brakes.
 _DRIVE_WINDOW_S = 0.05
 _LOUD_FILTER_S = 0.01  # time constant of the measured v_a. Shorter: a slip that shakes the base counts as vibration
 _TONES = 5  # tones of a loop check without `check_Hz`
@@ -88,7 +74,7 @@ class ExciterLimits(NamedTuple):
 
 def build(
     config: GuardConfig, exciter: ExciterLimits, run: int, arm: bool = False, stop_kept: bool = False
-) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+) -> tuple[Records, Records]:
     """Parameters and state of a guard at power-up.
 
     Args:
@@ -106,17 +92,10 @@ def build(
     velocity = config.velocity_mps or Level(alarm=fastest_mps, abort=1.5 * fastest_mps)
     heat = Level(alarm=config.heat.alarm_share, abort=1.0, hold_s=0.0)
     band = Level(alarm=0.5, abort=0.5, hold_s=config.band_hold_s)
-    for limit, level in (
-        (OVERTRAVEL, stroke),
-        (DRIVE_MAX, velocity),
-        (DRIVE_RATIO, config.velocity_ratio),
-        (LOUD, config.loud_ratio),
-        (BAND, band),
-        (HEAT, heat),
-        (DUTY, config.duty),
-    ):
-        p.alarm[limit - FIRST], p.abort[limit - FIRST] = level.alarm, level.abort
-        p.hold_blocks[limit - FIRST] = round(level.hold_s / exciter.block_s)
+    levels = stroke, velocity, config.velocity_ratio, config.loud_ratio, band, heat, config.duty
+    for row, level in enumerate(levels):  # in the order of LIMITS
+        p.alarm[row], p.abort[row] = level.alarm, level.abort
+        p.hold_blocks[row] = round(level.hold_s / exciter.block_s)
     p.block_s, p.sample_s = exciter.block_s, exciter.block_s / exciter.samples_per_block
     p.slew_m_per_block = exciter.slew_m_per_s * exciter.block_s if exciter.slew_m_per_s > 0.0 else stroke.alarm
     p.frequency_min_Hz, p.frequency_max_Hz = exciter.frequency_min_Hz, exciter.frequency_max_Hz
@@ -125,7 +104,7 @@ def build(
     p.lost_blocks = round(config.command_lost_s / exciter.block_s)
     p.duty_share = 1.0 - math.exp(-exciter.block_s / config.duty_window_s)
     warm = config.heat
-    losses_W = math.pi * warm.loss_tangent * warm.capacitance_F / warm.stroke_m_per_V**2  # over f u0^2
+    losses_W = math.pi * warm.loss_tangent * warm.capacitance_F / warm.stroke_m_per_V**2  # losses over f u0^2 [W s/m^2]
     p.heat_per_Hz_m2 = losses_W * warm.resistance_K_per_W / warm.rise_max_K
     p.heat_share = 1.0 - math.exp(-exciter.block_s / warm.time_s)
     p.gain_change = config.gain_change
@@ -135,7 +114,10 @@ def build(
     p.bands = len(config.forbidden_Hz)
     for i, (low, high) in enumerate(config.forbidden_Hz):
         p.band_Hz[i] = low, high
-    tones = config.check_Hz or [float(tone) for tone in _tones(config, exciter)]
+    # without frequencies in the rig file: evenly over the exciter's range, none forbidden
+    spaced = np.linspace(exciter.frequency_min_Hz, exciter.frequency_max_Hz, _TONES + 2)[1:-1].tolist()
+    allowed = [tone for tone in spaced if not any(low <= tone <= high for low, high in config.forbidden_Hz)]
+    tones = config.check_Hz or allowed
     p.tones = len(tones)
     p.tone_Hz[: len(tones)] = tones
 
@@ -143,13 +125,7 @@ def build(
     s: Any = state[0]
     s.last_sequence = -1
     s.frequency_Hz = exciter.frequency_max_Hz
-    s.state, s.cause = (ARMED, ARMED_BY_SCENARIO) if arm else (DISARMED, POWER_UP)
+    s.state, s.cause = (wire.ARMED, wire.ARMED_BY_SCENARIO) if arm else (wire.DISARMED, wire.POWER_UP)
     if stop_kept:
-        s.state, s.cause = FAULT, STOP_KEPT
+        s.state, s.cause = wire.FAULT, wire.STOP_KEPT
     return params, state
-
-
-def _tones(config: GuardConfig, exciter: ExciterLimits) -> list[float]:
-    """Frequencies of the loop check, evenly over the exciter's range, none forbidden."""
-    spaced = np.linspace(exciter.frequency_min_Hz, exciter.frequency_max_Hz, _TONES + 2)[1:-1]
-    return [tone for tone in spaced if not any(low <= tone <= high for low, high in config.forbidden_Hz)]

@@ -2,29 +2,12 @@
 
 from bridge.kernel import kernel
 from bridge.layouts import GuardMemory
-from bridge.wire.stickslip_pb2 import (
-    ACTIVE,
-    ARMED,
-    ARMED_BY_PERSON,
-    CHECKING,
-    DISARMED,
-    DISARMED_BY_PERSON,
-    FAULT,
-    GAIN_ACCEPTED,
-    GAIN_CHANGED,
-    READY,
-    RESET_BY_PERSON,
-    RUN_ENDED,
-    STOP_BY_PERSON,
-    VIBRATION_BEGAN,
-    VIBRATION_ENDED,
-    Operator,
-)
+from bridge.wire import stickslip_pb2 as wire
 
 # orders to the guard; numba reads no values of the nested enum
-STOP, RESET, ARM, DISARM = Operator.STOP, Operator.RESET, Operator.ARM, Operator.DISARM
-ACCEPT_GAIN = Operator.ACCEPT_GAIN
-LEAVE = -1  # the rig's process ends
+STOP, RESET, ARM, DISARM = wire.Operator.STOP, wire.Operator.RESET, wire.Operator.ARM, wire.Operator.DISARM
+ACCEPT_GAIN = wire.Operator.ACCEPT_GAIN
+LEAVE = -1  # order at the end of the rig's process
 
 
 @kernel
@@ -39,8 +22,8 @@ def enter(s: GuardMemory, state: int, cause: int) -> None:
 @kernel
 def trip(s: GuardMemory, cause: int) -> None:
     """Go to FAULT until the operator resets it; the first cause is kept, except that the operator's stop replaces it."""
-    if s.state != FAULT:
-        enter(s, FAULT, cause)
+    if s.state != wire.FAULT:
+        enter(s, wire.FAULT, cause)
 
 
 @kernel
@@ -53,28 +36,28 @@ def apply_order(s: GuardMemory, order: int) -> bool:
     """
     before = s.state
     if order == STOP:
-        enter(s, FAULT, STOP_BY_PERSON)
+        enter(s, wire.FAULT, wire.STOP_BY_PERSON)
         return True
-    if order == RESET and before == FAULT:
-        enter(s, DISARMED, RESET_BY_PERSON)
+    if order == RESET and before == wire.FAULT:
+        enter(s, wire.DISARMED, wire.RESET_BY_PERSON)
     elif order in (ARM, ACCEPT_GAIN):
-        changed = before == READY and s.cause == GAIN_CHANGED
+        changed = before == wire.READY and s.cause == wire.GAIN_CHANGED
         if changed and order == ACCEPT_GAIN:
             s.accepted[:] = s.gain
-            enter(s, ARMED, GAIN_ACCEPTED)
-        elif changed or before == DISARMED or (before == ARMED and s.verified == 0):
-            enter(s, CHECKING, ARMED_BY_PERSON)
-        elif before == READY:
-            enter(s, ARMED, ARMED_BY_PERSON)
-    elif order in (DISARM, LEAVE) and before not in (DISARMED, FAULT):
-        enter(s, DISARMED, DISARMED_BY_PERSON if order == DISARM else RUN_ENDED)
+            enter(s, wire.ARMED, wire.GAIN_ACCEPTED)
+        elif changed or before == wire.DISARMED or (before == wire.ARMED and s.verified == 0):
+            enter(s, wire.CHECKING, wire.ARMED_BY_PERSON)
+        elif before == wire.READY:
+            enter(s, wire.ARMED, wire.ARMED_BY_PERSON)
+    elif order in (DISARM, LEAVE) and before not in (wire.DISARMED, wire.FAULT):
+        enter(s, wire.DISARMED, wire.DISARMED_BY_PERSON if order == DISARM else wire.RUN_ENDED)
     return before != s.state
 
 
 @kernel
 def note_vibration(s: GuardMemory) -> None:
     """ARMED becomes ACTIVE when the vibration starts, and ARMED again when it ends."""
-    if s.state == ARMED and s.amplitude_m > 0.0:
-        s.state, s.cause = ACTIVE, VIBRATION_BEGAN
-    elif s.state == ACTIVE and s.amplitude_m == 0.0:
-        s.state, s.cause = ARMED, VIBRATION_ENDED
+    if s.state == wire.ARMED and s.amplitude_m > 0.0:
+        s.state, s.cause = wire.ACTIVE, wire.VIBRATION_BEGAN
+    elif s.state == wire.ACTIVE and s.amplitude_m == 0.0:
+        s.state, s.cause = wire.ARMED, wire.VIBRATION_ENDED

@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 from mcap.opcode import Opcode
 
+from bridge.arrays import Records
 from bridge.log.chunk_messages import FIELDS_BYTES, HEAD, INDEX_ENTRY
-from bridge.wire.messages import Records
 
 
 class MessageRows(NamedTuple):

@@ -37,14 +37,6 @@ class Chunked(NamedTuple):
     indexes: list[bytes]  # contents of the index records after it, which may be missing, damaged or from another chunk
 
 
-class ChunkWalk(NamedTuple):
-    """The result of a walk through the records of a chunk."""
-
-    offsets: Column  # begins of the message records
-    others: list[tuple[int, bytes]]  # opcode and content of all other records
-    broken: int  # number of byte stretches without a whole record
-
-
 @dataclass(eq=False)
 class Messages:
     """Messages of some chunks in file order."""
@@ -73,7 +65,9 @@ class Messages:
         return self._rows(np.flatnonzero(np.isin(self.channel, channels)))
 
     def _rows(self, rows: Column) -> "Messages":
-        return Messages(self.data, _as_bytes(self.heads)[rows].view(HEAD), self.channel[rows], self.start[rows])
+        # without fields: numpy copies such elements whole, and records with fields field by field
+        heads = self.heads.view(f"V{HEAD.itemsize}")[rows].view(HEAD)
+        return Messages(self.data, heads, self.channel[rows], self.start[rows])
 
     def payloads(self, most: int | None = None) -> list[bytes]:
         """The payload of each message, or of the first `most` messages."""
@@ -96,15 +90,16 @@ def messages_of(chunks: Sequence[Chunked]) -> Messages:
     data = np.frombuffer(b"".join([chunk.data for chunk in chunks]), np.uint8)
     begins = np.array([0, *accumulate(len(chunk.data) for chunk in chunks)])
     offsets = _indexed(chunks, begins)
-    heads = _heads(data, offsets)
+    inside = len(offsets) and offsets[0] >= 0 and offsets[-1] <= len(data) - HEAD.itemsize
+    heads = cut(data, offsets, HEAD.itemsize).view(HEAD) if inside else None
     others: list[tuple[int, bytes]] = []
     broken = 0
     if heads is None or not _tile(begins, offsets, heads):
         walks = [_walked(chunk.data) for chunk in chunks]
-        offsets = np.concatenate([walk.offsets + begin for walk, begin in zip(walks, begins, strict=False)])
+        offsets = np.concatenate([walk[0] + begin for walk, begin in zip(walks, begins, strict=False)])
         heads = cut(data, offsets, HEAD.itemsize).view(HEAD)
-        others = [other for walk in walks for other in walk.others]
-        broken = sum(walk.broken for walk in walks)
+        others = [other for _, more, _ in walks for other in more]
+        broken = sum(stretches for _, _, stretches in walks)
     return Messages(data, heads, heads["channel"].copy(), offsets + HEAD.itemsize, others, broken)
 
 
@@ -120,13 +115,6 @@ def _indexed(chunks: Sequence[Chunked], begins: Column) -> Column:
     return np.sort(np.concatenate(parts), kind="stable") if parts else np.empty(0, np.int64)
 
 
-def _heads(data: Bytes, offsets: Column) -> npt.NDArray[Any] | None:
-    """The bytes at the offsets, read as heads of messages, [messages]; None if an offset lies outside of the data."""
-    if not len(offsets) or offsets[0] < 0 or offsets[-1] > len(data) - HEAD.itemsize:
-        return None
-    return cut(data, offsets, HEAD.itemsize).view(HEAD)
-
-
 def _tile(begins: Column, offsets: Column, heads: npt.NDArray[Any]) -> bool:
     """Whether the chunks consist of messages at these offsets and of nothing else, so that a walk gives the same result."""
     ends = offsets + _RECORD.size + heads["length"].astype(np.int64)
@@ -138,8 +126,12 @@ def _tile(begins: Column, offsets: Column, heads: npt.NDArray[Any]) -> bool:
     )
 
 
-def _walked(data: bytes) -> ChunkWalk:
-    """Walk the records of a chunk in order."""
+def _walked(data: bytes) -> tuple[Column, list[tuple[int, bytes]], int]:
+    """Walk the records of a chunk in order.
+
+    Returns the begins of the messages, opcode and content of all other records, and the number of byte stretches without a whole
+    record.
+    """
     offsets: list[int] = []
     others: list[tuple[int, bytes]] = []
     broken = 0
@@ -157,12 +149,7 @@ def _walked(data: bytes) -> ChunkWalk:
         else:
             broken += 1
         at = begin + length
-    return ChunkWalk(np.array(offsets, np.int64), others, broken)
-
-
-def _as_bytes(heads: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """The heads without fields: numpy copies such elements whole, and records with fields field by field."""
-    return heads.view(f"V{HEAD.itemsize}")
+    return np.array(offsets, np.int64), others, broken
 
 
 def cut(data: Bytes, starts: Column, size: int) -> npt.NDArray[Any]:

@@ -18,7 +18,7 @@ class Damage(NamedTuple):
     closed: bool  # the file has its footer
     bad_records: int = 0  # number of definitions, tables, messages or stretches of bytes that cannot be read
     nameless: int = 0  # messages of a channel whose definition is lost: their topic cannot be known
-    missing: int = 0  # messages by the statistics in the file, less the messages read
+    missing: int = 0  # messages that the file's statistics count but that were not read
     before: str = ""  # earlier losses of the log that this log was recovered from, as text
     first_bad: str = ""  # fault of the first complete message that cannot be read
 
@@ -28,7 +28,7 @@ class Damage(NamedTuple):
         return self.closed and not any(getattr(self, name) for name in _COUNTS)
 
     def and_also(self, **more: int) -> "Damage":
-        """Add counts to the given fields."""
+        """The damage with counts added to the given fields."""
         return self._replace(**{name: getattr(self, name) + count for name, count in more.items()})
 
 
@@ -41,7 +41,7 @@ def of_all_files(damages: list[Damage]) -> Damage:
 
 
 def also_before(damage: Damage, lost: str) -> Damage:
-    """Add an earlier loss, as text from the file."""
+    """The damage with an earlier loss of the log, a text from the file; a known one is not repeated."""
     known = damage.before.split("; ") if damage.before else []
     return damage if not lost or lost in known else damage._replace(before="; ".join([*known, lost]))
 
@@ -56,7 +56,7 @@ def lost_in_words(damage: Damage) -> str:
     if damage.nameless:
         parts.append(f"{counted(damage.nameless, 'message')} whose topic is lost with its definition")
     if damage.missing:
-        parts.append(f"{counted(damage.missing, 'message')} that the log's statistics count")
+        parts.append(f"{counted(damage.missing, 'message')} in its statistics, but not read")
     parts += ["its end"] if not (parts or damage.whole) else []
     return ", ".join(parts)
 

@@ -4,20 +4,20 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bridge.arrays import Records
 from bridge.log.finding import Finding
 from bridge.log.watches.arrays import median, steps
 from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.event_codes import WEAK_REASONS
-from bridge.wire.messages import Records
+from bridge.wire.messages import NO_BLOCK
 from bridge.wire.words import help_of
 
-NO_COMMAND = (1 << 64) - 1  # in `Applied.command_block`: no command, before the first one or while the rig ends its run
 # A longer fallback means that the controller is absent, not stalled. Smaller: a controller that stalls for 0.5 s counts as
 # absent. Larger: slips without a controller count as slips in a stall. The bus drops a frozen process after its lease, 1.5 s.
 GONE_S = 1.0
-UNANSWERED_SHARE = 0.01  # share of blocks without an answer that is still no fault; every busy desktop has some
-WEAK_S = 1.0  # longest total time of a reason for ineffective vibration that is still no fault
+UNANSWERED_SHARE = 0.01  # largest share of blocks without an answer that is not a fault; every busy desktop has some
+WEAK_S = 1.0  # longest total time of ineffective vibration for one reason that is not a fault
 _MOST_STRETCHES = 1000  # most stretches that a result lists; the total time includes all
 
 
@@ -29,7 +29,7 @@ class InCharge(NamedTuple):
     longest_fallback_s: float
     stretches: list[tuple[float, float]]  # from and until [s of the run], at most 1000
     unanswered: int  # blocks that no command answers, fallback included
-    answerable: int  # blocks from the first command on
+    answerable: int  # blocks that a command could answer: from the first answered block on
     controller_until_s: float | None  # last step of a controller that left before the end; None: it stayed
     reasons_s: dict[str, float]  # time of each reason for ineffective vibration
 
@@ -76,7 +76,7 @@ class ChargeWatch:
         self._fallbacks = 0
         self._fallback_ns = self._longest_ns = 0
         self._since_ns: int | None = None  # begin of the present fallback
-        self._leaving = False  # the present fallback ends the rig's run
+        self._leaving = False  # in the present fallback no command is in force: the rig ends its run
         self._commanded = False  # the rig has had a command
         self._block_ns = 0
         self._end_ns = self._last_block = 0
@@ -89,14 +89,14 @@ class ChargeWatch:
         self._reasons = dict.fromkeys(map(wire.Reason.Value, WEAK_REASONS), 0)
 
     def applied(self, records: Records) -> None:
-        """Take the states applied by the rig, [blocks]."""
+        """Add messages of /applied, [blocks]: they show fallback and the command in force."""
         if not len(records):
             return
         t_ns = records["t_ns"].astype(np.int64)
         if not self._block_ns:
             self._block_ns = int(median(np.diff(t_ns))) if len(t_ns) > 1 else int(t_ns[0])
         fallback = records["fallback"] != 0
-        without = records["command_block"] == np.uint64(NO_COMMAND)
+        without = records["command_block"] == np.uint64(NO_BLOCK)
         edges = np.flatnonzero(steps(fallback.view(np.int8), int(self._since_ns is not None)))
         for at in edges:
             if fallback[at]:
@@ -124,7 +124,7 @@ class ChargeWatch:
         return self._since_ns * 1e-9 if self._since_ns is not None and not self._leaving else None
 
     def command(self, records: Records) -> None:
-        """Take commands, [messages]."""
+        """Add messages of /command, [messages]: they show the answered blocks."""
         if not len(records):
             return
         numbers = records["sequence"].astype(np.int64)
@@ -140,7 +140,7 @@ class ChargeWatch:
         self._next_command = int(numbers[-1]) + 1
 
     def trace(self, records: Records) -> None:
-        """Take steps of the controller, [steps]."""
+        """Add messages of /trace, [steps]: they show the controller's last step and its reasons."""
         if not len(records):
             return
         self._steps_until_ns = max(self._steps_until_ns or 0, int(records["t_ns"].max()))

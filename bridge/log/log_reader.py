@@ -16,22 +16,14 @@ from mcap.opcode import Opcode
 from mcap.records import Chunk, Header, Metadata, Statistics
 
 from bridge.faults import Fault
+from bridge.log import chunk_bytes
 from bridge.log.chunk_messages import Chunked, Messages, messages_of
 from bridge.log.damage import Damage, also_before
+from bridge.log.definitions import Definitions
 from bridge.log.library import HEAD, MAGIC, READABLE, refuse_other_version
-from bridge.log.reading.chunk_bytes import (
-    LARGEST_CHUNK_BYTES,
-    UNREADABLE,
-    FileRecord,
-    next_chunk,
-    next_record,
-    opened,
-    unpacked,
-)
-from bridge.log.reading.definitions import Definitions
 from bridge.log.storage.parts import LOST, OF_FILES, parts_of
 
-# Largest ratio of uncompressed bytes to the size of the log, and an allowance for short logs. A message of zeros compresses to
+# Largest accepted ratio of uncompressed bytes to file size, and an allowance for short logs. A message of zeros compresses to
 # nothing but still costs 16 bytes of index, so even a block of 200 zeros per channel stays below 200.
 _LARGEST_RATIO = 200
 _ALLOWANCE_BYTES = 1 << 24
@@ -42,7 +34,7 @@ _DEFINITIONS = (Opcode.SCHEMA, Opcode.CHANNEL)
 _MOST_NAMES = 3  # schemas of another program that a message lists
 
 
-_Part = tuple[Chunk | bytes | None, list[bytes]]  # a chunk, or a message outside of chunks; the indexes after it
+_Part = tuple[Chunk | bytearray | None, list[bytes]]  # a chunk, or messages outside of chunks; the indexes after it
 
 
 class _Group(NamedTuple):
@@ -57,7 +49,7 @@ def _parsed(parts: list[_Part], end_bytes: int) -> _Group:
     """The messages of a group, and the number of its damaged chunks."""
     chunks: list[Chunked] = []
     for part, indexes in parts:
-        data = part if isinstance(part, bytes) else unpacked(part)
+        data = bytes(part) if isinstance(part, bytearray) else chunk_bytes.unpacked(part)
         if data is not None:
             chunks.append(Chunked(data, indexes))
     messages = messages_of(chunks) if chunks else None
@@ -149,10 +141,10 @@ class LogReader:
     def _groups(self, path: Path, size_bytes: int, before_bytes: int) -> Iterator[Messages]:
         # A second thread parses a group while the caller works on the previous group. With 2, 4 and 8 groups ahead no log is read
         # faster, and 8 hold 13 MB more. A definition waits in its place, so that it applies to the messages after it.
-        before: Future[_Group] | FileRecord | None = None
+        before: Future[_Group] | chunk_bytes.FileRecord | None = None
         with path.open("rb") as file, ThreadPoolExecutor(max_workers=1) as worker:
             for item in chain(self._items(file, worker, size_bytes), [None]):
-                if isinstance(before, FileRecord):
+                if isinstance(before, chunk_bytes.FileRecord):
                     self._learn(before.opcode, before.content)
                 elif before is not None:
                     messages, bad_chunks, end_bytes = before.result()
@@ -168,7 +160,7 @@ class LogReader:
 
     def _items(
         self, file: IO[bytes], worker: ThreadPoolExecutor, size_bytes: int
-    ) -> Iterator[Future[_Group] | FileRecord]:
+    ) -> Iterator[Future[_Group] | chunk_bytes.FileRecord]:
         """Groups of chunks, and the definitions between them, in file order."""
         if file.read(len(MAGIC)) != MAGIC:
             line = f"{self.path}: {size_bytes} bytes, no MCAP file (its first 8 bytes differ); give a run log"
@@ -178,7 +170,7 @@ class LogReader:
         waiting_bytes = 0  # uncompressed size of the parts, as the chunks claim
         indexes: list[bytes] | None = None  # index records of the previous chunk; None if another record followed it
         while not self.damage.closed:
-            record = next_record(file, at, size_bytes)
+            record = chunk_bytes.next_record(file, at, size_bytes)
             is_index = record is not None and record.opcode == Opcode.MESSAGE_INDEX and not record.is_chunk
             is_definition = record is not None and record.opcode in _DEFINITIONS and not record.is_chunk
             if parts and (is_definition or (waiting_bytes > AT_ONCE_BYTES and not is_index)):
@@ -196,14 +188,16 @@ class LogReader:
                 continue
             indexes = None
             if record.is_chunk:
-                chunk = opened(record.content)
+                chunk = chunk_bytes.opened(record.content)
                 self._refuse_inflated(chunk)
                 indexes = []
                 parts.append((chunk, indexes))
                 waiting_bytes += chunk.uncompressed_size if chunk is not None else 0
             elif record.opcode == Opcode.MESSAGE:
-                parts.append((HEAD.pack(Opcode.MESSAGE, len(record.content)) + record.content, []))
-                waiting_bytes += len(record.content)
+                if not (parts and isinstance(loose := parts[-1][0], bytearray)):
+                    parts.append((loose := bytearray(), []))
+                loose += HEAD.pack(Opcode.MESSAGE, len(record.content)) + record.content
+                waiting_bytes += HEAD.size + len(record.content)
             elif record.opcode == Opcode.FOOTER and len(record.content) == _FOOTER_BYTES:
                 # bytes after the end, or an incomplete one, would hide a wrong checksum of the file
                 self.damage = self.damage._replace(closed=file.read(len(MAGIC) + 1) == MAGIC)
@@ -226,8 +220,8 @@ class LogReader:
         self._claimed_bytes += chunk.uncompressed_size
         most_bytes = _ALLOWANCE_BYTES + _LARGEST_RATIO * self.size_bytes
         line = f"{self.path}: {self.size_bytes / 1e3:.0f} kB"
-        if chunk.uncompressed_size > LARGEST_CHUNK_BYTES:
-            rule = f"must be at most {LARGEST_CHUNK_BYTES / 1e6:.0f} MB"
+        if chunk.uncompressed_size > chunk_bytes.LARGEST_CHUNK_BYTES:
+            rule = f"must be at most {chunk_bytes.LARGEST_CHUNK_BYTES / 1e6:.0f} MB"
             line += f": holds a chunk of {chunk.uncompressed_size / 1e6:.0f} MB: {rule}"
         elif self._claimed_bytes > most_bytes:
             rule = f"must be at most {most_bytes / 1e6:.0f} MB for a log of its size"
@@ -253,7 +247,7 @@ class LogReader:
 
     def _after_damage(self, file: IO[bytes], from_bytes: int, size_bytes: int) -> int | None:
         """Start of the next whole chunk after bytes that cannot be read; None if no chunk follows."""
-        start = next_chunk(file, from_bytes + 1, size_bytes)
+        start = chunk_bytes.next_chunk(file, from_bytes + 1, size_bytes)
         if start is not None:
             self.damage = self.damage.and_also(bad_records=1)
             return start
@@ -278,7 +272,7 @@ class LogReader:
                     self.metadata[metadata.name] = dict(metadata.metadata)
             elif opcode == Opcode.STATISTICS:
                 self._stated = Statistics.read(stream).message_count
-        except UNREADABLE:
+        except chunk_bytes.UNREADABLE:
             self.damage = self.damage.and_also(bad_records=1)
         if opcode == Opcode.HEADER and self.header is not None:
             refuse_other_version(self.path, self.header.library)

@@ -1,7 +1,5 @@
 """A run log, whole or cut: its topics as arrays, at once or chunk by chunk."""
 
-import contextlib
-import mmap
 import os
 from collections import Counter
 from collections.abc import Callable, Container, Iterator, Sequence
@@ -13,27 +11,26 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from bridge.arrays import Indices
+from bridge.arrays import Indices, Records
 from bridge.faults import Fault
 from bridge.files import check_file
 from bridge.log.chunk_messages import Bytes, Messages
 from bridge.log.damage import Damage
+from bridge.log.definitions import DERIVED
 from bridge.log.log_reader import LogReader
 from bridge.log.metadata import configuration_of
-from bridge.log.reading.definitions import DERIVED
 from bridge.log.storage.checksums import Checksums, checksums_of
 from bridge.log.storage.parts import later_names
 from bridge.log.watches.arrays import median
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import ANNOUNCE, APPLIED, COMMAND, STATE, TRACE, Layout, Records, sensor_block
+from bridge.wire.messages import ANNOUNCE, APPLIED, COMMAND, STATE, TRACE, Layout, sensor_block
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import BY_NAME
 
 STREAMING = ("sensors", "applied", "command", "trace", "state", "announce")
 _LAYOUTS = {"applied": APPLIED, "command": COMMAND, "trace": TRACE, "state": STATE, "announce": ANNOUNCE}
-_DEFAULT_SAMPLES = 20
-_FIRST_BYTES = 1 << 26  # initial memory for a topic; a short run never outgrows it
-_COUNTED_BLOCKS = 100  # blocks whose samples are counted; a chunk of a run in real time holds as many
+_DEFAULT_SAMPLES = 20  # samples of a channel in a block, in a log without a readable block
+_COUNTED_BLOCKS = 100  # first blocks, which show the number of samples; a chunk of a run in real time holds as many
 
 
 class Piece(NamedTuple):
@@ -173,41 +170,11 @@ class RunData(NamedTuple):
         return configuration_of(self.headers, role, self.path)
 
 
-class _Stack:
-    """Bytes of one topic, joined piece by piece.
-
-    The memory grows without a copy, because the system moves its pages, so that a log is never in memory twice. Filling 40 MB
-    takes 10 ms of processor time in large pages and 30 to 80 ms in small ones.
-    """
-
-    def __init__(self) -> None:
-        self._memory = mmap.mmap(-1, _FIRST_BYTES, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
-        self._in_large_pages()
-        self._used = 0
-
-    def add(self, data: Bytes) -> None:
-        """Append bytes."""
-        end = self._used + len(data)
-        if end > len(self._memory):
-            self._memory.resize(2 * end)  # memory that is not filled costs nothing
-            self._in_large_pages()
-        np.frombuffer(self._memory, np.uint8)[self._used : end] = data
-        self._used = end
-
-    def _in_large_pages(self) -> None:
-        with contextlib.suppress(OSError):  # the system has no large pages
-            self._memory.madvise(mmap.MADV_HUGEPAGE)
-
-    def records(self, dtype: np.dtype[Any]) -> Records:
-        """All bytes as messages, [messages]."""
-        return np.frombuffer(self._memory, np.uint8)[: self._used].view(dtype)
-
-
 class _Tables:
     """Collects a log in memory. A topic is joined as bytes: numpy would join the fields and drop the tags between them."""
 
     def __init__(self) -> None:
-        self.stored = {name: _Stack() for name in STREAMING}
+        self.stored = {name: bytearray() for name in STREAMING}  # Linux enlarges long ones without a copy
         self.dtypes = {name: layout.dtype for name, layout in _LAYOUTS.items()}
         self.dtypes["sensors"] = sensor_block(_DEFAULT_SAMPLES).dtype
         self.messages: dict[str, list[Any]] = {name: [] for name in BY_NAME}
@@ -215,11 +182,12 @@ class _Tables:
     def add(self, topic: str, records: Records, _log_time_ns: Indices) -> None:
         """Take messages of a streaming topic, [messages]."""
         self.dtypes[topic] = records.dtype
-        self.stored[topic].add(np.frombuffer(records, np.uint8))
+        self.stored[topic] += records.view(np.uint8).data
 
     def add_others(self, topic: str, messages: Sequence[Any]) -> None:
         """Take messages of another topic."""
-        self.messages.setdefault(topic, []).extend(messages)
+        if topic in self.messages:
+            self.messages[topic].extend(messages)
 
 
 def read_run(path: Path) -> RunData:
@@ -229,7 +197,7 @@ def read_run(path: Path) -> RunData:
     checksums = feed(reader, tables)
     return RunData(
         path,
-        *(tables.stored[name].records(tables.dtypes[name]) for name in STREAMING),
+        *(np.frombuffer(tables.stored[name], tables.dtypes[name]) for name in STREAMING),
         snapshots=tables.messages["snapshot"],
         events=[event for role in ("plant", "controller", "recorder") for event in tables.messages["event/" + role]],
         headers=reader.metadata,

@@ -17,22 +17,9 @@ from typing import IO
 
 import numpy as np
 import zstandard
+from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
-from mcap.records import (
-    Channel,
-    Chunk,
-    ChunkIndex,
-    DataEnd,
-    Footer,
-    Header,
-    McapRecord,
-    Metadata,
-    MetadataIndex,
-    Schema,
-    Statistics,
-    SummaryOffset,
-)
 
 from bridge.log.block_rows import MessageRows
 from bridge.log.chunk_messages import FIELDS_BYTES
@@ -41,7 +28,7 @@ from bridge.log.library import MAGIC
 _MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 _INDEX_HEAD = struct.Struct("<BQHI")
 _INDEX_ENTRY = struct.Struct("<QQ")
-_INDEX_IN_MEMORY_BYTES = 1 << 16  # some 400 chunks. Larger: more memory; smaller: short runs need a temporary file
+_INDEX_IN_MEMORY_BYTES = 1 << 16  # longest index in memory, some 400 chunks; smaller: short runs need a temporary file
 _COPIED_BYTES = 1 << 18  # bytes of the temporary file that are copied at once
 
 
@@ -67,10 +54,10 @@ class OpenChunk:
         return {channel: sum(map(len, entries)) // _INDEX_ENTRY.size for channel, entries in self.entries.items()}
 
 
-def _encoded(*records: McapRecord) -> bytes:
+def _encoded(*parts: records.McapRecord) -> bytes:
     builder = RecordBuilder()
-    for record in records:
-        record.write(builder)
+    for part in parts:
+        part.write(builder)
     return builder.end()
 
 
@@ -95,13 +82,13 @@ class ChunkWriter:
         self._unsure = 0
         self._compress = zstandard.ZstdCompressor(level=1).compress
         self.more: Callable[[bytes, dict[int, list[bytes]]], MessageRows | None] | None = None
-        self._schemas: list[Schema] = []
-        self._channels: list[Channel] = []
-        self._metadata_indexes: list[MetadataIndex] = []
+        self._schemas: list[records.Schema] = []
+        self._channels: list[records.Channel] = []
+        self._metadata_indexes: list[records.MetadataIndex] = []
         self._counts: dict[int, int] = {}
         self._first_ns, self._last_ns = 0, 0
         self.open_chunk = OpenChunk()
-        self._write(MAGIC + _encoded(Header(profile="", library=library)))
+        self._write(MAGIC + _encoded(records.Header(profile="", library=library)))
 
     def _write(self, data: bytes | bytearray) -> None:
         self.crc = zlib.crc32(data, self.crc)
@@ -109,14 +96,14 @@ class ChunkWriter:
 
     def add_schema(self, name: str, encoding: str, data: bytes) -> int:
         """Define a schema, and return its id."""
-        schema = Schema(id=len(self._schemas) + 1, name=name, encoding=encoding, data=data)
+        schema = records.Schema(id=len(self._schemas) + 1, name=name, encoding=encoding, data=data)
         self._schemas.append(schema)
         self._write(_encoded(schema))
         return schema.id
 
     def add_channel(self, topic: str, encoding: str, schema_id: int, metadata: dict[str, str]) -> int:
         """Define a channel, and return its id."""
-        channel = Channel(
+        channel = records.Channel(
             id=len(self._channels) + 1,
             topic=topic,
             message_encoding=encoding,
@@ -130,8 +117,8 @@ class ChunkWriter:
 
     def add_metadata(self, name: str, fields: dict[str, str]) -> None:
         """Write a table of texts immediately, outside the chunks."""
-        data = _encoded(Metadata(name=name, metadata=fields))
-        index = MetadataIndex(offset=self._stream.tell(), length=len(data), name=name)
+        data = _encoded(records.Metadata(name=name, metadata=fields))
+        index = records.MetadataIndex(offset=self._stream.tell(), length=len(data), name=name)
         self._write(data)
         self._metadata_indexes.append(index)
 
@@ -165,7 +152,7 @@ class ChunkWriter:
             if more is not None:
                 self.add_rows(more)
                 data += more.data
-            chunk = Chunk(
+            chunk = records.Chunk(
                 compression="zstd",
                 data=self._compress(data),
                 message_start_time=open_chunk.first_ns,
@@ -182,7 +169,7 @@ class ChunkWriter:
                 body = b"".join(entries)
                 indexes += _INDEX_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(body), channel_id, len(body)) + body
             self._write(encoded + indexes)
-            index = ChunkIndex(
+            index = records.ChunkIndex(
                 message_start_time=chunk.message_start_time,
                 message_end_time=chunk.message_end_time,
                 chunk_start_offset=start,
@@ -196,7 +183,7 @@ class ChunkWriter:
             self._count(index)
         self._stream.flush()
 
-    def _count(self, index: ChunkIndex) -> None:
+    def _count(self, index: records.ChunkIndex) -> None:
         self._first_ns = min(self._first_ns, index.message_start_time) if self.chunks else index.message_start_time
         self._last_ns = max(self._last_ns, index.message_end_time)
         for channel_id, messages in self.open_chunk.counts().items():
@@ -222,20 +209,20 @@ class ChunkWriter:
         self.open_chunk = OpenChunk()
 
     def finish(self, index: bool = True) -> None:
-        """Write the open chunk, the index and the footer; without `index` the footer, 50 bytes: readers then scan the file."""
+        """Write the open chunk, the index and the footer; without `index` 50 bytes only: readers then scan the file."""
         self.flush()
-        self._stream.write(_encoded(DataEnd(data_section_crc=self.crc)))
-        footer = Footer(summary_start=0, summary_offset_start=0, summary_crc=0)
+        self._stream.write(_encoded(records.DataEnd(data_section_crc=self.crc)))
+        footer = records.Footer(summary_start=0, summary_offset_start=0, summary_crc=0)
         if index:
             footer.summary_start = at = self._stream.tell()
             crc = 0
-            offsets: list[SummaryOffset] = []
+            offsets: list[records.SummaryOffset] = []
             for opcode, parts in self._summary():
                 start = at
                 for part in parts:
                     crc = zlib.crc32(part, crc)
                     at += self._stream.write(part)
-                offsets.append(SummaryOffset(opcode, start, at - start))
+                offsets.append(records.SummaryOffset(opcode, start, at - start))
             last = _encoded(*offsets)
             self._stream.write(last)
             footer.summary_offset_start = at
@@ -247,7 +234,7 @@ class ChunkWriter:
 
     def _summary(self) -> Iterator[tuple[Opcode, Iterable[bytes]]]:
         """The groups of the index, each with its bytes in pieces."""
-        statistics = Statistics(
+        statistics = records.Statistics(
             attachment_count=0,
             channel_count=len(self._channels),
             channel_message_counts=self._counts,

@@ -61,14 +61,19 @@ def configuration_of(metadata: Metadata, role: str, path: Path) -> dict[str, Any
 
 def number_of(controller: Mapping[str, Any], key: str, path: Path) -> float:
     """A number at `key`, as in `policy.enabled_from_s`, of the controller's configuration. Raises Fault BAD_LOG."""
-    value: Any = controller
-    for part in key.split("."):
-        value = value.get(part) if isinstance(value, dict) else None
+    value = value_at(controller, key)
     least, rule = (0.0, "a positive number") if key == "block_s" else (-math.inf, "a number")
     if not is_number(value) or value <= least:
         line = f"{path}: configuration of the controller: must hold {key} as {rule}"
         raise Fault("BAD_LOG", f"{line}; see bridge/wire/PROTOCOL.md, Header")
     return float(value)
+
+
+def value_at(table: Any, key: str) -> Any:
+    """The value at `key`, as in `rig.drive.stiffness_N_per_m`, of nested tables of JSON; None if it is absent."""
+    for part in key.split("."):
+        table = table.get(part) if isinstance(table, Mapping) else None
+    return table
 
 
 def is_number(value: Any) -> bool:

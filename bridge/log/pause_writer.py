@@ -2,8 +2,8 @@
 
 import time
 
-from bridge.log.pause_events import CORE_PAUSE, NOT_WATCHED, PAUSE, WATCH, in_words
 from bridge.log.runlog import RunLog
+from bridge.log.watches.event_watch import CORE_PAUSE, NOT_WATCHED, PAUSE, WATCH, in_words
 from bridge.units import counted
 from bridge.wire.messages import APPLIED as APPLIED_LAYOUT
 from bridge.wire.pauses import Pause, PauseWatch

@@ -22,7 +22,7 @@ from bridge.wire.topics import CONTROLLER_EVENT, PLANT_EVENT, RECORDER_EVENT, TO
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
 
 _INBOX_LIMIT = 1 << 16  # messages, 16 s of a run at 4100 messages/s; smaller: messages are lost while the disk is busy
-_QUIET_S = 0.3  # silence after the last END from which no message can still arrive
+_QUIET_S = 0.3  # silence after the last END that ends the recording: no message is still on its way
 _PLANT_LOST_S = 1.0  # silence from which a plant that left the bus counts as lost
 _GIVEN_UP_S = 30.0  # longest wait for a lost rig; the recording then ends
 _LOOK_S = 0.05  # longest wait for a message; a stop and the end of a chunk are delayed by at most this
@@ -30,7 +30,6 @@ _STOP_S = 3.0  # longest recording after a stop; the plant fades out within 1 s,
 # Switch interval of Python's threads while both have work; the default is 5 ms. After a slow disk the loop works off its backlog:
 # with 5 ms the receiving thread takes only 200 of the 4100 messages per second, and the rig's link drops the others.
 _SWITCH_S = 5e-5
-_REPORT_S = 1.0  # shortest time between two reports of messages that did not fit into the inbox
 # events that are also printed for the operator
 _ALOUD = frozenset({"LOG_LOST", "LOG_REPLACED", "LOG_WRITE", "DISK_SLOW", "DROPPED"})
 
@@ -90,7 +89,7 @@ def run(
             log.add_header(headers[role])
         with contextlib.ExitStack() as ending:
             pauses = None
-            if lockstep:  # runs with plant and controller
+            if lockstep:  # without deadlines: the priority of plant and controller
                 realtime.claim(realtime.core(bus_config.port + 1), realtime.LOCKSTEP_PRIORITY)
             else:
                 realtime.claim(None, realtime.RECORDER_PRIORITY)
@@ -99,9 +98,7 @@ def run(
             bus.announce()
             report("running", f"recording all messages into {path}")
             complaints = Complaints(log.add_event)
-            dropped = _Dropped(log, inbox)
-            lost_plant = _record(log, bus, inbox, stop, pauses, dropped, complaints)
-            dropped.report(at_once=True)
+            lost_plant = _record(log, bus, inbox, stop, pauses, complaints)
             complaints.report_when_due(all_of_it=True)
             if pauses is not None:
                 pauses.finish()
@@ -121,7 +118,6 @@ def _record(
     inbox: Inbox,
     stop: threading.Event,
     pauses: PauseWriter | None,
-    dropped: "_Dropped",
     complaints: Complaints,
 ) -> bool:
     """Write until plant and controller have ended. Returns whether the plant left the bus without an END."""
@@ -129,11 +125,14 @@ def _record(
     ended: set[str] = set()
     heard_s = time.monotonic()
     seen = lost = False
+    dropped = 0
     until_s = math.inf
     while True:
         if stop.is_set():
             until_s = min(until_s, time.monotonic() + _STOP_S)
-        dropped.report()
+        if new := inbox.dropped - dropped:
+            complaints.note("DROPPED", "inbox", "message lost: the recorder was too slow", new)
+            dropped += new
         if time.monotonic() > until_s:
             return False
         asked_s = time.monotonic()
@@ -177,19 +176,3 @@ def _record(
             log.add_event("PLANT_LOST", f"{why}; waiting for it for {_GIVEN_UP_S:g} s")
         if lost and (pauses is None or quiet_s > _GIVEN_UP_S):
             return True
-
-
-class _Dropped:
-    """Reports messages that did not fit into the inbox, at most once a second."""
-
-    def __init__(self, log: RunLog, inbox: Inbox) -> None:
-        self._log, self._inbox = log, inbox
-        self._reported = 0
-        self._due_s = 0.0
-
-    def report(self, at_once: bool = False) -> None:
-        new = self._inbox.dropped - self._reported
-        if new and (at_once or time.monotonic() > self._due_s):
-            self._due_s = time.monotonic() + _REPORT_S
-            self._reported += new
-            self._log.add_event("DROPPED", f"{new} messages: the recorder was too slow")

@@ -8,10 +8,10 @@ from bridge.files import LOG, Replacement, check_file, refuse_to_replace
 from bridge.log.chunk_messages import Messages
 from bridge.log.damage import Damage, also_before, lost_in_words, of_all_files
 from bridge.log.library import LIBRARY
-from bridge.log.live import refuse_a_live_log
 from bridge.log.log_reader import LogReader
 from bridge.log.mcap_chunks import ChunkWriter
 from bridge.log.storage.checksums import checksums_of
+from bridge.log.storage.part_file import refuse_a_live_log
 from bridge.log.storage.parts import LOST, PART, RECOVERED, part_of, parts_of
 from bridge.log.storage.verdict_file import remove_verdict
 
@@ -53,7 +53,7 @@ class _Copy:
 
     def _new_id(self, channel_id: int) -> int | None:
         """Define a channel of the old log in the new log, and return its new number; None if its definition is lost."""
-        self.reader.topic(channel_id)  # searches for a missing definition
+        self.reader.topic(channel_id)  # takes a missing definition from the file's summary
         channel = self.reader.definitions.channels.get(channel_id)
         if channel is None:
             return None
@@ -87,7 +87,7 @@ class _Copy:
         self.writer.flush()
 
     def record_losses(self) -> None:
-        """Record losses and changes in the new log, which looks undamaged, so that no reader could find them later."""
+        """Record losses and changes in the new log, which looks undamaged: a reader cannot find them otherwise."""
         damage = self.damage()
         if words := lost_in_words(damage):
             damage = also_before(damage, f"{self.reader.path.name}: {words}")

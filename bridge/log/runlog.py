@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from bridge.arrays import Records
 from bridge.faults import Fault
 from bridge.log.block_rows import rows
 from bridge.log.mcap_chunks import ChunkWriter
@@ -16,13 +17,12 @@ from bridge.log.storage.verdict_file import remove_verdict
 from bridge.log.viewers import foxglove_log
 from bridge.log.viewers.scope import ScopeMaker
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import Records
 from bridge.wire.payloads import file_descriptor_set, parsed, sequence_and_time
 from bridge.wire.topics import RECORDER_EVENT, SCOPE, TOPICS, Topic
 
 # Duration of a chunk. Longer: a kill loses more (at most the open chunk, 0.25 s). Shorter: larger files.
 FLUSH_PERIOD_S = 0.1
-LARGEST_CHUNK_BYTES = 1 << 20  # ends a chunk earlier; lockstep may fill more than this in 0.1 s
+LARGEST_CHUNK_BYTES = 1 << 20  # size at which a chunk ends earlier; lockstep may fill more than this in 0.1 s
 _LATEST_MESSAGES = 256  # largest delay of a message, in numbers; a larger step back means that the sender restarted
 NO_ROTATION = Rotation()
 
@@ -53,7 +53,7 @@ class RunLog:
         self.t_ns = 0  # time of the latest message
         self._lockstep = lockstep
         self._on_event = on_event
-        self._next: dict[str, int] = {}
+        self._next: dict[str, int] = {}  # next expected number by topic
         self._events = 0
         self._holding: dict[str, str] = {}  # texts of events that are valid for the whole log, by code
         self._due_s = time.monotonic() + FLUSH_PERIOD_S
@@ -170,7 +170,7 @@ class RunLog:
         return event
 
     def repeat_events(self) -> None:
-        """Repeat the events that are valid for the whole log."""
+        """Write the events that are valid for the whole log again, into a file that replaces a lost one."""
         for code, text in self._holding.items():
             self.add_event(code, text)
 
@@ -183,7 +183,7 @@ class RunLog:
         writer.add_message(self._channels[topic.name], log_time_ns, payload, t_ns, sequence & 0xFFFFFFFF)
 
     def _repeat_event(self, event: wire.Event) -> None:
-        """Write an event for viewers."""
+        """Write an event again, in the topic that Foxglove shows as a list."""
         writer = self._files.writer
         if writer is not None:
             log_time_ns = event.t_ns if self._lockstep else time.time_ns()

@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from bridge.arrays import Indices
+from bridge.arrays import Indices, Records
 from bridge.log.finding import Finding, findings_at
 from bridge.log.watches.arrays import steps
 from bridge.units import counted
-from bridge.wire.messages import Records
 
 # Tolerance between t_ns and the message numbers; rounding to whole nanoseconds stays far below it.
 _CLOCK_TOLERANCE_NS = 1000

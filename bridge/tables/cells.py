@@ -1,6 +1,7 @@
 """Cells of a stored column as numbers or as times: any other cell is NaN, and a finding reports its place."""
 
 import calendar
+import contextlib
 import datetime as dt
 import re
 from collections.abc import Sequence
@@ -38,22 +39,34 @@ def numbers(values: Any, where: str, decimal: str, thousands: str) -> tuple[Floa
 
     Raises Fault BAD_TABLE if most cells are not numbers.
     """
-    if isinstance(values, pa.ChunkedArray):
-        kind: Any = values.type
-        if is_text(kind):
-            return _from_text(texts_of(values), where, decimal, thousands)
-        try:
-            return np.asarray(values.cast(pa.float64(), safe=False).to_numpy(), np.float64), []
-        except pa.ArrowException:
-            raise Fault("BAD_TABLE", f"{where}: is {kind}: must be numbers; name another column") from None
-    array = np.asarray(values)
-    if array.dtype.kind == "O":
-        return _from_text(["" if cell is None else str(cell) for cell in array.ravel()], where, decimal, thousands)
-    if array.dtype.kind in "US":
-        return _from_text([str(cell) for cell in array.ravel()], where, decimal, thousands)
+    array = _array_of(values)
+    if array.dtype.kind in "OUS":
+        return _from_text(texts_of(array), where, decimal, thousands)
     if array.dtype.kind not in "fiub":
         raise Fault("BAD_TABLE", f"{where}: is {array.dtype}: must be numbers; name another column")
     return array.astype(np.float64), []
+
+
+def _array_of(values: Any) -> Any:
+    """A stored column as an array of NumPy: texts are objects, Arrow's numbers and truth values are float64."""
+    if not isinstance(values, pa.ChunkedArray):
+        return np.asarray(values)
+    kind: Any = values.type
+    with contextlib.suppress(pa.ArrowException):
+        if not (pa.types.is_temporal(kind) or pa.types.is_string(kind) or pa.types.is_large_string(kind)):
+            return values.cast(pa.float64(), safe=False).to_numpy()
+    return values.to_numpy()
+
+
+def texts_of(cells: Any) -> list[str]:
+    """The cells of an array as texts; an empty cell is ""."""
+    return ["" if cell is None else _as_text(cell) for cell in cells.ravel()]
+
+
+def _as_text(cell: Any) -> str:
+    if isinstance(cell, dt.date | dt.time):
+        return cell.isoformat()
+    return cell.decode(errors="replace") if isinstance(cell, bytes) else str(cell)
 
 
 def number_in(text: str, decimal: str, thousands: str) -> float | None:
@@ -104,44 +117,20 @@ def seconds(values: Any, where: str) -> tuple[Floats | None, list[Finding]]:
 
     Dates, clock times and both are read; clock times continue over midnight.
     """
-    stamps: Any = None
-    if isinstance(values, pa.ChunkedArray):
-        kind: Any = values.type
-        if pa.types.is_timestamp(kind) or pa.types.is_date(kind):
-            stamps = values.cast(pa.timestamp("ns"), safe=False).cast(pa.int64()).to_numpy()
-        elif pa.types.is_time(kind):
-            times = [np.nan if time is None else _of_day(time) for time in values.to_pylist()]
-            stamps = _counted_on(np.asarray(times, np.float64)) * 1e9
-        elif pa.types.is_duration(kind):
-            stamps = values.cast(pa.duration("ns"), safe=False).cast(pa.int64()).to_numpy()
-        elif is_text(kind):
-            return _times_from_text(texts_of(values), where)
-    else:
-        array = np.asarray(values)
-        if array.dtype.kind == "M":
-            stamps = array.astype("datetime64[ns]").astype(np.int64)
-        elif array.dtype.kind == "m":
-            stamps = array.astype("timedelta64[ns]").astype(np.int64)
-        elif array.dtype.kind == "O" and len(array) and not isinstance(array[0], int | float):
-            return _times_from_text([_as_text(cell) for cell in array.ravel()], where)
-        elif array.dtype.kind in "US":
-            return _times_from_text([str(cell) for cell in array.ravel()], where)
-    if stamps is None:
+    array = _array_of(values)
+    kind = array.dtype.kind
+    if kind in "US" or (kind == "O" and len(array) and not isinstance(array[0], int | float)):
+        return _times_from_text(texts_of(array), where)
+    if kind not in "mM":
         return None, []
-    stamps = np.asarray(stamps)
-    started = stamps[np.isfinite(stamps)]
-    from_first = (stamps - started[0]) * 1e-9 if len(started) else stamps * 1e-9
-    return from_first.astype(np.float64), [_time_finding(where)]
+    filled = ~np.isnat(array)
+    stamps_ns = array.astype(f"{kind}8[ns]").astype(np.int64)
+    since_s = (stamps_ns - stamps_ns[filled][:1].sum()) * 1e-9
+    return np.where(filled, since_s, np.nan), [_time_finding(where)]
 
 
 def _time_finding(where: str) -> Finding:
     return Finding("time", where, "holds times: counted in seconds from the first row")
-
-
-def _as_text(cell: Any) -> str:
-    if isinstance(cell, dt.datetime | dt.date | dt.time):
-        return cell.isoformat()
-    return "" if cell is None else str(cell)
 
 
 def _times_from_text(texts: list[str], where: str) -> tuple[Floats | None, list[Finding]]:
@@ -151,7 +140,7 @@ def _times_from_text(texts: list[str], where: str) -> tuple[Floats | None, list[
     texts = [_with_numbers(text) for text in texts] if _BY_NAME.search(filled) else texts
     order = _order_of(texts)
     stamps = [_time_in(text, order) for text in texts]
-    # seconds of the calendar would lose the digits of microseconds
+    # counted from the first day: seconds of the calendar would lose the digits of microseconds
     began = next((day for day, _ in filter(None, stamps)), 0)
     if filled.count(":") > 2 and _counts_frames(texts):
         return None, []
@@ -233,15 +222,11 @@ def _time_in(text: str, order: str) -> tuple[int, float] | None:
         return day, 0.0
     if clock[4]:
         return day, 60.0 * int(clock[1]) + float((clock[2] + clock[4]).replace(",", "."))
-    hours, minutes, secs = int(clock[1]), int(clock[2]), _seconds_in(clock[3] or "0")
+    hours, minutes, (whole_s, _, milliseconds) = int(clock[1]), int(clock[2]), (clock[3] or "0").partition(":")
     if clock[5]:
         hours = hours % 12 + (12 if clock[5].lower() == "pm" else 0)
+    secs = float(whole_s.replace(",", ".")) + 1e-3 * float(milliseconds or 0.0)
     return day, 3600.0 * hours + 60.0 * minutes + secs
-
-
-def _seconds_in(text: str) -> float:
-    whole_s, _, milliseconds = text.partition(":")
-    return float(whole_s.replace(",", ".")) + 1e-3 * float(milliseconds or 0.0)
 
 
 def is_time(text: str) -> bool:
@@ -249,24 +234,8 @@ def is_time(text: str) -> bool:
     return any(_time_in(_with_numbers(text), order) is not None for order in _ORDERS)
 
 
-def _of_day(time: Any) -> float:
-    return 3600.0 * time.hour + 60.0 * time.minute + time.second + 1e-6 * time.microsecond
-
-
 def _counted_on(times_s: Floats) -> Floats:
     """Clock times that continue over midnight, and minutes and seconds that continue over the hour, [rows]."""
     around_s = _DAY_S if np.nanmax(times_s, initial=0.0) >= _HOUR_S else _HOUR_S
     back = np.concatenate([[0.0], np.diff(times_s)]) < -0.5 * around_s
     return times_s + np.cumsum(back) * around_s
-
-
-def is_text(kind: Any) -> bool:
-    """Whether an Arrow type holds texts."""
-    types = pa.types
-    return types.is_string(kind) or types.is_large_string(kind) or types.is_binary(kind) or types.is_large_binary(kind)
-
-
-def texts_of(column: Any) -> list[str]:
-    """The cells of an Arrow column of texts; an empty cell is ""."""
-    cells = (cell.decode(errors="replace") if isinstance(cell, bytes) else cell for cell in column.to_pylist())
-    return ["" if cell is None else cell for cell in cells]

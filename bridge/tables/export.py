@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pyarrow as pa
 
+from bridge.arrays import Records
 from bridge.faults import Fault
 from bridge.files import check_file, refuse_to_lose
 from bridge.log.damage import Damage
@@ -15,7 +16,6 @@ from bridge.log.log_reader import LogReader
 from bridge.log.logfile import STREAMING, block_period_ns, iter_pieces, sample_times_s
 from bridge.tables.writers import ArrowTable, Columns, MatFile, MatTable, TableWriter
 from bridge.wire.channels import CHANNELS
-from bridge.wire.messages import Records
 
 SUFFIXES = (".parquet", ".csv", ".mat")
 

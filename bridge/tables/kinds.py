@@ -6,7 +6,6 @@ from typing import Literal
 from bridge.faults import Fault
 
 Kind = Literal["text", "parquet", "mat", "hdf5", "tdms", "sheet", "mcap"]
-KINDS: tuple[Kind, ...] = ("text", "parquet", "mat", "hdf5", "tdms", "sheet", "mcap")
 _NUMPY = b"\x93NUMPY"
 _ZIP, _ZIP_NAME_LENGTH, _ZIP_NAME = b"PK\x03\x04", slice(26, 28), 30  # mark, and places of the first file's name
 _MARKS: tuple[tuple[bytes, Kind], ...] = (
@@ -27,20 +26,8 @@ _PACKED = (
     (b"Rar!", "RAR"),
 )
 _HDF5_AT = 512  # MATLAB v7.3 writes a head of 512 bytes before the HDF5 data
-_BY_SUFFIX: dict[str, Kind] = {
-    ".parquet": "parquet",
-    ".mat": "mat",
-    ".tdms": "tdms",
-    ".xlsx": "sheet",
-    ".xls": "sheet",
-    ".ods": "sheet",
-}
-
-
-def _first_in_archive(start: bytes) -> bytes:
-    """The name of the first file in a zip archive with these first bytes; empty for other files."""
-    length = int.from_bytes(start[_ZIP_NAME_LENGTH], "little") if start.startswith(_ZIP) else 0
-    return start[_ZIP_NAME : _ZIP_NAME + length]
+_BY_SUFFIX: dict[str, Kind] = {".parquet": "parquet", ".mat": "mat", ".tdms": "tdms"}
+_BY_SUFFIX |= dict.fromkeys((".xlsx", ".xls", ".ods"), "sheet")
 
 
 def kind_of(path: Path) -> Kind:
@@ -52,7 +39,8 @@ def kind_of(path: Path) -> Kind:
         start = file.read(_HDF5_AT + 8)
     if start[_HDF5_AT:].startswith(b"\x89HDF"):
         return "hdf5"
-    if start.startswith(_NUMPY) or _first_in_archive(start).endswith(b".npy"):
+    first_in_zip = start[_ZIP_NAME:][: int.from_bytes(start[_ZIP_NAME_LENGTH], "little")]
+    if start.startswith(_NUMPY) or (start.startswith(_ZIP) and first_in_zip.endswith(b".npy")):
         line = f"{path.name}: holds NumPy arrays, without names for time and force; write them as columns of a text"
         call = 'numpy.savetxt("NAME.csv", numpy.column_stack([t, F]), delimiter=",", header="t (s),F (N)", comments="")'
         raise Fault("BAD_TABLE", f"{line}: {call}")

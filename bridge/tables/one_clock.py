@@ -12,7 +12,7 @@ from bridge.arrays import Floats, Indices
 from bridge.log.finding import Finding
 from bridge.units import counted
 
-# Share of empty cells from which a channel has separate rows. Smaller: a sensor that dropped out is interpolated.
+# Share of empty cells above which a channel counts as sampled separately. Smaller: a sensor that dropped out is interpolated.
 _SEPARATE_ROWS = 0.1
 _GAP_STEPS = 10.0  # longest gap that is interpolated, in median steps of the channel
 _SAME_S = 1e-3  # largest difference of two equal instants, as a share of a step
@@ -43,7 +43,7 @@ def _has_own_rows(t_s: Floats, values: Floats) -> bool:
 
 
 def own_rows(t_s: Floats, columns: dict[str, Floats]) -> dict[str, Sampled]:
-    """Each channel at its own rows alone."""
+    """Each channel at the rows in which it has values; at all rows if it is not sampled separately."""
     channels: dict[str, Sampled] = {}
     for name, values in columns.items():
         filled = np.isfinite(values) & np.isfinite(t_s) if _has_own_rows(t_s, values) else np.ones(len(t_s), np.bool_)

@@ -5,9 +5,8 @@ from pathlib import Path
 
 from bridge.faults import Fault
 from bridge.files import check_file
-from bridge.tables.hdf5 import read_hdf5
 from bridge.tables.kinds import Kind, kind_of
-from bridge.tables.mat import read_mat
+from bridge.tables.mat import read_hdf5, read_mat
 from bridge.tables.own_times import with_own_times
 from bridge.tables.ros_log import read_ros_log
 from bridge.tables.sheet import read_sheet

@@ -1,6 +1,5 @@
 """A sheet of a workbook (xlsx, xls, ods) as a table."""
 
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +10,8 @@ from bridge.log.finding import Finding
 from bridge.tables.table import Table
 from bridge.tables.text.dialect import Dialect, TextLayout, form_of
 from bridge.tables.text.head import read_head
-from bridge.tables.unit_words import unknown_units
 
-_BETWEEN = "\x1f"  # the unit separator, which no cell contains
+_BETWEEN = "\x1f"  # joins the cells of a line: an ASCII control character that no cell contains
 _HEAD_ROWS = 400  # rows within which the numbers must begin
 
 
@@ -42,12 +40,7 @@ def read_sheet(path: Path, given: Dialect) -> Table:
         cells = [row[i] if i < len(row) else "" for row in rows[head.lines :]]
         columns[column] = _column(cells, form)
     findings = [Finding("assumed", path.name, f"sheet {name!r} of {', '.join(names)}")] if len(names) > 1 else []
-    if head.units:
-        findings.append(
-            Finding("assumed", path.name, f"line {head.lines} holds units: {', '.join(filter(None, head.units))}")
-        )
-        if unknown := unknown_units(head.unit_of):
-            findings.append(Finding("units", path.name, f"unknown unit: {unknown}; kept as written"))
+    findings += head.unit_findings(path.name)
     rate_Hz = 1.0 / head.step_s if head.step_s else None
     return Table(
         path,
@@ -63,13 +56,10 @@ def read_sheet(path: Path, given: Dialect) -> Table:
 
 
 def _column(cells: list[Any], form: TextLayout) -> Any:
-    """Numbers as float64, an empty cell NaN; a column with texts as texts, its numbers in the same form; others unchanged."""
-    kinds = Counter(type(cell) for cell in cells if cell != "")
-    if kinds.keys() <= {float, int, bool}:
+    """Numbers as float64, an empty cell NaN; a column with other cells as texts, its numbers in the same form."""
+    if all(cell == "" or isinstance(cell, int | float) for cell in cells):
         return np.array([np.nan if cell == "" else float(cell) for cell in cells])
-    if str in kinds:
-        return np.array([None if cell == "" else _text(cell, form) for cell in cells], object)
-    return np.array([None if cell == "" else cell for cell in cells], object)
+    return np.array([None if cell == "" else _text(cell, form) for cell in cells], object)
 
 
 def _line(row: list[Any], form: TextLayout) -> str:

@@ -45,7 +45,7 @@ class Table:
     decimal: str = "."  # decimal mark, and the mark of thousands, of numbers that are stored as text
     thousands: str = ""
     findings: list[Finding] = field(default_factory=list[Finding])
-    written: dict[str, Any] = field(default_factory=dict[str, Any])  # properties of the file: keys of [source] of a map
+    written: dict[str, Any] = field(default_factory=dict[str, Any])  # how the file was read; keys of [source] of a map
     own_times: dict[str, str] = field(default_factory=dict[str, str])  # column of a channel's times, by channel
 
     def find(self, name: str | int) -> str:
@@ -58,7 +58,7 @@ class Table:
             return wanted
         if wanted.isdigit() and 1 <= int(wanted) <= len(self.columns):
             return list(self.columns)[int(wanted) - 1]
-        for simplified in (_squeezed, _bare):
+        for simplified in (_squeezed, lambda text: bare_name(text).casefold()):
             near = [key for key in self.columns if simplified(key) == simplified(wanted)]
             if len(near) == 1:
                 return near[0]
@@ -87,7 +87,7 @@ class Table:
         if nanoseconds := self._nanoseconds_of(key):
             whole_s = self.column(key)
             self._add([Finding("time", where, f"continues in column {nanoseconds}: both are one time")])
-            # seconds of the calendar would lose the digits of the nanoseconds
+            # counted from the first row: seconds of the calendar would lose the digits of the nanoseconds
             times_s = whole_s - whole_s[:1] + 1e-9 * self.column(nanoseconds)
             return times_s - times_s[:1], True
         times_s, findings = seconds(self.columns[key], where)
@@ -106,10 +106,6 @@ class Table:
         key = self.find(name)
         first = _AGAIN.sub("", key)
         return self.units.get(key) or unit_in_name(first if first in self.columns else key)
-
-
-def _bare(text: str) -> str:
-    return bare_name(text).casefold()
 
 
 def _squeezed(text: str) -> str:

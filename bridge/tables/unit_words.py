@@ -1,41 +1,14 @@
 """Units in their usual spellings: `kN`, `mm/s`, `[N]`, `Nm`, `°`; and units in the names of columns."""
 
 import re
+import tomllib
+from pathlib import Path
+from typing import Any
 
-_DEGREE, _TURN = 0.017453292519943295, 6.283185307179586  # rad
-_POUND_kg, _POUND_N = 0.45359237, 4.4482216152605
+_POUND_kg, _KILOGRAM_N = 0.45359237, 9.80665
+_TABLE: dict[str, Any] = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
 # by quantity: its SI unit, and the factors of units without a prefix
-_UNITS: dict[str, tuple[str, dict[str, float]]] = {
-    "time": (
-        "s",
-        dict.fromkeys(("s", "sec", "secs", "second", "seconds", "sekunden"), 1.0) | {"min": 60.0, "h": 3600.0},
-    ),
-    "force": (
-        "N",
-        {"N": 1.0, "newton": 1.0, "daN": 10.0, "lbf": _POUND_N, "kgf": 9.80665, "kp": 9.80665, "gf": 9.80665e-3},
-    ),
-    "length": (
-        "m",
-        {"m": 1.0, "meter": 1.0, "metre": 1.0, "in": 0.0254, "inch": 0.0254, "mil": 2.54e-5, "micron": 1e-6},
-    ),
-    "velocity": ("m/s", {"m/s": 1.0, "mm/min": 1e-3 / 60.0, "m/min": 1.0 / 60.0, "in/s": 0.0254}),
-    "acceleration": ("m/s²", {"m/s2": 1.0, "g": 9.80665, "gn": 9.80665, "Gal": 0.01}),
-    "frequency": ("Hz", {"Hz": 1.0, "1/s": 1.0}),
-    "mass": ("kg", {"kg": 1.0, "lb": _POUND_kg, "lbs": _POUND_kg, "t": 1000.0}),
-    "torque": ("N m", {"Nm": 1.0, "N.m": 1.0, "Nmm": 1e-3, "N.mm": 1e-3, "Ncm": 1e-2, "inlb": 0.0254 * _POUND_N}),
-    "angle": ("rad", {"rad": 1.0, "deg": _DEGREE, "°": _DEGREE, "rev": _TURN, "U": _TURN}),
-    "angular velocity": (
-        "rad/s",
-        {"rad/s": 1.0, "deg/s": _DEGREE, "°/s": _DEGREE} | dict.fromkeys(("rpm", "1/min", "U/min"), _TURN / 60.0),
-    ),
-    "angular acceleration": ("rad/s²", {"rad/s2": 1.0, "deg/s2": _DEGREE, "°/s2": _DEGREE}),
-    "inertia": ("kg m²", {"kgm2": 1.0}),
-    "share": ("1", {"-": 1.0, "1": 1.0, "%": 0.01}),
-    "voltage": ("V", {"V": 1.0}),
-    "current": ("A", {"A": 1.0}),
-    "pressure": ("Pa", {"Pa": 1.0, "bar": 1e5, "psi": 6894.757293168}),
-    "temperature": ("K", {"K": 1.0, "°C": 1.0, "degC": 1.0, "C": 1.0}),
-}
+_UNITS: dict[str, tuple[str, dict[str, float]]] = {name: (row["si"], row["factors"]) for name, row in _TABLE.items()}
 _PREFIXES = {"n": 1e-9, "µ": 1e-6, "u": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "k": 1e3, "M": 1e6, "G": 1e9}
 # units that take a prefix; `min` is not a milli-inch
 _PREFIXED = {"s", "N", "m", "m/s", "m/s2", "Hz", "g", "Nm", "rad", "rad/s", "V", "A", "Pa", "bar", "gn"}
@@ -93,7 +66,7 @@ def weight_unit(text: str) -> tuple[str, float] | None:
     known = known_unit(text)
     word = text.strip().strip("[](){}").translate(_SAME)
     grams = {"g": 1e-3, "kg": 1.0, "mg": 1e-6, "t": 1e3, "lb": _POUND_kg, "lbs": _POUND_kg}.get(word)
-    return ("force", _UNITS["force"][1]["kgf"] * grams) if grams is not None else known
+    return ("force", _KILOGRAM_N * grams) if grams is not None else known
 
 
 def si_unit(quantity: str) -> str:

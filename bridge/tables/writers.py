@@ -1,7 +1,10 @@
 """Tables written in batches of rows: Parquet, CSV and MATLAB v7.3. A file appears under its name only when complete."""
 
 import contextlib
+import io
 import shutil
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -47,9 +50,10 @@ def _schema(columns: Columns) -> Any:
 
 
 class _Batches:
-    """Rows that are collected until they fill a batch."""
+    """Rows that are collected until they fill a batch, for which `write` is called."""
 
-    def __init__(self) -> None:
+    def __init__(self, write: Callable[[Columns], None]) -> None:
+        self._write = write
         self._waiting: list[Columns] = []
         self._waiting_rows = 0
 
@@ -67,21 +71,18 @@ class _Batches:
             self._waiting, self._waiting_rows = [], 0
             self._write(columns)
 
-    def _write(self, columns: Columns) -> None:
-        raise NotImplementedError
-
 
 class ArrowTable(_Batches):
     """A Parquet or CSV file. Parquet columns have their unit as metadata, CSV columns in their name."""
 
     def __init__(self, path: Path) -> None:
-        super().__init__()
+        super().__init__(self._add)
         self.path = path
         self._new: Replacement | None = None
         self._writer: Any = None
         self._schema: Any = None
 
-    def _write(self, columns: Columns) -> None:
+    def _add(self, columns: Columns) -> None:
         if self._writer is None:
             self._schema = _schema(columns)
             self._new = Replacement(self.path)
@@ -111,6 +112,28 @@ class ArrowTable(_Batches):
             self._new.discard()
 
 
+class _Part(io.FileIO):
+    """A file for HDF5, which ends the process at a failed write: the failure is kept for the owner of the file."""
+
+    failed: OSError | None = None
+
+    def write(self, data: Any) -> int:
+        left = memoryview(data).cast("B")
+        try:
+            while left:  # a full disk takes a part
+                left = left[super().write(left) or 0 :]
+        except OSError as error:
+            self.failed = self.failed or error
+        return len(data)
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self.failed = self.failed or error
+            return size or 0
+
+
 class MatFile:
     """One MATLAB file with a struct of columns for each table, and the units of the columns in the struct `units`.
 
@@ -120,7 +143,9 @@ class MatFile:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._ending = contextlib.ExitStack()
-        self._part = self._ending.enter_context(folder_beside(path)) / "table.mat"
+        self._part = self._ending.enter_context(
+            _Part(self._ending.enter_context(folder_beside(path)) / "table.mat", "w+")
+        )
         self._file: Any = None
 
     def add(self, table: str, columns: Columns) -> None:
@@ -142,6 +167,12 @@ class MatFile:
                 rows = column.shape[1]
                 column.resize(rows + len(values), axis=1)
                 column[0, rows:] = values
+        self._refuse_unwritten()
+
+    def _refuse_unwritten(self) -> None:
+        """Raise the OSError of a failed write."""
+        if self._part.failed is not None:
+            raise self._part.failed
 
     def _dataset(self, table: str, name: str, values: npt.NDArray[Any], most: tuple[int | None, ...] | None) -> Any:
         for group in (table.partition("/")[0], table):
@@ -154,10 +185,11 @@ class MatFile:
             self.discard()
             return []
         self._file.close()
-        with replacing(self.path) as out, self._part.open("rb") as made:
+        self._refuse_unwritten()
+        with replacing(self.path) as out:
             out.write(_MATLAB_HEAD)
-            made.seek(len(_MATLAB_HEAD))
-            shutil.copyfileobj(made, out, 1 << 20)
+            self._part.seek(len(_MATLAB_HEAD))
+            shutil.copyfileobj(self._part, out, 1 << 20)
         self._ending.close()
         return [self.path]
 
@@ -170,12 +202,8 @@ class MatTable(_Batches):
     """One of several tables of a MATLAB file; the owner of the file completes it."""
 
     def __init__(self, file: MatFile, table: str) -> None:
-        super().__init__()
+        super().__init__(partial(file.add, table))
         self.file = file
-        self._table = table
-
-    def _write(self, columns: Columns) -> None:
-        self.file.add(self._table, columns)
 
     def finish(self) -> list[Path]:
         """Write the waiting rows; return an empty list, as the owner completes the file."""

@@ -2,14 +2,14 @@
 
 from enum import Enum
 
-# Largest delay of a message, and largest loss in a row [messages]. Smaller: a longer loss counts as another sender for 8 blocks.
-# Larger: another sender whose count is that close is accepted at once.
+# A number this far above the expected one continues the count after a loss; this far below, it is late or repeated. Smaller:
+# after a longer loss the sender counts as another for 8 blocks. Larger: another sender with close numbers is accepted at once.
 WINDOW = 256
-# Another count is accepted after this many consecutive numbers, while the present count has been silent for this long. Smaller: a
+# Another count is accepted after 8 consecutive numbers, if no message of the present count arrived for 50 ms. Smaller: a
 # burst of another client takes over. Larger: a restarted rig waits longer.
 _BELIEVED = 8
 _SILENT_NS = 50_000_000
-_DOUBTED = 64  # messages of another count from which they count as strays although the present count is silent
+_DOUBTED = 64  # messages of another count that count as strays even if the present count does not continue
 
 
 class NumberCheck(Enum):
@@ -29,9 +29,9 @@ class BlockNumbers:
         self.strays = 0  # messages rejected so far
         self.jumped = True  # the newest accepted message began another count
         self._doubted = 0  # messages of another count since the newest accepted one
-        self._taken_ns = 0  # arrival of the newest message of the present count
+        self._taken_ns = 0  # arrival of the newest message of the present count (time.perf_counter_ns)
         self._stray = -1  # the newest number outside of the present count
-        self._in_a_row = 0  # consecutive numbers up to that one
+        self._in_a_row = 0  # length of the run of consecutive numbers that ends with `_stray`
         self._may_begin_anew = False
 
     def sender_was_away(self) -> None:

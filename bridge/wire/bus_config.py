@@ -15,19 +15,19 @@ class BusConfig(Strict):
     endpoint: Annotated[str, Field(pattern=r"^(tcp|tls)/[^\s,?/]+:[0-9]{1,5}$")] = "tcp/127.0.0.1:7447"
     prefix: Annotated[str, Field(pattern=r"^[^/*$?#]+(/[^/*$?#]+)*$")] = "rig"
     certificates: str = Field(
-        default="",
+        "",
         description="Folder that `stickslip certs` made, for tls/ endpoints; empty: ~/.config/stickslip/certificates.",
     )
     insecure: bool = Field(
-        default=False,
+        False,
         description="true: a tcp/ endpoint needs no password, and other computers may reach it. Never on a shared network.",
     )
 
     wait_s: float = Field(
-        default=30.0,
+        30.0,
         gt=0.0,
         le=1e6,
-        description="Longest wait of plant, controller and record for the others at the start; `stickslip run` has --wait.",
+        description="Longest wait of plant, controller and recorder for each other at the start; `stickslip run` has --wait.",
     )
 
     @property
@@ -42,7 +42,7 @@ class BusConfig(Strict):
 
     @property
     def must_be(self) -> str:
-        """The condition for an answer of the rig, for a message: a rig with another authority closes the link silently."""
+        """A rule for messages, completed by `of a running rig`; over TLS a rig of another authority closes the link silently."""
         return "--endpoint and the authority of --certs must be those" if self.encrypted else "--endpoint must be that"
 
     @field_validator("endpoint")

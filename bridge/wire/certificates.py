@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from bridge.faults import Fault
 
-AUTHORITY = "authority"  # all roles hold its certificate; its key makes new roles and must not leave its folder
+AUTHORITY = "authority"  # all roles hold its certificate; its key signs theirs and must not leave its folder
 RIG = "rig"
 CLUSTER = "cluster"  # scheduler, workers and client of a Dask cluster; no access to the bus
 
@@ -42,7 +42,7 @@ def checked(role: str, place: Path) -> RoleFiles:
             raise Fault(
                 "NOT_SECURE", f"{line}; make it with `stickslip certs FOLDER`, and name the folder with --certs"
             )
-    if os.name == "posix" and files.key.stat().st_mode & (stat.S_IRWXG | stat.S_IRWXO):
+    if files.key.stat().st_mode & (stat.S_IRWXG | stat.S_IRWXO):
         raise Fault(
             "NOT_SECURE", f"{files.key}: others can read this key: its mode must be 0600; chmod 600 {files.key}"
         )

@@ -11,12 +11,12 @@ class Channel(NamedTuple):
     quantity: str  # a quantity of `bridge.tables.unit_words`
     turning: str  # quantity on a rotary rig
     radius_power: int  # power of the radius that converts a value of a rotary rig to a value of a linear rig
-    largest: float = math.inf  # a larger value has a wrong unit: mm in place of m exceed it on a bench rig
+    largest: float = math.inf  # larger values have a wrong unit: positions of a bench rig exceed it in mm, never in m
     has_spikes: bool = False  # a slip causes a spike, so a single value far from its neighbours may be right
     positive: str = ""  # direction of a positive value
     is_controlled: bool = False  # the controller needs it
     sensor: str = ""  # start of the channel's keys in [rig.sensors]: noise, resolution, range
-    has_lowest: bool = False  # its range need not be symmetric
+    has_lowest: bool = False  # [rig.sensors] has a lower end of its range; otherwise the range is symmetric
     without: str = ""  # consequence of a missing channel for a diagnosis of a rig with a drive spring
     without_force_drive: str = ""  # consequence for a diagnosis of a rig that a given force drives
 

@@ -1,4 +1,4 @@
-"""The clock of the processes of a run: the computer's, or simulated time, which stops during a computation."""
+"""The clock of the processes of a run: the computer's, or simulated time, which does not advance while a process computes."""
 
 import time as _machine
 from collections.abc import Callable, Generator

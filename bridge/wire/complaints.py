@@ -8,20 +8,20 @@ from dataclasses import dataclass
 
 from bridge.wire.clock import time
 
-_EVERY_S = 1.0  # between two events of one kind; shorter: a flood fills logs and screens
+_EVERY_S = 1.0  # shortest time between two events of one kind; shorter: a flood fills logs and screens
 
 # codes of the events
 BAD_MESSAGE = "BAD_MESSAGE"  # undecodable or too many bytes, or meaningless numbers
 FOREIGN = "FOREIGN"  # a valid message that no known process can have sent
 FLOOD = "FLOOD"  # more messages than the process can read
-CLOCK = "CLOCK"  # t_ns does not follow the numbers of the blocks
+CLOCK = "CLOCK"  # the times t_ns of the blocks do not match their numbers
 
 
 @dataclass
 class _Kind:
-    """One kind of complaint: a code and a place."""
+    """Counts of one kind of problem; code and place make a kind."""
 
-    text: str = ""
+    text: str = ""  # the newest problem of the kind
     times: int = 0
     pending: int = 0  # number of problems since the last event
     reported_s: float = -_EVERY_S
@@ -40,7 +40,6 @@ class Complaints:
         self._publish = publish
         self._clock = clock or time.monotonic
         self._kinds: dict[tuple[str, str], _Kind] = {}
-        self._pending = False
 
     def note(self, code: str, where: str, text: str, times: int = 1) -> None:
         """Count a problem: it is reported now, or together with others of its kind when 1 s has passed.
@@ -56,18 +55,13 @@ class Complaints:
         kind.text = text
         kind.times += times
         kind.pending += times
-        self._pending = True
         self._report(code, where, kind)
 
     def report_when_due(self, all_of_it: bool = False) -> None:
         """Report problems that have waited for 1 s; with `all_of_it`, at the end of a process, all problems."""
-        if not self._pending:
-            return
-        self._pending = False
         for (code, where), kind in self._kinds.items():
             if kind.pending:
                 self._report(code, where, kind, all_of_it)
-                self._pending = self._pending or kind.pending > 0
 
     def _report(self, code: str, where: str, kind: _Kind, at_once: bool = False) -> None:
         now_s = self._clock()

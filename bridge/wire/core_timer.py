@@ -13,9 +13,9 @@ import time
 # Period of the timer. Longer: a stall must be longer to be detected for certain. Shorter: the timer loads its core more, which
 # is 1.6 to 1.9 % now and 1.9 to 2.5 % with 1 ms (docs/method/rig.md).
 PERIOD_NS = 1_500_000
-# Lateness from which a timer reports a stall. Shorter: ordinary wake-ups count, one in 1000 of which takes 0.16 to 0.26 ms.
-# Longer: stalls are missed that make a command late, which needs 0.25 ms of its 1 ms. Each stall from PERIOD_NS + LEAST_NS on is
-# detected.
+# Lateness from which a timer reports a stall. Shorter: ordinary wake-ups count, one in 1000 of which is 0.16 to 0.26 ms late.
+# Longer: stalls are missed that make a command late, which takes 0.25 ms of its 1 ms. Each stall from PERIOD_NS + LEAST_NS on
+# is detected.
 LEAST_NS = 300_000
 # Number of wake-ups between two checks of the parent and of the waiting time; a check takes as long as a wake-up.
 _LOOKS = 16

@@ -24,7 +24,7 @@ class Received(NamedTuple):
 
 
 class _Counts:
-    """Numbers of messages of one kind, added and taken: only one thread writes each number, so it needs no lock."""
+    """Counts of messages of one kind, added and taken: only one thread writes each count, so they need no lock."""
 
     def __init__(self, limit: int) -> None:
         self.limit = limit
@@ -70,19 +70,10 @@ class Inbox:
             counts.added += 1
             self._queue.put((counts, received))
 
-    def get(self, timeout_s: float) -> Received | None:
-        """The oldest message; None if none arrives within `timeout_s`."""
+    def get(self, timeout_s: float = 0.0) -> Received | None:
+        """The oldest message; None if none waits or arrives within `timeout_s`."""
         try:
             counts, received = self._queue.get(timeout=timeout_s)
-        except queue.Empty:
-            return None
-        counts.taken += 1
-        return received
-
-    def get_nowait(self) -> Received | None:
-        """The oldest message; None without a message."""
-        try:
-            counts, received = self._queue.get_nowait()
         except queue.Empty:
             return None
         counts.taken += 1

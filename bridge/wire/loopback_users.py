@@ -9,6 +9,7 @@ import os
 import secrets
 import stat
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 from bridge.faults import Fault
@@ -39,8 +40,9 @@ def file_name(endpoint: str) -> str:
 
 def password(endpoint: str, role: str) -> str | None:
     """The password of a role at an endpoint; None if no rig of this user has made one."""
-    newest = max((path for path in _files(endpoint) if _is_private(path, stat.S_ISREG)), key=_written_ns, default=None)
+    files = [path for path in _files(endpoint) if _is_private(path, stat.S_ISREG)]
     with contextlib.suppress(OSError, UnicodeDecodeError):
+        newest = max(files, key=lambda path: path.stat().st_mtime_ns, default=None)
         for line in newest.read_text().splitlines() if newest is not None else []:
             name, _, word = line.partition(":")
             if name == role and word:
@@ -76,16 +78,11 @@ def is_private_folder(path: Path) -> bool:
     return _is_private(path, stat.S_ISDIR)
 
 
-def _is_private(path: Path, kind: object) -> bool:
+def _is_private(path: Path, is_kind: Callable[[int], bool]) -> bool:
     """Whether a path is of this kind, belongs to this user and is closed to all others; a link never is."""
     with contextlib.suppress(OSError):
         status = path.lstat()
-        return (
-            callable(kind)
-            and bool(kind(status.st_mode))
-            and status.st_uid == os.getuid()
-            and not status.st_mode & 0o077
-        )
+        return is_kind(status.st_mode) and status.st_uid == os.getuid() and not status.st_mode & 0o077
     return False
 
 
@@ -106,9 +103,3 @@ def _write(path: Path) -> None:
     except OSError:
         os.unlink(part)
         raise
-
-
-def _written_ns(path: Path) -> int:
-    with contextlib.suppress(OSError):
-        return path.stat().st_mtime_ns
-    return 0

@@ -5,6 +5,7 @@ record with these places: a filled record is an encoded message, and a topic of 
 reorders fields, the protobuf library first converts the bytes to this form.
 """
 
+import functools
 from typing import Any, cast
 from zlib import crc32
 
@@ -12,19 +13,18 @@ import numpy as np
 import numpy.typing as npt
 from google.protobuf.descriptor import FieldDescriptor
 from google.protobuf.internal.encoder import TagBytes  # pyright: ignore[reportPrivateImportUsage]
-from google.protobuf.message import DecodeError, Message
+from google.protobuf.message import Message
 
+from bridge.arrays import Records
 from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.payloads import refuse_oversized
+from bridge.wire.payloads import parsed
 
-NO_BLOCK = 2**64 - 1
+NO_BLOCK = 2**64 - 1  # `command_block` of /applied without a command in force
 
 BLOCK, GAP, STALE, STOP, RESET, ANNOUNCED, LATE = (1 << bit for bit in range(7))  # bits of `Trace.events`
 
-Records = npt.NDArray[Any]
-
-_SCALARS = {
+_SCALARS = {  # NumPy type and protobuf wire type of each field type
     FieldDescriptor.TYPE_DOUBLE: ("<f8", 1),
     FieldDescriptor.TYPE_FIXED64: ("<u8", 1),
     FieldDescriptor.TYPE_SFIXED64: ("<i8", 1),
@@ -109,16 +109,7 @@ class Layout:
         """The bytes of a message with every field written, in order. Raises Fault BAD_MESSAGE naming `topic`."""
         if self.is_canonical(payload):
             return payload
-        refuse_oversized(payload, self.message, topic)
-        message = self.message()
-        try:
-            message.ParseFromString(payload)
-        except DecodeError:
-            name = self.message.DESCRIPTOR.name
-            line = (
-                f"{topic}: {len(payload)} bytes cannot be decoded as {name}; see bridge/wire/PROTOCOL.md for its fields"
-            )
-            raise Fault("BAD_MESSAGE", line) from None
+        message = parsed(self.message, payload, topic)
         record = self.blank()
         for field in self.message.DESCRIPTOR.fields:
             value = getattr(message, field.name)
@@ -147,14 +138,11 @@ STATE = Layout(wire.State)
 ANNOUNCE = Layout(wire.Announce)
 SCOPE = Layout(wire.Scope)
 
-_sensor_layouts: dict[int, Layout] = {}
 
-
+@functools.cache
 def sensor_block(samples: int) -> Layout:
     """The layout of sensor blocks with `samples` samples a channel."""
-    if samples not in _sensor_layouts:
-        _sensor_layouts[samples] = Layout(wire.SensorBlock, samples)
-    return _sensor_layouts[samples]
+    return Layout(wire.SensorBlock, samples)
 
 
 def sealed(block: bytes) -> bytes:
@@ -174,5 +162,5 @@ def has_checksum(block: bytes) -> bool:
 
 
 def is_whole(block: bytes) -> bool:
-    """Whether the checksum of a canonical sensor block is right."""
+    """Whether the checksum of a canonical sensor block matches its bytes."""
     return crc32(block[: -_SUM_BYTES - 1]) == int.from_bytes(block[-_SUM_BYTES:], "little")

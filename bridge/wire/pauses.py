@@ -6,11 +6,12 @@ import subprocess
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 from bridge.wire import core_timer, realtime
 
-_PRIORITY = realtime.LOOP_PRIORITY + 1  # a long step of a loop must not look like a stall
+_PRIORITY = realtime.LOOP_PRIORITY + 1  # above the loops: a long step of a loop must not look like a stall
 # Most watched cores. Each takes a process of 10 MB, and a stall of eight cores already counts as a stall of the computer.
 _MOST_CORES = 8
 # Age from which a stall is complete. Shorter: the report of a timer that wakes later would be missed.
@@ -27,29 +28,19 @@ class Pause(NamedTuple):
 
 
 def shared(stalls: Sequence[Sequence[Pause]]) -> list[Pause]:
-    """Stalls of all cores at the same time, in order of time.
+    """Times at which all cores stalled together, in order of time.
 
     Args:
         stalls: the stalls of every core, in order of time and without overlap.
 
     """
-    if not stalls:
-        return []
-    common = list(stalls[0])
-    for core in stalls[1:]:
-        both: list[Pause] = []
-        first = second = 0
-        while first < len(common) and second < len(core):
-            from_ns = max(common[first].from_ns, core[second].from_ns)
-            until_ns = min(common[first].until_ns, core[second].until_ns)
-            if until_ns > from_ns:
-                both.append(Pause(from_ns, until_ns))
-            if common[first].until_ns < core[second].until_ns:
-                first += 1
-            else:
-                second += 1
-        common = both
-    return common
+    edges = sorted(edge for core in stalls for pause in core for edge in ((pause.from_ns, 1), (pause.until_ns, -1)))
+    stalled = accumulate(step for _, step in edges)
+    return [
+        Pause(from_ns, until_ns)
+        for cores, ((from_ns, _), (until_ns, _)) in zip(stalled, pairwise(edges), strict=False)
+        if cores == len(stalls)
+    ]
 
 
 class PauseWatch:
@@ -59,7 +50,7 @@ class PauseWatch:
     """
 
     def __init__(self) -> None:
-        self.cores = _cores()
+        self.cores = sorted(os.sched_getaffinity(0))[:_MOST_CORES]
         self.refused = _refusal()
         self._timers: list[subprocess.Popen[bytes]] = []
         self._lines = b""
@@ -114,7 +105,7 @@ class PauseWatch:
 
 
 def settled(stalls: Mapping[int, list[Pause]], until_ns: int) -> tuple[list[Pause], dict[int, list[Pause]]]:
-    """Stalls of the computer and of single cores that ended before `until_ns`; and the parts of later stalls."""
+    """Stalls of the computer and of single cores that ended before `until_ns`; and the later stalls by core."""
     together = shared(list(stalls.values()))
     complete = [pause for pause in together if pause.until_ns <= until_ns]
     reported_ns = max((pause.until_ns for pause in complete), default=0)
@@ -138,12 +129,6 @@ def _without(pause: Pause, others: Sequence[Pause]) -> list[Pause]:
             from_ns = stall.until_ns
     pieces.append(Pause(from_ns, pause.until_ns))
     return [piece for piece in pieces if piece.until_ns - piece.from_ns > core_timer.LEAST_NS]
-
-
-def _cores() -> list[int]:
-    if not hasattr(os, "sched_getaffinity"):
-        return []
-    return sorted(os.sched_getaffinity(0))[:_MOST_CORES]
 
 
 def _refusal() -> str:

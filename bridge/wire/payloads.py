@@ -21,7 +21,7 @@ _LONG: dict[type[Message], int] = {wire.Snapshot: 1 << 18, wire.Header: 1 << 18}
 
 _DESCRIBED = Path(__file__).with_name("stickslip.desc")  # definitions with comments, which the generated module omits
 _SEQUENCE_AND_TIME = struct.Struct("<QBq")  # first fields of a canonical message, with the tag between them
-_MESSAGES, _ENUMS = 4, 5  # numbers of these fields of a FileDescriptorProto
+_MESSAGES, _ENUMS = 4, 5  # field numbers of message_type and enum_type in a FileDescriptorProto
 
 M = TypeVar("M", bound=Message)
 
@@ -31,22 +31,17 @@ def largest_bytes(message: type[Message]) -> int:
     return _LONG.get(message, _LARGEST_BYTES)
 
 
-def refuse_oversized(payload: bytes, message: type[Message], topic: str) -> None:
-    """Raise Fault BAD_MESSAGE for a message that is too long to be parsed."""
-    most = largest_bytes(message)
-    if len(payload) > most:
-        line = f"{topic}: a message of more than {most} bytes: a {message.DESCRIPTOR.name} must be shorter"
-        raise Fault("BAD_MESSAGE", f"{line}; see bridge/wire/PROTOCOL.md")
-
-
 def parsed(message: type[M], payload: bytes, topic: str) -> M:
     """A protobuf message from its bytes. Raises Fault BAD_MESSAGE naming `topic`."""
-    refuse_oversized(payload, message, topic)
+    name = message.DESCRIPTOR.name
+    if len(payload) > (most := largest_bytes(message)):
+        line = f"{topic}: a message of more than {most} bytes: a {name} must be shorter"
+        raise Fault("BAD_MESSAGE", f"{line}; see bridge/wire/PROTOCOL.md")
     result = message()
     try:
         result.ParseFromString(payload)
     except DecodeError:
-        line = f"{topic}: {len(payload)} bytes cannot be decoded as {message.DESCRIPTOR.name}"
+        line = f"{topic}: {len(payload)} bytes cannot be decoded as {name}"
         raise Fault("BAD_MESSAGE", f"{line}; see bridge/wire/PROTOCOL.md for its fields") from None
     return result
 
@@ -78,19 +73,15 @@ def file_descriptor_set(message: type[Message]) -> bytes:
     files.ParseFromString(_DESCRIBED.read_bytes())
     file = files.file[0]
     paths = [(_MESSAGES, [kind.name for kind in file.message_type].index(message.DESCRIPTOR.name))]
-    enums = [kind.name for kind in file.enum_type]
-    paths += [(_ENUMS, enums.index(name)) for name in _enums_of(message) if name in enums]
+    enums = {field.enum_type.name for field in message.DESCRIPTOR.fields if field.enum_type is not None}
+    paths += [(_ENUMS, at) for at, kind in enumerate(file.enum_type) if kind.name in enums]
     comments = [
         place
         for place in file.source_code_info.location
         if tuple(place.path[:2]) in paths and (place.leading_comments or place.trailing_comments)
     ]
     for field in (field for kind in file.message_type for field in kind.field):
-        field.ClearField("json_name")  # follows from the name
+        field.ClearField("json_name")  # readers derive it from the field's name
     del file.source_code_info.location[:]
     file.source_code_info.location.extend(comments)
     return files.SerializeToString()
-
-
-def _enums_of(message: type[Message]) -> list[str]:
-    return [field.enum_type.name for field in message.DESCRIPTOR.fields if field.enum_type is not None]

@@ -6,7 +6,6 @@ import functools
 import gc
 import os
 import resource
-import sys
 import threading
 from pathlib import Path
 
@@ -25,24 +24,21 @@ VIEWER_PRIORITY = 1  # viewers: below the loop and the recorder, above every pro
 # A wait that ends this much later counts as a stall of this process. Shorter: a busy core looks like a stall. Longer: after a
 # stall, this process gives up a peer that works.
 _PAUSE_S = 0.25
-NORMAL = "normal scheduling"  # start of the text of a START event without SCHED_FIFO
+NORMAL = "normal scheduling"  # start of the text of a START event of a process that did not get SCHED_FIFO
 NOT_GUARANTEED = "real time is not guaranteed; grant CAP_SYS_NICE or an rtprio limit"
 
 
-def core(place: int) -> int | None:
-    """The core for thread number `place`, among the cores that this process may use; None if the system does not list them.
+def core(place: int) -> int:
+    """The core for thread number `place`, among the cores that this process may use.
 
     Choose the cores with `taskset`: with two cores for each rig, no rig delays another.
     """
-    if not hasattr(os, "sched_getaffinity"):
-        return None
     cores = sorted(os.sched_getaffinity(0))
     return cores[place % len(cores)]
 
 
 def _threads() -> list[int]:
-    tasks = Path("/proc/self/task")
-    return [int(entry.name) for entry in tasks.iterdir()] if tasks.exists() else []
+    return [int(entry.name) for entry in Path("/proc/self/task").iterdir()]
 
 
 def pin(to_core: int | None) -> bool:
@@ -52,11 +48,10 @@ def pin(to_core: int | None) -> bool:
     """
     if to_core is None:
         return False
-    threads = _threads()
-    for thread in threads:
+    for thread in _threads():
         with contextlib.suppress(OSError):  # a thread may have ended since
             os.sched_setaffinity(thread, {to_core})
-    return bool(threads)
+    return True
 
 
 def claim(to_core: int | None, priority: int = LOOP_PRIORITY) -> str:
@@ -70,17 +65,15 @@ def claim(to_core: int | None, priority: int = LOOP_PRIORITY) -> str:
     gc.freeze()
     gc.disable()
     pinned = pin(to_core)
-    threads = _threads()
-    fifo = bool(threads)
-    for thread in threads:
+    fifo = True
+    for thread in _threads():
         try:
             os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
         except ProcessLookupError:
             continue
         except PermissionError:
             fifo = False
-    if threads:
-        ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1)
+    ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1)
     where = f"core {to_core}" if pinned else "any core"
     memory = "memory locked" if _lock_memory() else "memory not locked"
     if fifo:
@@ -88,16 +81,14 @@ def claim(to_core: int | None, priority: int = LOOP_PRIORITY) -> str:
     return f"{NORMAL}, {where}, {memory}: {NOT_GUARANTEED}"
 
 
-@functools.cache  # computed before this process is pinned
+@functools.cache  # cached from before this process is pinned, which would hide the other cores
 def _cores_outside_the_loop() -> frozenset[int]:
     """The cores of this process without the cores of the loop's two processes; empty on a computer with two cores."""
-    if not hasattr(os, "sched_getaffinity"):
-        return frozenset()
     return frozenset(os.sched_getaffinity(0)) - {core(0), core(1)}
 
 
 def raise_priority() -> None:
-    """Give this process priority over all processes without SCHED_FIFO, if permitted: for viewers and operator commands.
+    """For viewers and operator commands: run off the loop's cores and, if permitted, before all processes without SCHED_FIFO.
 
     If all cores are busy it would otherwise wait for about 100 ms, and so would an operator's STOP. New threads inherit it.
     """
@@ -114,8 +105,6 @@ def _lock_memory() -> bool:
 
     With a limit on locked memory it does nothing, as a later allocation would fail.
     """
-    if not sys.platform.startswith("linux"):
-        return False
     if os.geteuid() != 0 and resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] != resource.RLIM_INFINITY:
         return False
     return ctypes.CDLL(None).mlockall(_MCL_CURRENT | _MCL_FUTURE | _MCL_ONFAULT) == 0

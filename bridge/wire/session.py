@@ -15,8 +15,8 @@ import zenoh
 
 from bridge.faults import Fault
 from bridge.wire import certificates, loopback_users
-from bridge.wire.access import access_control
 from bridge.wire.bus_config import BusConfig, is_loopback
+from bridge.wire.topics import TOPICS
 
 # Time after which a silent session is dropped. A process that ends closes its socket, so this concerns frozen processes only.
 # Shorter: a stall of a process breaks its link: with four stalls of 0.7 to 0.9 s in 16 s, 0.75 s loses 1540 blocks of the log and
@@ -25,7 +25,7 @@ from bridge.wire.bus_config import BusConfig, is_loopback
 LEASE_S = 1.5
 # In lockstep no process has a deadline and no message may be lost, so the lease is Zenoh's default.
 _LOCKSTEP_LEASE_S = 10.0
-DIAL_S = 2.0  # largest duration of one attempt; longer delays a stop, as Zenoh cannot be stopped while it dials
+DIAL_S = 2.0  # longest attempt to dial the rig; a longer one delays a stop, as Zenoh cannot be stopped while it dials
 # Longest message that a session assembles from its parts [bytes]; Zenoh drops a longer one. It equals the longest message that is
 # read (bridge/wire/payloads.py). Larger: the rig relays messages that fill a queue of 16 parts of 64 kB; with congestion control
 # BLOCK they stop the only thread of the rig's session until its links break: 10 s for a message of 3 MB.
@@ -40,6 +40,14 @@ _NEVER_WAIT = [
         "overwrite": {"congestion_control": "drop"},
     }
 ]
+
+# role of a session: its name as the sender in the table of topics
+_SENDER = {"controller": "controller", "recorder": "recorder", "operator": "cockpit"}
+# Zenoh's kinds of messages that the rig passes on to every role
+_MESSAGE_KINDS = [
+    "put", "delete", "declare_subscriber", "query", "reply", "declare_queryable",
+    "liveliness_token", "liveliness_query", "declare_liveliness_subscriber",
+]  # fmt: skip
 
 
 def session_settings(config: BusConfig, hub: bool, lockstep: bool, dial_s: float = DIAL_S) -> dict[str, Any]:
@@ -104,14 +112,14 @@ def rig_security(config: BusConfig) -> dict[str, Any]:
 def tls_rig_security(config: BusConfig, files: certificates.RoleFiles) -> dict[str, Any]:
     """Security settings of a rig at a tls/ endpoint: roles are the common names of certificates."""
     settings = certificates.tls_settings(certificates.RIG, files)
-    return settings | {"access_control": access_control(config.prefix, "cert_common_names")}
+    return settings | {"access_control": _access_control(config.prefix, "cert_common_names")}
 
 
 def loopback_rig_security(config: BusConfig, users: Path) -> dict[str, Any]:
     """Security settings of a rig at an endpoint of this computer alone: roles are the names in the password file."""
     return {
         "transport/auth/usrpwd": {"dictionary_file": str(users)},
-        "access_control": access_control(config.prefix, "usernames"),
+        "access_control": _access_control(config.prefix, "usernames"),
     }
 
 
@@ -122,5 +130,60 @@ def role_security(config: BusConfig, role: str) -> dict[str, Any]:
     """
     if config.encrypted:
         return certificates.tls_settings(role, certificates.checked(role, certificates.folder(config.certificates)))
-    word = loopback_users.password(config.endpoint, role)
-    return {"transport/auth/usrpwd": {"user": role, "password": word}} if word is not None else {}
+    password = loopback_users.password(config.endpoint, role)
+    return {"transport/auth/usrpwd": {"user": role, "password": password}} if password is not None else {}
+
+
+def _access_control(prefix: str, subject: str) -> dict[str, Any]:
+    """Zenoh's `access_control` for the session of a rig, which relays all messages: permissions of each role.
+
+    A message without a rule is denied. The rules do not bind the rig itself, as its session applies them.
+
+    Args:
+        prefix: prefix of the keys.
+        subject: attribute that identifies the role: `usernames` or `cert_common_names`.
+
+    """
+    rules = [
+        # messages that the rig relays: every role may receive all of them
+        _rule("hear", ["egress"], _MESSAGE_KINDS, [f"{prefix}/**"]),
+        _rule("listen", ["ingress"], ["declare_subscriber"], [f"{prefix}/**"]),
+        _rule("ask", ["ingress"], ["query"], [f"{prefix}/header/*"]),
+        _rule(
+            "who-is-there",
+            ["ingress"],
+            ["liveliness_query", "declare_liveliness_subscriber"],
+            [f"{prefix}/alive/*", f"{prefix}/claim/controller/*"],
+        ),
+    ]
+    policies: list[dict[str, Any]] = [
+        {"rules": ["hear", "listen", "ask", "who-is-there"], "subjects": list(loopback_users.ROLES)},
+    ]
+    for role in loopback_users.ROLES:
+        extra = _role_rules(prefix, role)
+        rules += extra
+        if extra:
+            policies.append({"rules": [rule["id"] for rule in extra], "subjects": [role]})
+    return {
+        "enabled": True,
+        "default_permission": "deny",
+        "rules": rules,
+        "subjects": [{"id": role, subject: [role]} for role in loopback_users.ROLES],
+        "policies": policies,
+    }
+
+
+def _role_rules(prefix: str, role: str) -> list[dict[str, Any]]:
+    """Permissions of this role alone."""
+    sent = [f"{prefix}/{topic.name}" for topic in TOPICS if topic.sender == _SENDER.get(role)]
+    rules = [_rule(f"{role}-says", ["ingress"], ["put"], sent)] if sent else []
+    if role in {"controller", "recorder"}:
+        tokens = [f"{prefix}/alive/{role}", f"{prefix}/claim/{role}/*"]
+        rules.append(_rule(f"{role}-is-there", ["ingress"], ["liveliness_token"], tokens))
+        header = [f"{prefix}/header/{role}"]
+        rules.append(_rule(f"{role}-answers", ["ingress"], ["declare_queryable", "reply"], header))
+    return rules
+
+
+def _rule(name: str, flows: list[str], messages: list[str], keys: list[str]) -> dict[str, Any]:
+    return {"id": name, "permission": "allow", "flows": flows, "messages": messages, "key_exprs": keys}

@@ -5,8 +5,15 @@ import re
 from pathlib import Path
 from typing import NamedTuple
 
-from bridge.wire.event_codes import SEVERITIES
-
+# severity, in the letters of NAMUR NE 107
+FAILURE, CHECK, OUTSIDE, MAINTENANCE, NEWS = "F", "C", "S", "M", ""
+SEVERITIES = {
+    FAILURE: "failure",
+    CHECK: "check",
+    OUTSIDE: "out of specification",
+    MAINTENANCE: "maintenance",
+    NEWS: "news",
+}
 _COLUMNS = {
     "Mode": "mode",
     "ContactState": "state",
@@ -14,7 +21,7 @@ _COLUMNS = {
     "Limit": "limit",
     "GuardState": "guard_state",
     "Cause": "cause",
-}  # columns by enum
+}  # column of a log by the enum of its codes
 
 
 class ColumnWord(NamedTuple):
@@ -27,12 +34,17 @@ class ColumnWord(NamedTuple):
 
 
 @functools.cache
+def source() -> str:
+    """The text of `stickslip.proto`, whose comments explain all codes."""
+    return Path(__file__).with_name("stickslip.proto").read_text(encoding="utf-8")
+
+
+@functools.cache
 def words() -> tuple[ColumnWord, ...]:
     """All codes, by column and number; `help` is the comment of the code in `stickslip.proto`, with its severity as a word."""
-    proto = Path(__file__).with_name("stickslip.proto").read_text(encoding="utf-8")
     result: list[ColumnWord] = []
     for enum, column in _COLUMNS.items():
-        body = re.findall(rf"^enum {enum} {{\n(.*?)^}}", proto, re.MULTILINE | re.DOTALL)[0]
+        body = re.findall(rf"^enum {enum} {{\n(.*?)^}}", source(), re.MULTILINE | re.DOTALL)[0]
         rows = re.findall(r"(\w+) = (\d+); +// (.+)", body)
         result += [ColumnWord(column, int(number), word, _spelt_out(comment)) for word, number, comment in rows]
     return tuple(result)

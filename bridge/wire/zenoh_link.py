@@ -32,11 +32,11 @@ __all__ = ["Bus", "BusConfig", "Inbox", "Received"]
 # Duration of one attempt to dial without a password. A starting rig makes a password, which only the next attempt can use.
 _WITHOUT_PASSWORD_S = 0.2
 _READS_S = 0.5  # time in which a running rig reads the first bytes of a connection, even on a busy computer
-_NO_PROTOCOL = b"\x08\x00" + b"\xff" * 8  # a length and its bytes, as Zenoh frames them; not a TLS handshake
-_AT_ONCE = struct.pack("ii", 0, 0)  # SO_LINGER off
+_NO_PROTOCOL = b"\x08\x00" + b"\xff" * 8  # invalid as Zenoh and as TLS: a rig that runs ends the connection
+_AT_ONCE = struct.pack("ii", 0, 0)  # value of SO_LINGER: off
 _SOURCE_LINE = re.compile(r" at /\S+\.rs:\d+\.?")  # a line of Zenoh's source, at the end of each of its errors
 _LIBC = ctypes.CDLL(None)
-_ROLES = frozenset({"plant", "controller", "recorder"})  # the roles with a token
+_ROLES = frozenset({"plant", "controller", "recorder"})  # roles that announce themselves by a liveliness token
 _MOST_CLAIMS = 64  # most claims that are stored; more are a flood, and a controller yields to a single rival already
 
 
@@ -68,7 +68,8 @@ def _listening(config: BusConfig, lockstep: bool) -> zenoh.Session:
     try:
         session = zenoh.open(session_config(config, hub=True, lockstep=lockstep, security=security))
     except zenoh.ZError as error:
-        line = f"{config.endpoint}: cannot listen on it: must be a free port and an address of this computer ({_brief(error)})"
+        cause = _SOURCE_LINE.sub("", str(error).splitlines()[0])
+        line = f"{config.endpoint}: cannot listen on it: must be a free port and an address of this computer ({cause})"
         raise Fault("ENDPOINT_BUSY", f"{line}; end the process that holds it, or choose another --endpoint") from None
     return session
 
@@ -321,8 +322,3 @@ def _header(reply: Any) -> wire.Header | None:
         if str(reply.ok.key_expr).endswith(f"/header/{header.role}"):
             return header
     return None
-
-
-def _brief(error: Exception) -> str:
-    """The message of a Zenoh error without the lines of its source."""
-    return _SOURCE_LINE.sub("", str(error).splitlines()[0])

@@ -12,13 +12,13 @@ import typer
 from bridge.faults import FAULTS, Fault
 from bridge.files import refuse_to_replace_text
 from bridge.plain import plain, print_line
-from bridge.results import write_json
 from cockpit.commands.as_json.option import STDOUT, Json, print_result
 from cockpit.commands.options import Certs, command
 from cockpit.run.child_process import end_like_ctrl_c, report
 from cockpit.run.writable import JSON, PAGE, RIG, check_output, check_output_folder, written
 
 if TYPE_CHECKING:
+    from cockpit.commands.diagnose_output import Diagnoses
     from diagnosis.diagnose_many import EvidenceFolder
     from diagnosis.evidence.folder import Evidence
     from diagnosis.result import Diagnosis
@@ -41,16 +41,6 @@ class _Options(NamedTuple):
         from diagnosis.diagnose_many import real_diagnose
 
         return partial(real_diagnose, budget_s=self.budget_s)
-
-    @property
-    def json_file(self) -> Path | None:
-        """File for the JSON; None if the JSON goes to stdout or was not requested."""
-        return None if self.as_json == STDOUT else self.as_json
-
-    @property
-    def only_json(self) -> Path | None:
-        """`as_json` for `print_result`, without a file: it is written after the text, which is printed even if it fails."""
-        return STDOUT if self.as_json == STDOUT else None
 
 
 @command()
@@ -119,7 +109,8 @@ def _check_destinations(options: _Options, is_single: bool, sources: list["Evide
     from diagnosis.report.rig_file import RIG_BEGINS
 
     seen: dict[Path, str] = {}
-    outputs = ("--json", options.json_file, JSON), ("--report", options.report, PAGE), ("--apply", options.apply, RIG)
+    json_file = None if options.as_json == STDOUT else options.as_json
+    outputs = ("--json", json_file, JSON), ("--report", options.report, PAGE), ("--apply", options.apply, RIG)
     for option, path, kinds in outputs:
         if path is None:
             continue
@@ -184,10 +175,10 @@ def _diagnose_one(source: "EvidenceFolder", options: _Options) -> int:
         refuse_force_drive(evidence)
     with watched() as progress:
         diagnosis = _result(source, evidence, options, progress)
-    print_result(options.only_json, diagnosis, in_words(diagnosis), indent=1)
+    refused: list[Fault] = []
+    _print(options, diagnosis, in_words(diagnosis), refused)
     wanted: list[tuple[str, Path | None, Callable[[Path], None]]] = [
-        ("", options.json_file, lambda path: write_json(path, diagnosis)),
-        ("report     ", options.report, partial(write_source_report, source, diagnosis)),
+        ("report     ", options.report, partial(write_source_report, source, diagnosis))
     ]
     if options.apply is not None and diagnosis.verdict in ("unexplained", "partly"):
         why = (
@@ -196,11 +187,18 @@ def _diagnose_one(source: "EvidenceFolder", options: _Options) -> int:
         _print_line(options, f"rig file   not written: {why}, so no effect can be applied")
     else:
         wanted.append(("rig file   ", options.apply, lambda path: write_rig(diagnosis, evidence, path)))
-    refused: list[Fault] = []
     for label, path, write in wanted:
-        if path is not None and written(partial(write, path), refused) and label:
+        if path is not None and written(partial(write, path), refused):
             _print_line(options, f"{label}{path}")
     return _report_refused(refused)
+
+
+def _print(options: _Options, result: "Diagnosis | Diagnoses", words: list[str], refused: list[Fault]) -> None:
+    """Print a result. A JSON file that cannot be written does not prevent the other files."""
+    try:
+        print_result(options.as_json, result, words, indent=1)
+    except Fault as fault:
+        refused.append(fault)
 
 
 def _report_refused(refused: list[Fault]) -> int:
@@ -232,7 +230,7 @@ def _result(
 def _diagnose_many(sources: list["EvidenceFolder"], options: _Options) -> int:
     """Diagnose all folders; with --report the results already in its folder are reused."""
     from cockpit.commands.diagnose_output import Diagnoses, in_a_line, watched
-    from cockpit.fleet.work import INDEX, FleetFolder, with_estimate, without_pictures
+    from cockpit.fleet.work import INDEX, FleetFolder, without_pictures
     from diagnosis import diagnose_many as many
 
     fleet = None if options.report is None else FleetFolder(options.report, sources, options.budget_s)
@@ -249,11 +247,11 @@ def _diagnose_many(sources: list["EvidenceFolder"], options: _Options) -> int:
                 many.diagnose_many(missing, options.jobs, options.cluster, options.diagnose, options.certs)
             ) as outcomes,
         ):
-            for outcome, estimate in with_estimate(outcomes, len(missing)):
+            for outcome in outcomes:
                 outcomes_by_name[outcome.source.name] = without_pictures(outcome)
                 if fleet is not None:
                     fleet.add(outcome)
-                line = f"{len(outcomes_by_name)} of {len(sources)}: {in_a_line(outcome)}{estimate and f'; {estimate}'}"
+                line = f"{len(outcomes_by_name)} of {len(sources)}: {in_a_line(outcome)}"
                 progress(line, len(outcomes_by_name) / len(sources))
     except KeyboardInterrupt:
         if fleet is not None:
@@ -264,12 +262,10 @@ def _diagnose_many(sources: list["EvidenceFolder"], options: _Options) -> int:
     results = [outcomes_by_name[source.name] for source in sources]
     refused = [] if fleet is None else fleet.refused
     table = Diagnoses(results)
-    if options.json_file is not None:
-        written(partial(write_json, options.json_file, table), refused)
     words = [in_a_line(outcome) for outcome in results]
     if options.report is not None:
         words.append(f"reports    {options.report / INDEX}")
-    print_result(options.only_json, table, words, indent=1)
+    _print(options, table, words, refused)
     statuses = [FAULTS[outcome.fault.fault].exit_status for outcome in results if outcome.fault is not None]
-    # the lowest status: bad evidence, which the caller can mend
+    # of several statuses the lowest: bad evidence comes first, which the caller can mend
     return min((status for status in (*statuses, _report_refused(refused)) if status), default=0)

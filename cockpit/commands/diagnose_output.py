@@ -1,15 +1,14 @@
 """Output of `stickslip diagnose`: progress, the answer in words, one line per folder."""
 
-import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from typing import Literal, NamedTuple
 
 from bridge import units
-from bridge.plain import plain, print_line
+from bridge.plain import plain
 from diagnosis.diagnose_many import FolderResult
 from diagnosis.report import words
-from diagnosis.report.relation_words import number_lines, relation_lines
+from diagnosis.report.words import number_lines, relation_lines
 from diagnosis.result import Diagnosis
 
 _SHOWN_CANDIDATES = 3
@@ -39,7 +38,7 @@ def in_words(diagnosis: Diagnosis) -> list[str]:
         lines += [f"{'' if i else label:<10} {line}" for i, line in enumerate(block)]
     lines.append(f"next       {after.what} {after.why}")
     if diagnosis.cannot_show:
-        lines.append(f"not shown  {', '.join(diagnosis.cannot_show)}: not with this drive, these runs or these numbers")
+        lines.append(f"not shown  {', '.join(diagnosis.cannot_show)}: excluded by drive, runs or assumed numbers")
     files: dict[tuple[str, str], list[str]] = {}
     for finding in diagnosis.findings:
         file, _, column = finding.where.partition(": ")
@@ -62,29 +61,19 @@ def in_a_line(outcome: FolderResult) -> str:
 @contextmanager
 def watched() -> Generator[Callable[[str, float], None]]:
     """Intermediate results line by line on stderr, with a progress bar below on a terminal."""
-    last = ""
-    if not sys.stderr.isatty():
-
-        def to_file(text: str, _share: float) -> None:
-            nonlocal last
-            if text != last:
-                print_line(text)
-            last = text
-
-        yield to_file
-        return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TimeElapsedColumn, TimeRemainingColumn
 
-    columns = (BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    columns, last = (BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn()), ""
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("", total=1.0)
 
-        def to_terminal(text: str, share: float) -> None:
+        def show(text: str, share: float) -> None:
             nonlocal last
             if text != last:
-                bar.console.print(plain(text), markup=False, highlight=False)
+                console.print(plain(text), markup=False, highlight=False, emoji=False, soft_wrap=True)
             last = text
             bar.update(task, completed=share)
 
-        yield to_terminal
+        yield show

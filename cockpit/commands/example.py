@@ -55,7 +55,7 @@ def example(
         TemporaryDirectory(prefix=".stickslip-", dir=parent_folder) as part,
         watched_share(f"making {folder}", quiet=as_json == STDOUT) as progress,
     ):
-        make_evidence(Path(part, "made"), Case("ladder", _EFFECTS[effect or _HIDDEN]), seed, progress)
+        make_evidence(Path(part, "made"), Case(effects=_EFFECTS[effect or _HIDDEN]), seed, progress)
         folder.parent.mkdir(parents=True, exist_ok=True)
         Path(part, "made").rename(folder)
     runs = read_manifest(folder).run

@@ -3,7 +3,6 @@
 import contextlib
 import json
 import signal
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -15,21 +14,16 @@ from cockpit.commands.options import BUS, SharedOptions, command
 if TYPE_CHECKING:
     from bridge.wire.bus_config import BusConfig
 
-_Port = Annotated[int, typer.Option(min=0, max=65535, help="Port of the page on 127.0.0.1; 0: any free port.")]
-_Log = Annotated[Path | None, typer.Option("--log", hidden=True)]
 
-
-def _seen_bus(command: str, shared: SharedOptions, log: Path | None, as_json: Json) -> "BusConfig":
+def _seen_bus(command: str, shared: SharedOptions, as_json: Json) -> "BusConfig":
     """The bus for a viewer. Raises Fault CONFIG or NOT_SECURE before anything is shown."""
     from bridge.wire.session import role_security
 
-    if log is not None:
-        raise Fault("CONFIG", f"--log {log}: {command} shows a running rig; for a log use `stickslip review {log}`")
     if as_json not in (None, STDOUT):
         raise Fault(
             "CONFIG", f"--json {as_json}: {command} writes to stdout while it runs; redirect it: --json > {as_json}"
         )
-    # The rig drops the link of a suspended viewer, and with it 20 to 40 blocks for the other clients.
+    # Ctrl-Z is ignored: the rig drops the link of a suspended viewer, and with it 20 to 40 blocks for the other clients.
     signal.signal(signal.SIGTSTP, signal.SIG_IGN)
     bus = shared.bus()
     role_security(bus, "viewer")
@@ -39,14 +33,15 @@ def _seen_bus(command: str, shared: SharedOptions, log: Path | None, as_json: Js
 @command(*BUS)
 def serve(
     shared: SharedOptions,
-    port: _Port = 8447,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port of the page on 127.0.0.1; 0: any free port.")
+    ] = 8447,
     foxglove: Annotated[
         bool, typer.Option("--foxglove", help="Also serve the signals to Foxglove and Lichtblick (extra foxglove).")
     ] = False,
     foxglove_port: Annotated[
         int, typer.Option(min=0, max=65535, help="Port for --foxglove on 127.0.0.1; 0: any free port.")
-    ] = 8765,
-    log: _Log = None,
+    ] = 8765,  # default of the connection dialogs of Foxglove and Lichtblick
     as_json: Json = None,
 ) -> None:
     """Show a rig while it runs, as a page for a browser on this computer; `stickslip review` shows a log.
@@ -55,11 +50,11 @@ def serve(
     that is printed.
     """
     from bridge.plain import print_line
+    from cockpit.live.operator_link import kept_token
     from cockpit.live.server import HOST, Server, listening
-    from cockpit.live.token import kept_token
     from cockpit.run.child_process import stop_event
 
-    bus = _seen_bus("serve", shared, log, as_json)
+    bus = _seen_bus("serve", shared, as_json)
     with contextlib.ExitStack() as ending:
         sock = ending.enter_context(listening(port))
         page_port = int(sock.getsockname()[1])
@@ -93,14 +88,13 @@ def watch(
     every: Annotated[
         float, typer.Option(min=0.05, max=3600.0, metavar="S", help="Seconds between two lines of --json.")
     ] = 1.0,
-    log: _Log = None,
     as_json: Json = None,
 ) -> None:
     """Show a rig while it runs, on one screen of a terminal until Ctrl-C; with --json one line per second on stdout."""
     from cockpit.live.screen import lines, show
     from cockpit.run.child_process import stop_event
 
-    bus = _seen_bus("watch", shared, log, as_json)
+    bus = _seen_bus("watch", shared, as_json)
     if as_json is None:
         show(bus, stop_event())
     else:

@@ -37,9 +37,8 @@ def look(
 ) -> None:
     """Estimate slips, period, F_s, F_k, mu, stiffness and mass from a measured file, each with its 90 % interval."""
     from cockpit.look.cycles import refuse_to_replace_sheet
-    from cockpit.look.hints import hints
-    from cockpit.look.result import Looked
-    from cockpit.look.source import LookOptions, looked_at, read_record
+    from cockpit.look.evidence import hints
+    from cockpit.look.source import Looked, LookOptions, looked_at, read_record
     from diagnosis.look.words import headline, sentences
 
     check_file(path, "BAD_TABLE", "give the path of a file of measured data")
@@ -86,7 +85,6 @@ def look(
 def _write(target: Path, seen: Any, record: Any, findings: list[Any]) -> None:
     suffix = target.suffix.lower()
     with writing(target):
-        target.parent.mkdir(parents=True, exist_ok=True)
         if suffix in PAGE:
             from cockpit.look.page import write_page
 
@@ -94,7 +92,7 @@ def _write(target: Path, seen: Any, record: Any, findings: list[Any]) -> None:
         elif suffix in PICTURE:
             from bridge.files import replacing
             from bridge.provenance import provenance
-            from cockpit.look.plots import save, whole
+            from cockpit.look.page import save, whole
 
             with replacing(target) as file:
                 save(whole(seen), file, suffix[1:], note=provenance([record.path]).in_words())

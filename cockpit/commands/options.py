@@ -78,7 +78,9 @@ class SharedOptions(NamedTuple):
         bool,
         typer.Option("--lockstep", help="Not in real time: each block waits for its command. Repeatable to the bit."),
     ] = False
-    log: Annotated[Path | None, typer.Option(metavar="FILE", help="Log to write; runs/NAME.mcap if not given.")] = None
+    log: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Log to write; runs/NAME.mcap if not given; `soak`: temporary.")
+    ] = None
     wait: Annotated[
         float | None,
         typer.Option(

@@ -10,8 +10,8 @@ import typer
 
 from bridge.faults import Fault
 from bridge.files import check_file, refuse_to_lose, refuse_to_replace_text
-from cockpit.commands.as_json.option import Json, print_result
-from cockpit.commands.options import DEFAULT_SCENARIO, command
+from cockpit.commands.as_json.option import STDOUT, Json, print_result
+from cockpit.commands.options import DEFAULT_SCENARIO, command, watched_share
 from cockpit.run.writable import CSV, PAGE, PICTURE, check_output, writing
 
 
@@ -20,7 +20,6 @@ def _written(out: Path, suffixes: tuple[str, ...]) -> Generator[None]:
     """Context of work that ends with writing `out`. Raises Fault if it cannot be written, at the start where possible."""
     check_output("--out", out, suffixes)
     with writing(out):
-        out.parent.mkdir(parents=True, exist_ok=True)
         yield
 
 
@@ -49,22 +48,18 @@ def plot(
         ),
     ] = "screen",
     width: Annotated[float | None, typer.Option(help="Width in mm; if not given 280 for screen, 85 for paper.")] = None,
-    dpi: Annotated[
-        float | None, typer.Option(help="Dots per inch of a .png; if not given 110 for screen, 600 for paper.")
-    ] = None,
     versus: Annotated[Path | None, typer.Option("--vs", help="Second log, drawn over the first.")] = None,
     data: Annotated[Path | None, typer.Option(help="Write the numbers of the curves to this FILE.csv.")] = None,
     as_json: Json = None,
 ) -> None:
     """Draw the run in a log: drive force, v_a against v_d, and the controller's actions; or any of its signals."""
-    from cockpit.figures.curves import FIRST_LINE
-    from cockpit.figures.request import request_of
+    from cockpit.figures.curves import FIRST_LINE, request_of
     from cockpit.figures.run_figure import Plotted, draw_logs
     from cockpit.run.replay import time_s
 
     from_s = time_s(f"--from {start}", start, "12.5s") if start else -math.inf
     to_s = time_s(f"--to {end}", end, "20s") if end else math.inf
-    request = request_of(from_s, to_s, signals, style, width, dpi)
+    request = request_of(from_s, to_s, signals, style, width)
     logs = [log] if versus is None else [log, versus]
     for path in logs:
         check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
@@ -135,7 +130,7 @@ def reproduce(
     """Recompute the paper: its figures, tables and claims, each with its number and whether it holds."""
     from cockpit.paper.page import reproduce as redo
 
-    with _written(out, PAGE):
-        result = redo(out, progress=True)
+    with _written(out, PAGE), watched_share("reproducing the paper", quiet=as_json == STDOUT) as progress:
+        result = redo(out, progress)
     print_result(as_json, result, [result.verdict, f"report   {out}"])
     return 0 if result.passed else 1

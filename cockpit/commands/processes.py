@@ -1,4 +1,4 @@
-"""`stickslip plant`, `controller` and `record`: one process of a run."""
+"""`stickslip run`: plant, controller and recorder to the end of a scenario; `plant`, `controller`, `record`: one of them."""
 
 from typing import Annotated, NamedTuple
 
@@ -6,9 +6,8 @@ import typer
 
 from bridge.faults import Fault
 from cockpit.commands.as_json.option import Json, print_result
-from cockpit.commands.options import SharedOptions, command
-from cockpit.run.child_process import stop_event, warn_without_priority
-from cockpit.run.lifecycle_lines import step_reports
+from cockpit.commands.options import SharedOptions, Strict, Verbose, command
+from cockpit.run.child_process import step_reports, stop_event, stopped_once, warn_without_priority
 from cockpit.run.writable import LOG, check_output
 
 _OF_A_PROCESS = ("scenario", "settings", "seed", "endpoint", "prefix", "certs", "lockstep", "wait", "child")
@@ -42,7 +41,7 @@ def plant(
     as_json: Json = None,
 ) -> None:
     """Simulate the rig of a scenario and serve it on the bus."""
-    from bridge.guard.latch import StopLatch
+    from bridge.guard.kept import StopLatch
     from cockpit.run.scenario import header, load_scenario, refuse_faults, refuse_short_blocks
     from plant.app import run as serve
 
@@ -120,3 +119,39 @@ def record(shared: SharedOptions, as_json: Json = None) -> None:
     with step_reports(quiet=bool(shared.child)) as report:
         record_all(path, made.bus, roles, about, shared.lockstep, stop, ready, made.log.rotation, report)
     print_result(as_json, Recorded(str(path)), [f"log      {path}"])
+
+
+@command("scenario", "settings", "seed", "endpoint", "prefix", "certs", "insecure", "lockstep", "log", "wait")
+def run(
+    shared: SharedOptions,
+    rig: Annotated[
+        str | None,
+        typer.Option(
+            "--rig", metavar="NAME", help="Rig in place of the scenario's: a name in deploy/rigs, or a .toml file."
+        ),
+    ] = None,
+    in_process: Annotated[
+        bool,
+        typer.Option(
+            "--in-process",
+            help="Lockstep in one process, without a bus: fastest. With faults 0.4 s of CPU per simulated second.",
+        ),
+    ] = False,
+    without: Annotated[
+        bool, typer.Option("--without", help="Also simulate the same run without the controller, for comparison.")
+    ] = False,
+    verbose: Verbose = False,
+    strict: Strict = False,
+    as_json: Json = None,
+) -> int:
+    """Run plant, controller and recorder through a scenario and judge it; exit status 0: ok, 1: not ok, 14: not judged."""
+    from cockpit.judge.verdict_words import strictly
+    from cockpit.run.run import run_scenario
+    from cockpit.run.scenario_file import rig_setting
+
+    of_rig = [rig_setting(rig)] if rig is not None else []
+    changed = [*of_rig, *shared._replace(wait=None).as_settings()]
+    with stopped_once():
+        outcome = run_scenario(shared.scenario, changed, shared.lockstep, in_process, shared.log, shared.wait, without)
+        print_result(as_json, outcome, [*outcome.in_words(verbose), *strictly(outcome.verdict, strict)])
+    return outcome.verdict.exit_status(strict)

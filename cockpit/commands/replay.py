@@ -65,6 +65,7 @@ def replay_command(
     else:
         paced = {"--speed": speed is not None, "--all": everything, "--wait": wait}
         meeting = {f"--{name}": getattr(shared, name) is not None for name in ("endpoint", "prefix", "certs")}
+        meeting["--insecure"] = shared.insecure
         _refuse(paced | meeting, "only with --to-bus, which publishes the log on the bus; add that, or leave it out")
     if not closed_loop:
         _refuse(
@@ -73,7 +74,7 @@ def replay_command(
     out = log or Path("runs/closed-loop.mcap")
     if closed_loop:
         check_output("--log", out, LOG)
-    for path in logs:  # checked before the work on the other logs
+    for path in logs:  # all logs are checked before the work on the first
         check_log_file(path)
     if to_bus:
         from cockpit.run.log_to_bus import publish_log

@@ -17,6 +17,15 @@ class Shipped(NamedTuple):
     rigs: list[str]
 
 
+class Copied(NamedTuple):
+    """The copy of a scenario."""
+
+    file: str
+
+
+ScenariosResult = Shipped | Copied
+
+
 @command()
 def scenarios(
     copy: Annotated[
@@ -44,7 +53,7 @@ def scenarios(
         lines = source.read_text(encoding="utf-8").splitlines(keepends=True)
         with writing(target):  # the line `#:schema` is left out: its path is relative to the folder of the source
             write_whole(target, "".join(line for line in lines if not line.startswith("#:schema")))
-        print_result(as_json, {"file": str(target)}, [str(target), f"next     stickslip run --scenario {target}"])
+        print_result(as_json, Copied(str(target)), [str(target), f"next     stickslip run --scenario {target}"])
         return
     known = {
         path.stem: str(read_toml(path).get("description", ""))

@@ -3,12 +3,12 @@
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from bridge.config import Strict, read_toml, validate
 from bridge.faults import Fault
 from cockpit.run.scenario_file import deploy_folder
-from plant.faults.kinds import ALL, TARGETS, InjectionKind
+from plant.faults.kinds import KINDS, TARGETS, InjectionKind
 from plant.faults.table import FaultTable
 
 NotNegative = Annotated[float, Field(ge=0)]
@@ -34,15 +34,15 @@ class NamedFault(Strict):
     checked: bool = Field(
         default=True, description="Armed by an operator, with a loop check; false: armed by its scenario."
     )
-    begin_s: NotNegative = Field(default=2.5, description="Time of the run; the loop check ends at 1.6 s.")
+    begin_s: NotNegative = Field(default=2.5, description="Begin in the run; the loop check ends at 1.6 s.")
     watch_s: Positive = Field(default=4.0, description="Time from begin_s during which the entry is judged.")
     told: list[str] | None = Field(
         default=None,
         description="Events, causes or reasons, at least one of which must be reported; default: the list of the group; "
         "empty: the fault must have no effect.",
     )
-    within_s: Positive = Field(default=1.0, description="Time limit for the report.")
-    zero_s: Positive | None = Field(default=None, description="Time after which nothing may vibrate until the end.")
+    within_s: Positive = Field(default=1.0, description="Time limit for the report, from begin_s.")
+    zero_s: Positive | None = Field(default=None, description="Time from begin_s after which nothing may vibrate.")
     open: Literal["", "SILENT", "UNSAFE"] = Field(default="", description="Known defect that this entry still shows.")
 
 
@@ -54,30 +54,14 @@ class FaultGroup(Strict):
     settings: list[str] = []
     entry: list[NamedFault]
 
-    @model_validator(mode="after")
-    def _names_differ(self) -> "FaultGroup":
-        names = [entry.name for entry in self.entry]
-        if twice := sorted({name for name in names if names.count(name) > 1}):
-            raise ValueError(f"entry.name = {twice[0]}: is used twice; give each entry a different name")
-        return self
-
 
 class CatalogueEntry(Strict):
-    """An entry with the settings of its group."""
+    """An entry, with the reports and settings that apply to it, which include the settings of its group."""
 
     group: str
     entry: NamedFault
     told: list[str]
     settings: list[str]
-
-    @property
-    def faults(self) -> list[FaultTable]:
-        """Fault tables with times of the run."""
-        entry = self.entry
-        return [
-            table.model_copy(update={"name": table.name or entry.name, "from_s": entry.begin_s + table.from_s})
-            for table in entry.fault
-        ]
 
 
 def load_catalogue(folder: Path | None = None) -> list[CatalogueEntry]:
@@ -91,12 +75,12 @@ def load_catalogue(folder: Path | None = None) -> list[CatalogueEntry]:
             catalogue.append(CatalogueEntry(group=path.stem, entry=entry, told=reports, settings=settings))
     names = [named.entry.name for named in catalogue]
     if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise Fault("CONFIG", f"deploy/faults: name = {twice[0]}: is in two files; give each entry a different name")
+        raise Fault("CONFIG", f"deploy/faults: name = {twice[0]}: is used twice; give each entry a different name")
     return catalogue
 
 
 def entry_names(incomplete: str) -> list[str]:
-    """Entries for shell completion."""
+    """Names of entries that begin with `incomplete`, for shell completion."""
     return [named.entry.name for named in load_catalogue() if named.entry.name.startswith(incomplete)]
 
 
@@ -111,7 +95,7 @@ def find_entry(name: str) -> CatalogueEntry:
 
 
 class KnownFault(NamedTuple):
-    """An entry in a list."""
+    """Row of the list of the catalogue."""
 
     name: str
     group: str
@@ -125,7 +109,7 @@ class FaultList(NamedTuple):
     kinds: list[InjectionKind]
 
     def in_words(self) -> list[str]:
-        """Lines of text."""
+        """Lines for the operator: the entries, then the kinds of fault by target."""
         lines = [f"{fault.name:<32} {fault.about}" for fault in self.faults]
         lines += ["", "kinds of [[fault]], by target:"]
         for group, targets in TARGETS.items():
@@ -138,5 +122,5 @@ class FaultList(NamedTuple):
 def known_faults() -> FaultList:
     """All known faults. Raises Fault CONFIG."""
     return FaultList(
-        [KnownFault(named.entry.name, named.group, named.entry.about) for named in load_catalogue()], list(ALL)
+        [KnownFault(row.entry.name, row.group, row.entry.about) for row in load_catalogue()], list(KINDS.values())
     )

@@ -24,7 +24,7 @@ from plant.faults.table import FaultTable
 _DIAL_S = 2.0  # timeout of the connection
 _HEADERS_S = 2.0  # timeout for the headers of the processes
 _AGAIN_S = 0.5  # interval of repetition: the first message may be lost during connection
-_TWICE_S = 0.6  # time for two messages, if no confirmation is expected
+_TWICE_S = 0.6  # time in which each order is sent twice, if no confirmation is expected
 _TAKEN_S = 5.0  # timeout of the confirmation of a fault that begins at once
 
 
@@ -33,24 +33,18 @@ class Injected(NamedTuple):
 
     endpoint: str
     name: str
-    done: list[str]
+    done: list[str]  # a line per fault: begun, or to begin, with its time
 
     def in_words(self) -> list[str]:
-        """Lines of text."""
+        """Lines for the operator."""
         return [f"{self.name:<8} {line.removeprefix(f'{self.name}: ')}" for line in self.done]
 
 
 def inject(bus_config: BusConfig, name: str, tables: Sequence[FaultTable], clear: bool = False) -> Injected:
-    """Inject faults into the loop at an endpoint; returns after a frozen process was continued.
+    """Inject faults, whose times count from now, into the loop at an endpoint; with `clear` first end the active faults.
 
-    Args:
-        bus_config: connection to the loop.
-        name: name of the faults.
-        tables: the faults; their times count from now.
-        clear: first end the active faults.
-
-    Raises Fault NO_PEER if no rig answers or confirms the fault, or a process cannot be reached.
-
+    Returns after a frozen process was continued. Raises Fault NO_PEER if no rig answers or confirms the fault, or a process
+    cannot be reached.
     """
     where = bus_config.endpoint
     of_rig = [table for table in tables if table.group != PROCESS]

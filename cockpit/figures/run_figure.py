@@ -7,15 +7,16 @@ from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.figure import Figure
 
 from bridge.files import replacing, write_whole
 from bridge.log.logfile import RunData, read_run
 from bridge.provenance import Provenance, provenance, shown_name
 from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
-from cockpit.figures.curves import LogCurve, as_table, curve_of, window_of
-from cockpit.figures.request import PAPER, SCREEN, FigureRequest
+from cockpit.figures.curves import PAPER, SCREEN, FigureRequest, LogCurve, as_table, curve_of, window_of
 from cockpit.figures.signals import limits_of, named
 from cockpit.judge.judged import judge_tables
 from cockpit.judge.verdict import RunVerdict
@@ -29,7 +30,8 @@ _SHADES: dict[int, tuple[str, str]] = {
     wire.STOPPED: ("#f0d5d5", "stopped"),
 }  # colour and label by mode
 _INK, _SLIP = "#1f2d3a", "#b5402a"
-_MM = 1.0 / 25.4  # inch
+_DPI = {SCREEN: 110.0, PAPER: 600.0}  # dots per inch of a .png
+_MM = 1.0 / 25.4  # inches per mm
 _FIRST_MM = {SCREEN: 90.0, PAPER: 42.0}  # height of the first panel, and of each that follows
 _NEXT_MM = {SCREEN: 60.0, PAPER: 30.0}
 _FOOT_MM = 1.35  # width of a letter in the foot line
@@ -44,7 +46,7 @@ class _Shown(NamedTuple):
     run: RunData
     name: str
     verdict: RunVerdict
-    cycles: Cycles | None
+    cycles: Cycles | None  # slips; None without a force
 
 
 class Plotted(NamedTuple):
@@ -66,8 +68,9 @@ def draw_logs(
     """
     wanted = request or FigureRequest()
     made = provenance(logs)
-    shown = [_shown(path, name) for path, name in zip(logs, _names(logs), strict=True)]
-    from_s, to_s = window_of([log.run for log in shown], wanted)
+    runs = [read_run(path) for path in logs]
+    shown = [_Shown(run, name, *judge_tables(run)) for run, name in zip(runs, _names(logs), strict=True)]
+    from_s, to_s = window_of(runs, wanted)
     signals = [named(wanted.signals, log.run) for log in shown]
     panels = [
         [
@@ -82,11 +85,6 @@ def draw_logs(
     if data is not None:
         write_whole(data, as_table([curve for panel in panels for curve in panel]))
     return [log.verdict for log in shown]
-
-
-def _shown(path: Path, name: str) -> _Shown:
-    run = read_run(path)
-    return _Shown(run, name, *judge_tables(run))
 
 
 def _names(logs: Sequence[Path]) -> list[str]:
@@ -110,16 +108,12 @@ def _figure(
     window_s: tuple[float, float],
     made: Provenance,
 ) -> Any:
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
     paper = request.style == PAPER
-    rest_mm = _NEXT_MM[request.style] * (len(panels) - 1)
-    size = (request.width_mm * _MM, (_FIRST_MM[request.style] + rest_mm) * _MM)
+    heights_mm = [_FIRST_MM[request.style], *([_NEXT_MM[request.style]] * (len(panels) - 1))]
+    size = (request.width_mm * _MM, sum(heights_mm) * _MM)
     with mpl.rc_context(_rules(paper)):
         figure = Figure(figsize=size, layout="constrained")
-        heights = [_FIRST_MM[request.style], *([_NEXT_MM[request.style]] * (len(panels) - 1))]
-        every: Any = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+        every: Any = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights_mm)[:, 0]
         if not paper:
             figure.suptitle(_title(shown, request, window_s), color=_INK, parse_math=False)
             foot = textwrap.fill(made.in_words(), int(request.width_mm / _FOOT_MM))
@@ -263,9 +257,7 @@ def _shade(axes: Any, shown: _Shown, window_s: tuple[float, float], named: bool)
 
 
 def _save(figure: Any, shown: Sequence[_Shown], out: Path, request: FigureRequest, made: Provenance) -> None:
-    import matplotlib as mpl
-
     suffix = out.suffix.lower()
     metadata = made.metadata(suffix, "; ".join(log.name for log in shown))
     with mpl.rc_context(_rules(request.style == PAPER)), replacing(out) as file:
-        figure.savefig(file, dpi=request.dpi, format=suffix.removeprefix("."), metadata=metadata)
+        figure.savefig(file, dpi=_DPI[request.style], format=suffix.removeprefix("."), metadata=metadata)

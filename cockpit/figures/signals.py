@@ -8,7 +8,7 @@ import numpy as np
 from bridge.arrays import Floats
 from bridge.faults import Fault
 from bridge.log.logfile import RunData, block_period_ns, sample_times_s
-from bridge.log.metadata import is_number
+from bridge.log.metadata import is_number, value_at
 from cockpit.judge.setup import absent_channels
 
 
@@ -69,11 +69,11 @@ PANELS = (
     Panel("Drive force",
         "Rises while the slide sticks and falls when it slips (red triangle). Smooth sliding is a level line."),
     Panel("Vibration against drive",
-        "Stick-slip ends where the vibration v_a is faster than the drive v_d: blue above red."),
+        "Stick-slip ends where v_a exceeds the drive's speed: blue above red or, on the way back, above red's mirror image."),
     Panel("Amplitude of the base against its stroke",
         "Amplitude of the base, zero to peak. Dashed: its limit. A curve at the limit has no reserve."),
     Panel("Predicted time to the next slip",
-        "Expected rest of a detected stick. No curve: the controller expects no slip."),
+        "Time until a detected stick is expected to break away. No curve: the controller expects no slip."),
     Panel("Positions", "The slide rests in a stick and jumps in a slip.", is_open=False),
     Panel("Accelerations", "The base shows the vibration; the slide shows a peak at each slip.", is_open=False),
     Panel("Frequency of the vibration", "As applied by the exciter.", is_open=False),
@@ -101,8 +101,8 @@ SIGNALS = {
         PlottedSignal("mass_accel_mps2", "", "slide's acceleration", "acceleration", "sensors", 1.0, "m/s²", _GREEN, _ACCEL),
         PlottedSignal("mass_position_m", "x", "slide's position", "position", "sensors", 1e3, "mm", _GREEN, _POSITIONS),
         PlottedSignal("drive_position_m", "s_d", "drive's position", "position", "sensors", 1e3, "mm", _RED, _POSITIONS),
-        PlottedSignal("round_trip_ns", "", "block out to command in", "round trip", "applied", 1e-3, "µs", _BROWN, unknown=0),
-        PlottedSignal("heat_share", "", "exciter's temperature rise, over its limit", "heating", "applied", 1e2, "%", _RED),
+        PlottedSignal("round_trip_ns", "", "block to command", "round trip", "applied", 1e-3, "µs", _BROWN, unknown=0),
+        PlottedSignal("heat_share", "", "exciter's temperature rise / limit", "heating", "applied", 1e2, "%", _RED),
     )
 }
 # fmt: on
@@ -180,19 +180,12 @@ def limits_of(run: RunData, axis: str) -> list[tuple[str, float]]:
 
 def stroke_limits(configurations: Mapping[str, Any]) -> list[tuple[str, float]]:
     """Limits of the amplitude from the configurations by role: label and value [m]."""
-    limits: list[tuple[str, float]] = []
-    for role, keys, words in (
-        ("controller", ("limits", "amplitude_max_m"), "controller's limit"),
-        ("plant", ("rig", "guard", "stroke_m"), "guard's limit"),
-        ("plant", ("rig", "piezo", "amplitude_max_m"), "exciter's stroke"),
+    limits: dict[float, list[str]] = {}
+    for key, words in (
+        ("controller.limits.amplitude_max_m", "controller's limit"),
+        ("plant.rig.guard.stroke_m", "guard's limit"),
+        ("plant.rig.piezo.amplitude_max_m", "exciter's stroke"),
     ):
-        value: Any = configurations.get(role)
-        for key in keys:
-            value = value.get(key) if isinstance(value, dict) else None
-        if is_number(value):
-            same = next((number for number, (_, limit_m) in enumerate(limits) if limit_m == value), None)
-            if same is None:
-                limits.append((words, float(value)))
-            else:
-                limits[same] = (f"{limits[same][0]} and {words}", float(value))
-    return limits
+        if is_number(value := value_at(configurations, key)):
+            limits.setdefault(float(value), []).append(words)
+    return [(" and ".join(words), value) for value, words in limits.items()]

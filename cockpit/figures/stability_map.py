@@ -1,16 +1,29 @@
 """Stability of a rig as a picture: where it sticks and slips, and how much vibration removes stick-slip."""
 
+import math
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from bridge.faults import Fault
 from bridge.files import replacing
 from bridge.provenance import Provenance, provenance
 from plant.config import RigConfig
-
-if TYPE_CHECKING:
-    from plant.stability import Floats
+from plant.stability import (
+    Floats,
+    critical_velocity_mps,
+    hurwitz_margin,
+    self_sustained_velocity_mps,
+    stabilising_vibration_mps,
+    with_constant_effects,
+)
+from plant.stability import stability_map as growth_map
 
 _RED, _AMBER, _GREEN, _INK = "#d9826b", "#f2d694", "#dcebd8", "#1f2d3a"
 _KINDS = (
@@ -18,7 +31,7 @@ _KINDS = (
     (1, _AMBER, "smooth if undisturbed; stick-slip that has started can go on"),
     (0, _GREEN, "stable: smooth sliding"),
 )
-_RATIO_SET_POINT = 1.2  # v_a / v_d at the controller's default set point
+_RATIO_SET_POINT = 1.2  # the controller's default set point of v_a / v_d
 
 
 class MapResult(NamedTuple):
@@ -45,17 +58,6 @@ def stability_map(rig: RigConfig, out: Path, files: Iterable[Path] = ()) -> MapR
     drive, which is unstable at low velocities, possibly a lower one. Raises Fault CONFIG if the drive never moves, and
     OSError if `out` cannot be written.
     """
-    import math
-
-    from plant.stability import (
-        critical_velocity_mps,
-        hurwitz_margin,
-        self_sustained_velocity_mps,
-        stabilising_vibration_mps,
-        with_constant_effects,
-    )
-    from plant.stability import stability_map as growth_map
-
     effects, nominal = rig.effects, rig.model_copy(update={"effects": {}})
     alone = {name: with_constant_effects(rig.model_copy(update={"effects": {name: effects[name]}})) for name in effects}
     rig = with_constant_effects(rig)
@@ -119,12 +121,7 @@ def _mm(velocity_mps: float) -> str:
 
 
 def _draw(rig: RigConfig, result: MapResult, out: Path, made: Provenance) -> None:
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     figure = Figure(figsize=(12.5, 6.4), layout="constrained")
-    FigureCanvasAgg(figure)
     left, right = figure.subplots(1, 2)
     _draw_without_vibration(left, rig, result)
     _draw_with_vibration(right, rig, result)
@@ -136,10 +133,6 @@ def _draw(rig: RigConfig, result: MapResult, out: Path, made: Provenance) -> Non
 
 
 def _draw_without_vibration(axes: Any, rig: RigConfig, result: MapResult) -> None:
-    import numpy as np
-
-    from plant.stability import hurwitz_margin, self_sustained_velocity_mps, stability_map
-
     v_d, k_d = result.drive_velocity_mps, result.drive_stiffness_N_per_m
     v_s = rig.contact.stribeck_velocity_mps
     # 20 v_s: beyond 27 v_s the slope of friction is 0 in double precision and an undamped rig would look stable
@@ -151,7 +144,7 @@ def _draw_without_vibration(axes: Any, rig: RigConfig, result: MapResult) -> Non
     areas = _regions(axes, velocity_mps * 1e3, stiffness * 1e-3, unstable, sustained)
     if result.critical_velocity_mps is None:
         # unstable at every velocity: draw lines of slow growth in place of a border
-        growth_per_s = stability_map(rig, *grid)
+        growth_per_s = growth_map(rig, *grid)
         for level_per_s, style in ((1.0, "-"), (1e-3, "--")):
             axes.contour(
                 velocity_mps * 1e3, stiffness * 1e-3, growth_per_s,
@@ -171,10 +164,6 @@ def _draw_without_vibration(axes: Any, rig: RigConfig, result: MapResult) -> Non
 
 
 def _draw_with_vibration(axes: Any, rig: RigConfig, result: MapResult) -> None:
-    import numpy as np
-
-    from plant.stability import hurwitz_margin, self_sustained_velocity_mps
-
     v_d = result.drive_velocity_mps
     removing = result.removing_vibration_velocity_mps
     top_mps = 2.5 * v_d
@@ -199,12 +188,8 @@ def _draw_with_vibration(axes: Any, rig: RigConfig, result: MapResult) -> None:
     _finish(axes, areas)
 
 
-def _regions(axes: Any, x: "Floats", y: "Floats", unstable: Any, sustained: Any) -> list[Any]:
+def _regions(axes: Any, x: Floats, y: Floats, unstable: Any, sustained: Any) -> list[Any]:
     """Colour the regions; returns a legend entry for each visible region."""
-    import numpy as np
-    from matplotlib.colors import ListedColormap
-    from matplotlib.patches import Patch
-
     kind = np.where(unstable, 2, np.where(sustained, 1, 0))
     axes.pcolormesh(x, y, kind, cmap=ListedColormap([_GREEN, _AMBER, _RED]), vmin=0, vmax=2, shading="nearest")
     return [Patch(fc=color, label=label) for number, color, label in _KINDS if (kind == number).any()]

@@ -4,8 +4,7 @@ from collections import defaultdict
 from typing import Literal, NamedTuple
 
 from diagnosis.report import words
-from diagnosis.report.latent_block import mostly
-from diagnosis.report.relation_words import remainder_in_words, share_in_words
+from diagnosis.report.words import mostly, remainder_in_words, share_in_words
 from diagnosis.result import Diagnosis
 
 FORMAT = "fleet/1"
@@ -53,19 +52,11 @@ class Fleet(NamedTuple):
     left: tuple[str, ...]  # pending folders
 
 
-class Diagnosed(NamedTuple):
-    """A folder with its diagnosis, and the file of its report."""
-
-    evidence: str
-    diagnosis: Diagnosis
-    report: str
-
-
-def fleet_of(done: list[Diagnosed], failed: list[Failed], left: list[str]) -> Fleet:
-    """The fleet from the results so far."""
+def fleet_of(done: list[tuple[str, Diagnosis, str]], failed: list[Failed], left: list[str]) -> Fleet:
+    """The fleet from the results so far; `done`: name of the evidence, its diagnosis and the file of its report."""
     members: dict[tuple[Kind, str], list[GroupedRig]] = defaultdict(list)
     for diagnosed in done:
-        key, rig = _placed(diagnosed)
+        key, rig = _placed(*diagnosed)
         members[key].append(rig)
     groups = [
         RigGroup(
@@ -81,9 +72,9 @@ def fleet_of(done: list[Diagnosed], failed: list[Failed], left: list[str]) -> Fl
     return Fleet(FORMAT, len(done) + len(failed) + len(left), tuple(groups), tuple(failed), tuple(left))
 
 
-def _placed(diagnosed: Diagnosed) -> tuple[tuple[Kind, str], GroupedRig]:
+def _placed(evidence: str, diagnosis: Diagnosis, report: str) -> tuple[tuple[Kind, str], GroupedRig]:
     """Group of a rig, and its row in the group."""
-    diagnosis, gap = diagnosed.diagnosis, diagnosed.diagnosis.gap
+    gap = diagnosis.gap
     kind: Kind = "named"
     what, size, explains, interval_90 = "", "", gap.shrinkage, gap.interval_90
     if diagnosis.verdict in ("effect", "partly"):
@@ -110,6 +101,4 @@ def _placed(diagnosed: Diagnosed) -> tuple[tuple[Kind, str], GroupedRig]:
     # a fit below the noise floor closes the whole gap and not more; a fit that widens the gap counts as 0
     explains = None if explains is None else min(max(explains, 0.0), 1.0)
     answer, after = words.answer(diagnosis), diagnosis.next_experiment.what
-    return (kind, what), GroupedRig(
-        diagnosed.evidence, diagnosed.report, diagnosis.verdict, answer, explains, interval_90, size, after
-    )
+    return (kind, what), GroupedRig(evidence, report, diagnosis.verdict, answer, explains, interval_90, size, after)

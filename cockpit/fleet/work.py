@@ -1,36 +1,41 @@
-"""Work on a fleet: stored results are not repeated, and an interrupted run resumes where it ended."""
+"""Work on a fleet: its index page; stored results are not repeated, and an interrupted run resumes where it ended."""
 
+import hashlib
+import json
 import os
-import time
-from collections.abc import Generator, Iterator
+from functools import cache
 from itertools import count
 from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from bridge.faults import Fault
+from bridge.files import read_json, write_whole
+from bridge.pages import filled_page
+from bridge.provenance import file_sha256, provenance
 from bridge.results import write_json
-from cockpit.fleet.groups import Diagnosed, Failed, Fleet, fleet_of
-from cockpit.fleet.kept import digest_of, evidence_files, keep, kept
-from cockpit.fleet.page import write_page
+from bridge.units import counted, interval, percent
+from cockpit.fleet.groups import Failed, Fleet, RigGroup, fleet_of
 from cockpit.run.writable import written
 from diagnosis.diagnose_many import EvidenceFolder, FolderResult
+from diagnosis.evidence.manifest import MANIFEST, read_manifest
 from diagnosis.report.page import write_report
 from diagnosis.result import Diagnosis
 from diagnosis.version import tool_version
 
 INDEX, INDEX_JSON = "index.html", "index.json"
 _LONGEST_NAME_BYTES = 200  # longest name of a report: a number and `.html.part` follow, up to 255 bytes are possible
+FORMAT = "fleet-result/1"
+RESULTS = "results"  # name of the folder of stored results, in the folder of a fleet
 
 
 class FleetFolder:
     """The folder of a fleet: a report and a stored result per rig, and the index, which is complete at any time.
 
-    Faults are not stored: their folders are tried again.
-
-    Args:
-        at: the folder; created if missing.
-        sources: all folders of the fleet.
-        budget_s: time limit per folder; None: no limit.
-
+    Faults are not stored: their folders are tried again. `sources` are all folders of the fleet, `budget_s` is the time limit
+    per folder, None without a limit.
     """
 
     def __init__(self, at: Path, sources: list[EvidenceFolder], budget_s: float | None) -> None:
@@ -39,7 +44,7 @@ class FleetFolder:
         self._reports = report_names([source.name for source in sources])
         self._digests = {source.name: self._digest(source) for source in sources}
         self._outcomes: dict[str, FolderResult] = {}
-        self._written: dict[str, str] = {}  # reports by name of the source
+        self._written: dict[str, str] = {}  # report file of each source
         self.refused: list[Fault] = []  # failed writes
 
     def kept(self) -> list[FolderResult]:
@@ -65,7 +70,7 @@ class FleetFolder:
         """The fleet from the results so far."""
         outcomes = [self._outcomes[source.name] for source in self._sources if source.name in self._outcomes]
         done = [
-            Diagnosed(outcome.source.name, outcome.diagnosis, self._written.get(outcome.source.name, ""))
+            (outcome.source.name, outcome.diagnosis, self._written.get(outcome.source.name, ""))
             for outcome in outcomes
             if outcome.diagnosis is not None
         ]
@@ -99,26 +104,6 @@ def write_source_report(source: EvidenceFolder, diagnosis: Diagnosis, path: Path
     write_report(diagnosis, source.name, path, evidence_files(source.folder))
 
 
-def with_estimate(outcomes: Iterator[FolderResult], left: int) -> Generator[tuple[FolderResult, str]]:
-    """Each outcome with the estimated time left, in words; empty after the last outcome.
-
-    Args:
-        outcomes: outcomes in order of completion.
-        left: number of outcomes.
-
-    """
-    began_s = time.monotonic()
-    for done, outcome in enumerate(outcomes, 1):
-        each_s = (time.monotonic() - began_s) / done
-        yield outcome, f"about {_in_words(each_s * (left - done))} left" if done < left else ""
-
-
-def _in_words(duration_s: float) -> str:
-    if duration_s < 90.0:
-        return f"{max(duration_s, 1.0):.0f} s"
-    return f"{duration_s / 60.0:.0f} min" if duration_s < 5400.0 else f"{duration_s / 3600.0:.1f} h"
-
-
 def without_pictures(outcome: FolderResult) -> FolderResult:
     """The outcome without its pictures, the largest part: hundreds of folders must fit into memory."""
     return outcome._replace(diagnosis=outcome.diagnosis and outcome.diagnosis._replace(pictures=()))
@@ -137,3 +122,78 @@ def report_names(names: list[str]) -> dict[str, str]:
         taken.add(unique.casefold())
         reports[name] = f"{unique}.html"
     return reports
+
+
+def write_page(fleet: Fleet, path: Path) -> None:
+    """Write the index page of a fleet. Raises Fault LOG_WRITE, OSError."""
+    shared = [group for group in fleet.groups if group.kind != "no-gap"]
+    text = filled_page(
+        Path(__file__).with_name("page.html.j2"),
+        f"Fleet of {counted(fleet.folders, 'rig')}",
+        provenance().footer(),
+        fleet=fleet,
+        shared=shared,
+        without=[rig for group in fleet.groups if group.kind == "no-gap" for rig in group.rigs],
+        rigs=sum(len(group.rigs) for group in shared),
+        title=_title,
+        percent=percent,
+        between=interval,
+        counted=counted,
+        link=quote,
+        most=max((group.helps for group in shared), default=0.0),
+    )
+    write_whole(path, text)
+
+
+def _title(group: RigGroup) -> str:
+    """Title of a group: the shared cause."""
+    if group.kind == "named":
+        return group.what
+    return f"unexplained: {group.what}" if group.what else "unexplained, without a known common cause"
+
+
+def evidence_files(folder: Path) -> list[Path]:
+    """The manifest and the distinct files of the runs. Raises Fault BAD_EVIDENCE."""
+    runs = dict.fromkeys(run.file for run in read_manifest(folder).run)  # several runs may be parts of a file
+    return [folder / MANIFEST, *(folder / file for file in runs)]
+
+
+def digest_of(folder: Path, tool: str, budget_s: float | None) -> str:
+    """SHA-256 over the files of an evidence folder, the version of the diagnosis and its time budget.
+
+    The name of the folder and the times of its files are excluded. Raises Fault BAD_EVIDENCE, OSError.
+    """
+    # the manifest contains the names of the files
+    parts = [tool, str(budget_s), *(file_sha256(path) for path in evidence_files(folder))]
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+def keep(fleet: Path, digest: str, diagnosis: Diagnosis, report: str) -> None:
+    """Store a result; it is valid only with its report, already written. Raises Fault LOG_WRITE, OSError."""
+    table = {
+        "format": FORMAT,
+        "report": report,
+        "report_sha256": file_sha256(fleet / report),
+        "diagnosis": _adapter().dump_python(diagnosis._replace(pictures=()), mode="json"),
+    }
+    write_whole(_place(fleet, digest), json.dumps(table) + "\n")  # keeps NaN and infinity, unlike strict JSON
+
+
+def kept(fleet: Path, digest: str) -> tuple[Diagnosis, str] | None:
+    """A stored result without its pictures, and the file of its report; None without an intact result."""
+    try:
+        table: dict[str, Any] = read_json(_place(fleet, digest))
+        if table["format"] != FORMAT or file_sha256(fleet / table["report"]) != table["report_sha256"]:
+            return None
+        return _adapter().validate_python(table["diagnosis"]), table["report"]
+    except (OSError, ValueError, TypeError, KeyError, ValidationError):
+        return None
+
+
+def _place(fleet: Path, digest: str) -> Path:
+    return fleet / RESULTS / f"{digest}.json"
+
+
+@cache
+def _adapter() -> TypeAdapter[Diagnosis]:
+    return TypeAdapter(Diagnosis, config=ConfigDict(arbitrary_types_allowed=True, ser_json_inf_nan="constants"))

@@ -10,9 +10,11 @@ from bridge.log.finding import Finding
 from bridge.log.log_reader import LogReader
 from bridge.log.logfile import RunData, check_log_file, feed
 from bridge.results import in_json
+from cockpit.judge.phases import Phase
 from cockpit.judge.run_judge import RunJudge
 from cockpit.judge.setup import is_known
 from cockpit.judge.verdict import RunVerdict
+from cockpit.judge.verdict_words import in_words
 from diagnosis.slips import Cycles
 
 _PIECE_ROWS = 4096  # messages of a log in memory that the judge takes per call
@@ -34,17 +36,11 @@ class Judged(NamedTuple):
 
 
 def judge_log(
-    path: Path,
-    progress: Callable[[float], None] | None = None,
-    stretch_from_s: float | None = None,
+    path: Path, progress: Callable[[float], None] | None = None, stretch_from_s: float | None = None
 ) -> Judged:
     """Judge and check a log in one pass, in constant memory. Raises Fault BAD_LOG.
 
-    Args:
-        path: path of the log.
-        progress: called with the share of the log read so far, 0 to 1.
-        stretch_from_s: begin of a further stretch, see `RunJudge`.
-
+    `progress` is called with the share of the log read so far, 0 to 1; `stretch_from_s` as of `RunJudge`.
     """
     check_log_file(path)
     reader = LogReader(path)
@@ -68,8 +64,26 @@ def judge_tables(run: RunData) -> tuple[RunVerdict, Cycles | None]:
     judge.log.events.add(run.events)
     tables = {name: getattr(run, name) for name in ("trace", "applied", "command", "state", "announce", "sensors")}
     pieces = max(map(len, tables.values())) // _PIECE_ROWS + 1
-    for piece in range(pieces):  # the pieces of all tables are of the same time, apart from missing messages
+    for piece in range(pieces):  # the pieces of all tables cover the same time, apart from missing messages
         for name, table in tables.items():
             part = table[len(table) * piece // pieces : len(table) * (piece + 1) // pieces]
             judge.add(name, part, part["t_ns"])
     return judge.result(run.damage, run.checksums, run.foreign), judge.cycles
+
+
+class RunOutcome(NamedTuple):
+    """Verdict on a run, name and effects of its rig."""
+
+    verdict: RunVerdict
+    rig: str
+    effects: list[str]  # effects of the rig
+    without: Phase | None  # the stretch `after`, simulated without the controller; None without the option `--without`
+    JSON_MERGED = "verdict"
+    JSON_OPTIONAL = "effects", "without"
+
+    def in_words(self, verbose: bool) -> list[str]:
+        """The verdict in six lines; with `verbose` all figures."""
+        lines = in_words(self.verdict, verbose, self.without)
+        if verbose:
+            lines.append(f"rig      {self.rig}" + (f", with {', '.join(self.effects)}" if self.effects else ""))
+        return lines

@@ -23,11 +23,11 @@ from bridge.log.watches.arrays import noise_of
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.judge.window import HasMoved, Window
 
-_FOLLOWS = 0.5  # share of the drive's travel; a slide that moves farther no longer sticks
-_AT_TURN_SIGMAS = 6.0  # distance to the turning point within which the drive turns, in rms noises of its position
-# Reversals reported in this time before the end of a window are left to the next window, as reports are early or late.
+_FOLLOWS = 0.5  # a slide that moves by more than this share of the drive's travel no longer sticks
+_AT_TURN_SIGMAS = 6.0  # the drive turns within this distance of its extreme position, in rms noises of the position
+# Reversals that the controller reports in this time before the end of a window are left to the next: it reports early or late.
 _CHANGE_S = 0.25
-_SEEN_SIGMAS = 10.0  # travel of the drive over which the slide is compared, in rms noises of both positions
+_SEEN_SIGMAS = 10.0  # travel of the drive with which the slide's travel is compared, in rms noises of both positions
 
 
 class Following(NamedTuple):
@@ -35,11 +35,11 @@ class Following(NamedTuple):
 
     moving_s: float
     error_rms_m: float
-    error_peak_m: float  # largest magnitude
+    error_peak_m: float  # largest magnitude of drive less slide
     error_ripple_m: float  # rms about the mean of each direction: a constant offset does not remove it
     reversals: int  # changes of sign of the drive's velocity
     reversal_stick_s: float  # longest time from a reversal until the slide follows; 0 without reversals
-    quadrant_error_m: float  # the largest; 0 without reversals
+    quadrant_error_m: float  # largest of all reversals; 0 without reversals
 
 
 class Reversal(NamedTuple):
@@ -48,7 +48,7 @@ class Reversal(NamedTuple):
     reported_s: float  # time by the controller, up to 0.03 s early or late
     t_s: float  # turning point by the drive position
     stick_s: float  # time until the slide makes half of the drive's travel, at most to the end of the stroke
-    quadrant_error_m: float  # 0 if the slide never follows
+    quadrant_error_m: float  # as defined at the top of this file; 0 if the slide never follows
 
 
 class BlockMotion(NamedTuple):
@@ -68,7 +68,7 @@ class FollowingSum:
         self.moving = 0  # blocks with a moving drive, with or without a position of the slide
         self._blocks = 0
         self._squares_m2 = self._peak_m = self._dose_m2_per_s = 0.0
-        self._ways = {-1: (0, 0.0, 0.0), 1: (0, 0.0, 0.0)}  # by direction: blocks, mean, squares about the mean
+        self._ways = {-1: (0, 0.0, 0.0), 1: (0, 0.0, 0.0)}  # by direction: blocks, mean error, squares about the mean
         self._reversals = 0
         self._stick_s = self._quadrant_m = 0.0
 
@@ -122,7 +122,7 @@ class MotionOf:
 
     def __init__(self) -> None:
         self._moved = HasMoved()
-        # last moving block so far: time, slide, drive, direction
+        # last moving block so far: time [s], positions of slide and drive [m], direction
         self._last: tuple[float, float, float, int] | None = None
         self._until_s = -np.inf  # reversals are judged up to this time
 
@@ -148,7 +148,7 @@ class MotionOf:
         """Reversals in a window. A reversal at its end belongs to the next window, which has the stroke after it."""
         until_s = np.inf if window.is_last else window.own_ns[1] * 1e-9 - _CHANGE_S
         columns: Any = t_s, slide_m, drive_m, direction
-        if self._last is not None and self._last[0] < t_s[0]:  # the drive may have rested since
+        if self._last is not None and self._last[0] < t_s[0]:  # the drive may have rested since: add its last motion
             columns = tuple(
                 np.concatenate([[value], column]) for value, column in zip(self._last, columns, strict=True)
             )
@@ -177,12 +177,9 @@ def _shaken(window: Window, rows: npt.NDArray[np.int64]) -> Bools:
 
 
 def reversals_of(t_s: Floats, slide_m: Floats, drive_m: Floats, direction: npt.NDArray[np.int64]) -> list[Reversal]:
-    """Changes of sign of the drive's velocity; stops between both signs are ignored.
+    """Changes of sign of the drive's velocity; stops between both signs are ignored. All arguments are [blocks].
 
-    Args:
-        t_s, slide_m, drive_m: time and positions, [blocks].
-        direction: direction of the drive, 0 at rest; it may lag the position.
-
+    The direction of the drive is 0 at rest, and may lag its position.
     """
     moving = np.flatnonzero(direction)
     at = np.flatnonzero(np.diff(direction[moving])) + 1
@@ -192,14 +189,13 @@ def reversals_of(t_s: Floats, slide_m: Floats, drive_m: Floats, direction: npt.N
     seen_m = _SEEN_SIGMAS * np.hypot(noise_of(slide_m), noise_of(drive_m))
     at_turn_m = _AT_TURN_SIGMAS * noise_of(drive_m)
     begins = [0]
-    for change in changes:  # search the turning point, back from the reported change
+    for change in changes:  # the turning point is the last block near the extreme position before the reported change
         place_m = direction[change] * drive_m[begins[-1] : change + 1]
         begins.append(begins[-1] + int(np.flatnonzero(place_m <= place_m.min() + at_turn_m)[-1]))
     ends = [*np.minimum(begins[2:], lasts[1:] + 1), moving[-1] + 1]
     return [
         Reversal(
-            float(t_s[change]),
-            *_stick(t_s[begin:end], way * slide_m[begin:end], way * drive_m[begin:end], seen_m),
+            float(t_s[change]), *_stick(t_s[begin:end], way * slide_m[begin:end], way * drive_m[begin:end], seen_m)
         )
         for change, begin, end, way in zip(changes, begins[1:], ends, direction[changes], strict=True)
         if end - begin > 1

@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from bridge.log.pause_events import RunPause
-from bridge.log.watches.event_watch import EventWatch
+from bridge.log.watches.event_watch import EventWatch, RunPause
 from bridge.units import counted
 from bridge.wire import core_timer
 from cockpit.judge.watches import LatencyWatch
@@ -26,17 +25,17 @@ class Pauses(NamedTuple):
     number: int
     total_ms: float
     longest_ms: float
-    late_inside: int  # commands later than 1 ms with a stall between their block and the plant
+    late_inside: int  # commands later than 1 ms, at least half of whose delay is a stall of all cores
     late_outside: int  # all other late commands
-    late_one_core: int  # part of `late_outside`, during a stall of one core, which no real-time priority prevents
-    within_1_ms_outside: float  # share of the commands not delayed by a stall
+    late_one_core: int  # part of `late_outside` that a stall of one core delayed, which no real-time priority prevents
+    within_1_ms_outside: float  # share of commands within 1 ms, of all commands not in `late_inside`
 
 
 class Computer(NamedTuple):
     """Stalls seen by the recorder, and lateness of plant and controller."""
 
-    stalls: int
-    longest_ms: float
+    stalls: int  # stalls of every core, and those above 5 ms of plant or controller; overlapping ones count once
+    longest_ms: float  # the longest stall or lateness
     whose: str  # stalled process, plant or controller, or every core; empty if nothing was late
     at_s: float  # begin of the longest stall
 
@@ -53,7 +52,7 @@ class CommandSum:
         self._inside = self._one_core = 0
 
     def add(self, window: Window) -> None:
-        """Add the judged rows of a window, with the stalls known so far."""
+        """Count the late commands in the judged rows of a window that the stalls known so far delayed."""
         applied = window.applied[window.own(window.applied)]
         if not len(applied):
             return
@@ -158,6 +157,6 @@ def pauses_in_words(pauses: Pauses | None) -> list[str]:
         f"every core stalled {counted(pauses.number, 'time')} ({pauses.total_ms:.1f} ms in total, longest "
         f"{pauses.longest_ms:.1f} ms); {counted(pauses.late_inside, 'late command')} in stalls, "
         if pauses.number
-        else "none of every core; "
+        else "no stall of all cores at once; "
     )
     return [f"stalls   {stalls}{late} later than 1 ms outside of them ({share}){alone}"]

@@ -1,6 +1,6 @@
-"""Stretches of a run: before the controller, hand-over, after, and without a controller in charge."""
+"""Stretches of a run: before the controller, hand-over, after, without a controller; whether they test the controller."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,13 +9,12 @@ from bridge.arrays import Floats
 from bridge.log.in_charge import GONE_S, ChargeWatch
 from cockpit.judge.machine_terms import BlockMotion, Following, FollowingSum
 from cockpit.judge.setup import SETTLING_S, Setup
-from cockpit.judge.slips import Forces
-from cockpit.judge.strokes import Swing
+from cockpit.judge.slips import Forces, Swing
 from cockpit.judge.watches import StepWatch
 
 Stretches = list[tuple[float, float]]
 
-# Begin of a phase, at most half of it, that does not count for the swing: a run starts with an unloaded spring.
+# First seconds of a phase, at most half of it, that do not count for swing and mean force: a run starts with an unloaded spring.
 _RAMP_S = 4.0
 
 
@@ -27,23 +26,18 @@ class Phase(NamedTuple):
     slips_per_min: float
     swing_N: float  # drive force: largest less smallest block mean in the steady part of a stroke, median of strokes
     strokes: int  # number of these strokes; 0 without even motion: then the swing is over all blocks
-    mean_force_N: float
+    mean_force_N: float  # mean drive force of the stretch, without its first 4 s, or first half if that is shorter
     following: Following | None  # None without motion of the drive or without a measured position
     vibration_dose_mm2_per_s: float  # integral of v_a^2
 
 
 class PhaseSum:
-    """A stretch of a run, summed window by window. Its end is infinite while unknown.
-
-    Args:
-        from_s, to_s: begin and end.
-
-    """
+    """A stretch of a run from `from_s` to `to_s`, summed window by window. Its end is infinite while unknown."""
 
     def __init__(self, from_s: float, to_s: float) -> None:
         self.from_s, self.to_s = from_s, to_s
-        self.missing = 0  # blocks missing in the log, or without a force
-        self.unsure = 0  # slips with missing blocks
+        self.missing = 0  # blocks missing in the log, or without a finite force
+        self.unsure = 0  # slips during which blocks are missing
         self.slips = 0
         self._blocks = 0
         self._whole, self._steady = Swing(), Swing()
@@ -75,7 +69,7 @@ class PhaseSum:
             self._following.add(motion, counts)
 
     def result(self, block_s: float) -> Phase | None:
-        """The sums; None without a block."""
+        """Figures of the stretch; None if it has no block with a force."""
         if not self._blocks:
             return None
         seconds = self._blocks * block_s
@@ -100,16 +94,16 @@ class Interruptions:
         self._setup, self._charge, self._steps = setup, charge, steps
 
     def stops(self, is_last: bool) -> Stretches:
-        """Stops, each with its settling second."""
+        """Stretches with the controller stopped or the rig not armed, each with its settling second."""
         return self._steps.stops(self._setup.block_s, is_last)
 
     def fallbacks(self) -> Stretches:
-        """Stretches without a fresh command; infinite end if still open."""
+        """Stretches in which the rig had no fresh command; the end is infinite while one lasts."""
         since_s = self._charge.open_from_s
         return [*self._charge.stretches, *([(since_s, np.inf)] if since_s is not None else [])]
 
     def gone(self) -> Stretches:
-        """Fallbacks too long for a stall of the computer: the controller was absent."""
+        """Fallbacks above 1 s, too long for a stall of the computer: the controller was absent."""
         return [stretch for stretch in self.fallbacks() if stretch[1] - stretch[0] > GONE_S]
 
     def stalls(self) -> Stretches:
@@ -151,3 +145,60 @@ def apart(stretch: tuple[float, float], without: Stretches) -> Stretches:
             parts.append((at_s, min(from_s, end_s)))
         at_s = max(at_s, until_s)
     return [(first_s, last_s) for first_s, last_s in [*parts, (at_s, end_s)] if last_s > first_s]
+
+
+def untested(
+    setup: Setup,
+    steps: StepWatch,
+    seconds: float,
+    unreadable: str,
+    answered: bool,
+    after: Phase | None,
+    in_charge_s: float,
+) -> str:
+    """Reason for which the run does not test the controller; empty if it does.
+
+    Args:
+        seconds: end of the last block; 0 without any.
+        unreadable: error of the first unreadable block; empty without any.
+        answered: at least one block had a fresh command.
+        in_charge_s: time in which the controller was in charge, including its settling.
+
+    """
+    if setup.imported:
+        return "measured data of another program: no controller to judge"
+    if not seconds:
+        return (
+            f"no block can be read: {unreadable}; every block must have all channels"
+            if unreadable
+            else "no block was recorded"
+        )
+    if not steps.steps:
+        return "no step of a controller was recorded: nothing was tested"
+    if not steps.armed:
+        return "the rig was never armed: `stickslip arm`, or `arm = true` in the scenario of a simulated rig"
+    if not steps.moved:
+        return "the drive never moved: nothing was tested"
+    if after is not None:
+        return ""
+    if seconds < setup.enabled_from_s:
+        return f"ended before the controller was enabled (at {setup.enabled_from_s:.1f} s)"
+    if in_charge_s <= 0.0 or not answered:
+        return "the controller was not in charge in this run"
+    why = f"too short to judge: it has {SETTLING_S:g} s to settle"
+    if in_charge_s > SETTLING_S:  # no finite force, or stops and stalls left no second to settle
+        why = "but none of it can be judged"
+    return f"the controller was in charge for {in_charge_s:.2g} s, {why}"
+
+
+def too_little(after: Phase | None, phases: Mapping[str, PhaseSum], block_s: float) -> str:
+    """Reason for which the controlled motion is too short to show a slip; empty if it is long enough."""
+    if after is None:
+        return ""
+    moving_s, before = phases["after"].moving * block_s, phases["before"]
+    if not moving_s:
+        return f"the drive did not move in the {after.seconds:.2g} s with the controller in charge"
+    if before.slips and moving_s < (period_s := before.moving * block_s / before.slips):
+        line = f"the drive moved for {moving_s:.2g} s with the controller in charge"
+        return f"{line}, less than the {period_s:.2g} s between two slips before: make the run longer"
+    return ""

@@ -12,10 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from bridge.arrays import Bools, Floats
-from bridge.log.in_charge import NO_COMMAND
 from bridge.log.watches.arrays import Longest
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import GAP, LATE, STALE
+from bridge.wire.messages import GAP, LATE, NO_BLOCK, STALE
 from cockpit.judge.setup import SETTLING_S, Setup
 from cockpit.judge.watches import STANDSTILL_MPS
 from cockpit.judge.window import Rows, Window
@@ -27,10 +26,10 @@ ALARM_RATIO = 1.05
 # vibrates harder than commanded passes.
 _MOST_SET_POINTS = 1.5
 MOST_ABOVE_S = 0.2
-_RAMP_S = 0.15  # not judged after each begin: 40 ms of ramp at the default slew, plus the filter of the measurement
-_STEADY_S, _STEADY_SHARE = 0.1, 0.1  # a smaller change of the drive velocity in this time counts as even motion
-_RAMPED_DOWN = (wire.STALE_INPUT, wire.NOT_FINITE, wire.OPERATOR_STOP)  # limits that fade the vibration
-_LATE_BLOCKS = 2.0  # lateness, in block times, from which a stall of the computer counts
+_RAMP_S = 0.15  # not judged after each begin of vibration: 40 ms of ramp at the default slew, and the filter of v_a
+_STEADY_S, _STEADY_SHARE = 0.1, 0.1  # motion is even if the drive velocity changes by less than this share in this time
+_RAMPED_DOWN = (wire.STALE_INPUT, wire.NOT_FINITE, wire.OPERATOR_STOP)  # limits that fade the vibration: not judged
+_LATE_BLOCKS = 2.0  # lateness of the plant, in block times, above which it counts as a stall of the computer
 
 
 class RatioVerdict(NamedTuple):
@@ -39,10 +38,10 @@ class RatioVerdict(NamedTuple):
     lowest: float
     highest: float
     judged_s: float
-    below_s: float  # under 1.05, a warning: without slips the run is ok
-    above_s: float  # over 1.5 set points, total
+    below_s: float  # time below 1.05: a warning, not a failure, as a run without slips is ok
+    above_s: float  # time above 1.5 set points, total
     longest_above_s: float  # the longest such stretch
-    left_out_s: float  # vibration in stalls and the second after them
+    left_out_s: float  # time of vibration not judged: in stalls and the second after each
 
     @property
     def ok(self) -> bool:
@@ -105,7 +104,7 @@ class RatioWatch:
     def _after_stall(self, t_s: Floats, trace: Rows, applied: Rows) -> Bools:
         """Steps in a stall of plant or controller, or in the second after it."""
         # a fallback before the first command does not count as a stall
-        answers = applied["command_block"] != np.uint64(NO_COMMAND)
+        answers = applied["command_block"] != np.uint64(NO_BLOCK)
         stalls = ((applied["fallback"] != 0) & answers) | (applied["late_ns"] > _LATE_BLOCKS * self._block_s * 1e9)
         stalled_s = t_s[(trace["events"] & (GAP | STALE | LATE)) != 0]
         at_s = np.sort(np.concatenate([[-math.inf], applied["t_ns"][stalls] * 1e-9, stalled_s]))
@@ -120,6 +119,6 @@ class RatioWatch:
 
 
 def _since_begin(excited: Bools) -> Floats:
-    """Steps since the begin of the vibration; a vibration in the first row began earlier."""
+    """Steps since the begin of the vibration; infinite for a vibration in the first row, which began earlier."""
     index = np.arange(len(excited), dtype=np.float64)
     return index - np.maximum.accumulate(np.where(excited, -math.inf, index)) - 1.0

@@ -1,6 +1,6 @@
 """Judge of a run: takes messages piece by piece in the order of the log, and returns the verdict at the end.
 
-Watches, each with `add` for the messages of a topic, are in `_watches`; checks of windows are in `judged_windows`.
+Watches, each with `add` for the messages of a topic, are in `_watches`; checks of windows are in `JudgedWindows`.
 """
 
 import re
@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from bridge.arrays import Floats
+from bridge.arrays import Floats, Records
 from bridge.log.check.channel import not_finite
 from bridge.log.check.log_check import LogWatch
 from bridge.log.damage import Damage, damage_findings, foreign_in_words
@@ -22,17 +22,26 @@ from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.channels import SENSOR_CHANNELS
 from bridge.wire.event_codes import SEVERITIES, WEAK_REASONS, harms, is_listed
-from bridge.wire.messages import Records
-from cockpit.judge.judged_windows import JudgedWindows
-from cockpit.judge.losses import Losses, clock_fault, losses_of
-from cockpit.judge.margins import Margins
-from cockpit.judge.phases import Interruptions, Phase, Stretches, apart, settling, within
-from cockpit.judge.setup import SETTLING_S, Setup, described, is_known, plant_of, setup_of
-from cockpit.judge.slips import bins_of
-from cockpit.judge.tested import too_little, untested
+from cockpit.judge.machine_terms import MotionOf
+from cockpit.judge.pauses import CommandSum, StallSum
+from cockpit.judge.phases import (
+    Interruptions,
+    Phase,
+    PhaseSum,
+    Stretches,
+    apart,
+    settling,
+    too_little,
+    untested,
+    within,
+)
+from cockpit.judge.ratio_watch import RatioWatch
+from cockpit.judge.sensor_watch import SensorWatch
+from cockpit.judge.setup import SETTLING_S, Described, Setup, described, is_known, plant_of, setup_of
+from cockpit.judge.slips import Forces, bins_of, forces_of
 from cockpit.judge.verdict import MISSING_SHARE, RunVerdict
-from cockpit.judge.watches import FrozenWatch, LatencyWatch, RigWatch, StepWatch
-from cockpit.judge.window import LAYOUTS, WaitingRows, reduced
+from cockpit.judge.watches import FrozenWatch, LatencyWatch, Losses, RigWatch, StepWatch, clock_fault, losses_of
+from cockpit.judge.window import LAYOUTS, HasMoved, WaitingRows, Window, reduced
 from diagnosis.slips import Cycles
 
 # Events left out of the findings: the judge counts them from blocks and steps, and DRIVE_UNSEEN also occurs at sound turns.
@@ -45,14 +54,71 @@ class _Watch(Protocol):
     def add(self, records: Records) -> None: ...
 
 
+class JudgedWindows:
+    """Figures of one run, summed over its windows. `began_s`: begin of the first block; `stretch_from_s`: as in `RunJudge`."""
+
+    def __init__(
+        self,
+        setup: Setup,
+        of: Described,
+        log: LogWatch,
+        frozen: FrozenWatch,
+        interruptions: Interruptions,
+        began_s: float,
+        stretch_from_s: float | None,
+    ) -> None:
+        self._setup, self._interruptions = setup, interruptions
+        self._moved, self._motion = HasMoved(), MotionOf()
+        self._cycles: list[Cycles] = []
+        self._has_force = False  # some block of the log has a finite force
+        self.checked = False  # the checks below have received a window; stays False for an imported log
+        self.alone = PhaseSum(0.0, np.inf)  # stretches above 1 s, longer than a stall, without the controller
+        self.phases = {
+            "before": PhaseSum(began_s, setup.enabled_from_s),
+            "taking_over": PhaseSum(setup.enabled_from_s, setup.settled_from_s),
+            "after": PhaseSum(max(setup.settled_from_s, began_s), np.inf),
+        }
+        if stretch_from_s is not None:
+            self.phases["stretch"] = PhaseSum(stretch_from_s, np.inf)
+        self.ratio = RatioWatch(setup)
+        self.commands, self.stalls = CommandSum(log.events, setup.block_s), StallSum(log.events)
+        self.sensors = SensorWatch(of, log, frozen, setup.block_s)
+
+    def add(self, window: Window, last_s: float) -> tuple[Window, Forces]:
+        """Judge a window of a log read up to `last_s`. Returns the window with its final `end`, and its slips and forces."""
+        block_s, is_last = self._setup.block_s, window.is_last
+        forces = forces_of(window, self._setup, self._moved)
+        window, motion = window._replace(end=forces.end), None
+        if not self._setup.imported:
+            self.checked = True
+            motion = self._motion(window, block_s)
+            self.sensors.add(window, forces)
+            for check in (self.ratio, self.commands, self.stalls):
+                check.add(window)
+        without = self._interruptions.all(is_last)
+        for name, sum_ in self.phases.items():
+            sum_.to_s = min(sum_.to_s, last_s) if is_last else sum_.to_s
+            sum_.add(forces, motion, without if name in ("taking_over", "after") else [])
+        if absences := self._interruptions.gone():
+            self.alone.from_s, self.alone.to_s = absences[0][0], absences[-1][1]
+            self.alone.add(forces, motion, apart((0.0, np.inf), absences))
+        self._cycles.append(forces.cycles)
+        self._has_force |= len(forces.t_s) > 0
+        return window, forces
+
+    def cycles(self) -> Cycles | None:
+        """All slips of the run. Without a force it returns None and drops all stretches, as none can be judged."""
+        if not self._has_force or "drive_force_N" in self._setup.absent:
+            self.phases, self.alone = {}, PhaseSum(0.0, np.inf)
+            return None
+        return Cycles(*(np.concatenate(parts) for parts in zip(*self._cycles, strict=True)))
+
+
 class RunJudge:
     """Judges one run.
 
-    Args:
-        path: the log.
-        headers: configurations in the log; they may arrive while it is read.
-        stretch_from_s: begin of a further stretch that is judged to the end of the run, with or without a controller.
-
+    The configurations in `headers` may arrive while the log is read. `stretch_from_s` is the begin of a further stretch, judged
+    up to the end of the run, whether or not a controller is in charge.
     """
 
     def __init__(self, path: Path, headers: Metadata, stretch_from_s: float | None = None) -> None:
@@ -194,11 +260,6 @@ class RunJudge:
             gain_verified=setup.known_gain or self._rig.gain_seen,
         )
 
-    def margins(self) -> Margins:
-        """Margins of the amplitude loop. Raises Fault BAD_LOG."""
-        _, _, windows = self._begin()
-        return windows.margins.result(self._headers, self._path, self._steps.loop_delay_s)
-
     def _lines(
         self, charge: InCharge, fallbacks: Stretches, damaged: list[str], checksums: Checksums, foreign: dict[str, int]
     ) -> tuple[list[str], list[str]]:
@@ -227,7 +288,7 @@ class RunJudge:
     def _doubts(
         self, charge: InCharge, after: Phase | None, losses: Losses, checksums: Checksums, damaged: list[str]
     ) -> list[str]:
-        """Reasons against a verdict although something was tested."""
+        """Reasons for which a run that tests the controller still gets no verdict."""
         setup, _, windows = self._begin()
         doubts = [clock_fault(self.log), self._rig.disarmed(), too_little(after, windows.phases, setup.block_s)]
         if charge.controller_until_s is not None:
@@ -251,7 +312,7 @@ def _slips_in(slips_s: Floats, stretches: Stretches, without: Iterable[tuple[flo
 
 
 def _open_loop(event: wire.Event, fallbacks: Stretches) -> str:
-    """Text of an OPEN_LOOP event; it names a preceding time without a fresh command as the cause of the low v_a."""
+    """Text of an OPEN_LOOP event. If no fresh command reached the rig just before, it names that as the cause of the low v_a."""
     at_s = event.t_ns * 1e-9
     for from_s, until_s in fallbacks:
         if from_s <= at_s <= until_s + SETTLING_S:

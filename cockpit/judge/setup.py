@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from bridge.log.check.channel import ChannelLimits, channels_of
-from bridge.log.metadata import Metadata, configuration_of, is_number, number_of, source_of_import, texts_of
+from bridge.log.metadata import Metadata, configuration_of, is_number, number_of, source_of_import, texts_of, value_at
 
-SETTLING_S = 1.0  # settling time after the controller is enabled, stopped or absent
-# Largest difference of force and spring, as a share of the larger. Smaller: a described stiffness that is 30 % wrong is doubted.
-# Larger: a force sensor of half or twice the scale, 0.5, passes. With effects that bend the relation, and for a rig without a
-# description, whose configured stiffness may be 10 times wrong, only the sign counts.
+SETTLING_S = 1.0  # time that is not judged after the controller was enabled, stopped or absent
+# Largest difference between measured force and stiffness times extension, as a share of the larger. Smaller: a described
+# stiffness that is 30 % wrong is doubted. Larger: a force sensor of half or twice the scale, 0.5, passes. With effects that bend
+# the relation, and for a rig without a description, whose configured stiffness may be 10 times wrong, only the sign counts.
 _APART, _APART_SIGN = 0.4, 1.05
 _BENT = {"drive-hardening", "frame-compliance", "drive-damping", "force-sensor-lag", "drive-backlash"}
 
@@ -21,8 +21,8 @@ class Setup(NamedTuple):
 
     imported: str  # source file of an imported log; empty for a run
     block_s: float
-    enabled_from_s: float  # infinite for an imported log, which has no controller
-    slowest_fall_s: float  # slowest fall of the force that counts as a slip
+    enabled_from_s: float  # time at which the controller is enabled; infinite for an imported log, which has none
+    slowest_fall_s: float  # longest duration of a fall of the force that counts as a slip
     absent: list[str]  # channels missing in the source file of an imported log; they are zeros in the log
     known_gain: bool  # the configuration declares the exciter's gain as verified
     v_ratio: float  # configured set point of v_a / v_d; infinite if unknown
@@ -38,12 +38,12 @@ class Described(NamedTuple):
     """Description of a rig and its controller; NaN for unknown numbers."""
 
     channels: dict[str, ChannelLimits]
-    stiffness_N_per_m: float  # drive spring, in readings of the force sensor; without a rig, as the controller has it
-    apart: float  # allowed difference of force and spring, as a share of the larger
+    stiffness_N_per_m: float  # of the drive spring, by the force sensor; without a described rig the controller's value
+    apart: float  # allowed difference between measured force and stiffness times extension, as a share of the larger
     fall_N: float  # fall of the force in a slip, 2 (F_s - F_c)
     slip_m: float  # length of a slip, 2 (F_s - F_c) / k_d
     mass_kg: float  # mass of the slide
-    contact_per_s2: float  # stiffness of the contact over the mass
+    contact_per_s2: float  # stiffness of the sliding contact over the mass of the slide
     uses_force: bool  # the verdict depends on the force: the controller uses it, or the rig is described
     uses_slide: bool
     accel_bandwidth_Hz: float  # bandwidth for which the controller corrects v_a; infinite if unknown
@@ -60,7 +60,7 @@ def is_known(headers: Metadata) -> bool:
 
 
 def setup_of(headers: Metadata, path: Path, period_ns: float) -> Setup:
-    """Setup of a log; `period_ns`: block period without a controller. Raises Fault BAD_LOG."""
+    """Setup of a log; `period_ns`: block period, used for an imported log, which has no controller. Raises Fault BAD_LOG."""
     absent = absent_channels(headers, path)
     plant = plant_of(headers, path)
     mass_kg, stiffness = _number(plant, "rig.slide.mass_kg"), _number(plant, "rig.drive.stiffness_N_per_m")
@@ -75,7 +75,7 @@ def setup_of(headers: Metadata, path: Path, period_ns: float) -> Setup:
         enabled_from_s=number_of(controller, "policy.enabled_from_s", path),
         slowest_fall_s=fall_s,
         absent=absent,
-        known_gain=bool(_at(controller, "amplitude.known_gain")),
+        known_gain=bool(value_at(controller, "amplitude.known_gain")),
         v_ratio=_number(controller, "limits.v_ratio", math.inf),
         duration_s=_number(plant, "duration_s", 0.0),
     )
@@ -100,7 +100,7 @@ def described(plant: Mapping[str, Any], controller: Mapping[str, Any]) -> Descri
     def grown(effect: str) -> float:
         return 1.0 + rig(f"effects.{effect}.ratio", 0.0)
 
-    effects = _at(plant, "rig.effects")
+    effects = value_at(plant, "rig.effects")
     names = effects.keys() if isinstance(effects, Mapping) else set[str]()
     gain = rig("sensors.force_gain", 1.0) * grown("force-sensor-gain")
     k_d = rig("drive.stiffness_N_per_m") * gain * grown("drive-stiffness")
@@ -115,18 +115,12 @@ def described(plant: Mapping[str, Any], controller: Mapping[str, Any]) -> Descri
         slip_m=fall_N / k_d if k_d > 0.0 else math.nan,
         mass_kg=mass_kg,
         contact_per_s2=rig("contact.stiffness_N_per_m") / mass_kg,
-        uses_force=k_d > 0.0 or _at(controller, "estimator.use_force") is not False,
-        uses_slide=k_d > 0.0 or _at(controller, "estimator.use_slide_position") is not False,
+        uses_force=k_d > 0.0 or value_at(controller, "estimator.use_force") is not False,
+        uses_slide=k_d > 0.0 or value_at(controller, "estimator.use_slide_position") is not False,
         accel_bandwidth_Hz=_number(controller, "amplitude.accel_bandwidth_Hz", math.inf),
     )
 
 
 def _number(table: Any, path: str, otherwise: float = math.nan) -> float:
-    value = _at(table, path)
+    value = value_at(table, path)
     return float(value) if is_number(value) else otherwise
-
-
-def _at(table: Any, path: str) -> Any:
-    for name in path.split("."):
-        table = table.get(name) if isinstance(table, Mapping) else None
-    return table

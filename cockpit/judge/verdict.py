@@ -47,28 +47,28 @@ class RunVerdict(NamedTuple):
     before: Phase | None
     taking_over: Phase | None  # the settling second between `before` and `after`
     after: Phase | None
-    unsure_slips: int  # slips in `after` with missing blocks
+    unsure_slips: int  # slips in `after` during which blocks are missing, so they may not be slips
     stopped_slips: int  # slips in `stopped_s` and the second after it; excluded from `after`
     stalled_slips: int  # slips in short fallbacks and the second after each; excluded from `after`
-    drive_velocity_max_mps: float  # measured
+    drive_velocity_max_mps: float  # largest v_d forwards that the controller measured
     velocity_ratio_min: float
     velocity_ratio_max: float
-    ratio: RatioVerdict | None  # v_a over v_d, judged at both ends; None for an imported log
+    ratio: RatioVerdict | None  # v_a over v_d against its lower and upper limit; None for an imported log
     highest_set_point: float  # highest set point of v_a / v_d: the controller raises it at the start and after slips
     sensors: SensorVerdict | None  # whether they can support a verdict; None for an imported log
     latency: Latency | None
-    late_commands: int  # later than 1 ms
-    pauses: Pauses | None  # stalls of all cores; None in lockstep, or if not watched
+    late_commands: int  # commands later than 1 ms after their block
+    pauses: Pauses | None  # simultaneous stalls of all cores; None in lockstep, or if not watched
     computer: Computer | None  # all stalls; None in lockstep
     not_watched: str  # reason for which stalls are unknown; else empty
     faults: list[str]  # harmful events and findings
     told: list[str]  # events and findings without harm
     checksums: Checksums
     normal_scheduling: list[str]  # processes without a real-time priority; irrelevant in lockstep
-    untested: str  # reason for which nothing was tested; empty if the drive moved under control
-    doubts: list[str]  # reasons against a verdict although something was tested
+    untested: str  # reason for which the run does not test the controller; else empty
+    doubts: list[str]  # reasons for which a run that tests the controller still gets no verdict
     imported: str  # source file of an imported log; empty for a run
-    gain_verified: bool  # gain of the exciter: by a loop check, or by the configuration
+    gain_verified: bool  # the exciter's gain was confirmed by a loop check, or is declared known in the configuration
 
     @in_json
     def headline(self) -> str:
@@ -79,7 +79,7 @@ class RunVerdict(NamedTuple):
 
     @in_json
     def data(self) -> str:
-        """Losses of the log, and doubts about the sensors, in words."""
+        """Completeness of the log in words, and whether the controller received the missing blocks."""
         from cockpit.judge.verdict_words import data_in_words
 
         return data_in_words(self)
@@ -96,7 +96,7 @@ class RunVerdict(NamedTuple):
 
     @property
     def cut(self) -> str:
-        """End of the log, in words, if the log ends before its run; else empty."""
+        """Actual and planned end in words, if the log ends before the planned end of its run; else empty."""
         ends = f"the log ends at {self.seconds:.2f} s, the run was to end at {self.planned_s:.2f} s"
         return ends if self.planned_s and self.blocks else ""
 
@@ -162,7 +162,7 @@ class RunVerdict(NamedTuple):
 
     @property
     def blind(self) -> list[str]:
-        """Findings on sensors that decide the verdict."""
+        """Findings on the sensors on which the verdict depends; with any, slips and v_a/v_d decide nothing."""
         findings = self.sensors.findings if self.sensors is not None else []
         return [f"{finding.code}: {finding.text}" for finding in findings if finding.decides]
 

@@ -17,14 +17,7 @@ _FADE_S = 0.2  # shorter stops are not printed: each run ends with one, while th
 
 
 def in_words(verdict: RunVerdict, verbose: bool, without: Phase | None = None) -> list[str]:
-    """The verdict in six lines, or with `verbose` with all figures.
-
-    Args:
-        verdict: verdict on the run.
-        verbose: all figures.
-        without: the stretch `after`, simulated without the controller, if available.
-
-    """
+    """The verdict in six lines, or with `verbose` with all figures; `without`: `after`, simulated without the controller."""
     v = verdict
     lines = [headline(v)]
     if v.imported:

@@ -1,18 +1,24 @@
-"""Repeated blocks, latency, state of the rig, and steps of the controller, message by message in constant memory."""
+"""Repeated blocks, latency, state of the rig, and steps of the controller, message by message; completeness of the log."""
 
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Records
+from bridge.log.check.log_check import LogWatch
+from bridge.log.damage import Damage
 from bridge.log.watches.arrays import Longest, steps
 from bridge.log.watches.histogram import Histogram
+from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.channels import CHANNELS
-from bridge.wire.messages import STALE, Records
-from cockpit.judge.setup import SETTLING_S
+from bridge.wire.messages import STALE
+from cockpit.judge.setup import SETTLING_S, Setup
 
 STANDSTILL_MPS = 2e-5  # a slower drive is at standstill; the default of the controller
+
+_OF_EVERY_BLOCK = ("applied", "command", "trace")
 
 
 class Latency(NamedTuple):
@@ -21,7 +27,7 @@ class Latency(NamedTuple):
     p50_us: float  # the percentiles are accurate to 0.25 %
     p99_us: float
     p999_us: float
-    within_1_ms: float  # share of the blocks
+    within_1_ms: float  # share of the blocks whose command came within 1 ms
 
 
 class LatencyWatch:
@@ -44,7 +50,7 @@ class LatencyWatch:
         """Percentiles; None in lockstep, which has no latency."""
         if not self.took_us.count:
             return None
-        # a missing command counts as late; the command of the last block arrives after the end
+        # a missing command counts as late, except for the last block: its command arrives after the end of the log
         in_time = min((self.commands - self.late) / max(self.blocks - 1, 1), 1.0)
         p50_us, p99_us, p999_us = (self.took_us.quantile(share) for share in (0.5, 0.99, 0.999))
         return Latency(p50_us, p99_us, p999_us, in_time)
@@ -56,7 +62,7 @@ class RigWatch:
     def __init__(self) -> None:
         self.answered = False  # some block has a fresh command
         self.gain_seen = False  # a loop check confirmed the exciter's gain
-        self.end_ns = 0
+        self.end_ns = 0  # time of the latest row
         self._disarmed_s = np.inf  # first time at which the rig disarmed itself without a fresh command
 
     def add(self, records: Records) -> None:
@@ -69,7 +75,7 @@ class RigWatch:
             self._disarmed_s = min(self._disarmed_s, 1e-9 * float(records["t_ns"][disarmed.argmax()]))
 
     def disarmed(self) -> str:
-        """Sentence if the rig disarmed itself; else empty."""
+        """Sentence with time and remedy if the rig disarmed itself for lack of fresh commands; else empty."""
         if self._disarmed_s == np.inf:
             return ""
         why = f"the rig disarmed itself at {self._disarmed_s:.2f} s, as no fresh command reached it"
@@ -105,8 +111,7 @@ class StepWatch:
         self.armed = self.moved = False
         self.highest_set_point = 0.0  # highest set point of v_a / v_d during vibration
         self.drive_velocity_max_mps = 0.0
-        self.loop_delay_s = 0.0
-        self.stale: list[tuple[float, float]] = []  # first and last step of stretches without a timely block [s]
+        self.stale: list[tuple[float, float]] = []  # first and last step of each stretch without a timely block [s]
         self._idle: list[tuple[float, float]] = []  # first and last step of each finished stop [s]
         self._idle_from_s: float | None = None
         self._last_s = 0.0
@@ -123,7 +128,6 @@ class StepWatch:
         self.drive_velocity_max_mps = max(self.drive_velocity_max_mps, float(v_d_mps.max()))
         set_points = records["velocity_ratio"][records["mode"] == wire.EXCITE]
         self.highest_set_point = max(self.highest_set_point, float(set_points.max(initial=0.0)))
-        self.loop_delay_s = max(self.loop_delay_s, float(records["loop_delay_s"].max()))
         for at_s in t_s[(records["events"] & STALE) != 0].tolist():
             goes_on = self.stale and at_s - self.stale[-1][1] <= SETTLING_S
             self.stale[len(self.stale) - bool(goes_on) :] = [(self.stale[-1][0] if goes_on else at_s, at_s)]
@@ -143,3 +147,49 @@ class StepWatch:
             until_s = self._last_s + SETTLING_S if is_last else np.inf
             stretches.append((self._idle_from_s - block_s, until_s))
         return stretches
+
+
+class Losses(NamedTuple):
+    """Losses of one log."""
+
+    planned_s: float  # planned length if the log ends earlier and without the plant's END; else 0
+    blocks: int  # missing blocks
+    at_the_end: int  # part of `blocks` after the last block in the log, by the plant's END
+    blocks_known: bool  # False: a cut or damaged log may lack more
+    messages: int  # missing messages, blocks included
+    absent: list[str]  # topics without any message that should have one per block
+    misses_known: bool  # False: the log lacks steps of the controller, so it may have missed more blocks
+
+
+def losses_of(log: LogWatch, steps: StepWatch, setup: Setup, damage: Damage, seconds: float) -> Losses:
+    """Losses of a log that ends at `seconds`.
+
+    A damaged chunk may contain the first or the last blocks: then the number in the plant's END counts.
+    """
+    blocks, sent, topics = log.topics["sensors"], log.events.blocks_sent, log.topics
+    early = seconds < setup.duration_s - 0.5 * setup.block_s and not log.events.has("plant", "END")
+    at_the_end = max((sent or 0) - blocks.end, 0)
+    lost, known = blocks.missing, damage.whole and not damage.before
+    if sent is not None:  # by the plant's END also blocks before a late start of the recorder are counted
+        lost, known = lost + (0 if known else blocks.first_number) + at_the_end, True
+    return Losses(
+        planned_s=setup.duration_s if early else 0.0,
+        blocks=lost,
+        at_the_end=at_the_end,
+        blocks_known=known,
+        messages=lost + sum(topics[name].missing for name in (*_OF_EVERY_BLOCK, "state")),
+        absent=[name for name in _OF_EVERY_BLOCK if not (setup.imported or topics[name].messages)],
+        # a gap is reported only by the step after it
+        misses_known=topics["trace"].missing == 0 and steps.last_block >= max(blocks.end, sent or 0) - 1,
+    )
+
+
+def clock_fault(log: LogWatch) -> str:
+    """Fault of the block times, in words; empty if the times follow the block numbers."""
+    watch = log.topics["sensors"]
+    if not watch.jumps:
+        return ""
+    number, where = (watch.standing, "is constant") if watch.standing > watch.jumps // 2 else (watch.jumps, "jumps")
+    first, off_ns = watch.first_jump
+    times = f"{where} at {counted(number, 'block')}, first {first} by {off_ns * 1e-6:g} ms: times are wrong from there"
+    return f"CLOCK: t_ns of /sensors {times}"

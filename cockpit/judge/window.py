@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from bridge.wire.messages import Records
+from bridge.arrays import Records
 
 Rows = npt.NDArray[Any]
 
@@ -19,8 +19,8 @@ Rows = npt.NDArray[Any]
 # Fewer: strokes are cut. With 5000 the shipped scenarios give the same slips; the swing of the pneumatic seal, which has longer
 # strokes, is 2.9 instead of 1.1 N.
 WINDOW_BLOCKS = 60_000
-# Rows known after a window when it is judged. Less than 8 s: the swing of a phase may depend on a later end of the run.
-# More: memory.
+# A window is judged once the log is read this far beyond its end. Less than 8 s: the swing of a phase may change with the length
+# of the rest of the run. More: memory grows.
 AHEAD_S = 10.0
 # Rows before a window kept for context. Less: a slip (0.1 s) or a ramp of the vibration (0.15 s) that began earlier is cut.
 BEHIND_S = 2.0
@@ -32,7 +32,6 @@ TRACE_ROW = np.dtype(
         ("velocity_ratio", "f8"), ("drive_force_N", "f8"), ("slips", "i8"), ("surges", "i8"),
     ]
 )  # fmt: skip
-COMMAND_ROW = np.dtype([("t_ns", "i8"), ("block", "i8"), ("frequency_Hz", "f8"), ("amplitude_m", "f8")])
 APPLIED_ROW = np.dtype(
     [
         ("t_ns", "i8"), ("sequence", "i8"), ("amplitude_m", "f8"), ("command_block", "u8"), ("late_ns", "i8"),
@@ -40,7 +39,7 @@ APPLIED_ROW = np.dtype(
     ]
 )  # fmt: skip
 
-LAYOUTS = {"trace": TRACE_ROW, "applied": APPLIED_ROW, "command": COMMAND_ROW}
+LAYOUTS = {"trace": TRACE_ROW, "applied": APPLIED_ROW}
 
 
 class JudgedBlocks(NamedTuple):
@@ -88,7 +87,7 @@ def _rms(samples: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
 
 
 def rows_of(records: Records, layout: np.dtype[Any]) -> Rows:
-    """Selected fields of messages, [messages]."""
+    """The fields of `layout` of messages, [messages]."""
     rows = np.empty(len(records), layout)
     for name in layout.names or ():
         rows[name] = records[name]
@@ -96,22 +95,21 @@ def rows_of(records: Records, layout: np.dtype[Any]) -> Rows:
 
 
 class Window(NamedTuple):
-    """Rows of which those from `first` to before `end` are judged; the others are their context."""
+    """Rows of one window: those from `first` up to, not including, `end` are judged; the others are their context."""
 
     blocks: JudgedBlocks
     trace: Rows
     applied: Rows
-    command: Rows
     first: int
     end: int
-    begins: int  # first known row of the present stroke
-    after_turn: bool  # the drive turned at `begins`
-    stroke: int  # number of the present stroke
+    begins: int  # first row, among those kept, of the stroke that contains `first`
+    after_turn: bool  # that stroke starts at `begins`, with a turn of the drive; False: it started earlier
+    stroke: int  # number of that stroke, counted over the run
     is_last: bool
 
     @property
     def own_ns(self) -> tuple[int, int]:
-        """Time of the first judged row, and of the first row after them."""
+        """Times of the first judged row and of the first row after the judged rows; unlimited at the begin and end of the log."""
         t_ns = self.blocks.t_ns
         far = np.iinfo(np.int64)
         from_ns = int(t_ns[self.first]) if self.first else far.min
@@ -143,11 +141,11 @@ class WaitingRows:
         self._rows[topic].append(rows_of(records, LAYOUTS[topic]))
 
     def is_full(self, block_s: float) -> bool:
-        """True if a window can be judged."""
+        """True if the rows of a window and of the time after it are pending, so it can be judged."""
         return self.blocks - self._first > WINDOW_BLOCKS + AHEAD_S / block_s
 
     def window(self, is_last: bool, block_s: float) -> Window:
-        """All pending rows, at least one block; `end` is the latest end of the window."""
+        """All pending rows, of which at least one is a block; `end` is the latest possible end of the window."""
         return Window(
             JudgedBlocks(*(np.concatenate(columns) for columns in zip(*self._sensors, strict=True))),
             *(np.concatenate(parts) for parts in self._rows.values()),
@@ -160,19 +158,11 @@ class WaitingRows:
         )
 
     def judged(self, window: Window, turned: bool, stroke: int, block_s: float) -> None:
-        """Drop the rows that no later window needs.
-
-        Args:
-            window: the window that was judged.
-            turned: the drive turned at its end.
-            stroke: number of the first stroke of the next window.
-            block_s: duration of a block.
-
-        """
+        """Drop the rows that the next window does not need. It begins in stroke number `stroke`, at a turn if `turned`."""
         keep = max(window.end - round(BEHIND_S / block_s), 0)
         self._sensors = [JudgedBlocks(*(column[keep:].copy() for column in window.blocks))]
         keep_ns = int(window.blocks.t_ns[keep])
-        for name, rows in (("trace", window.trace), ("applied", window.applied), ("command", window.command)):
+        for name, rows in (("trace", window.trace), ("applied", window.applied)):
             self._rows[name] = [rows[rows["t_ns"] >= keep_ns]]
         self.blocks -= keep
         self._first = window.end - keep

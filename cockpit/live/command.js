@@ -1,8 +1,8 @@
 // Commands of the operator. STOP is sent again after each reconnection; a failure is shown until the rig answers.
 "use strict";
 
-const STOP_MS = 5000; // of trying to send STOP
-const OLD_MS = 20_000; // after which a success is hidden: it is no longer the state of the rig
+const STOP_MS = 5000; // time for which an unsent STOP is tried again
+const OLD_MS = 20_000; // time after which the outcome of a successful command is hidden, as the rig's state may have changed
 const WANTED = { STOP: ["FAULT"], DISARM: ["DISARMED"], RESET: ["DISARMED", "READY", "ARMED", "ACTIVE"], ARM: ["ARMED", "ACTIVE"] };
 const BY_HAND = "in a terminal, or the amplifier's switch";
 

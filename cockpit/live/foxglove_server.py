@@ -5,7 +5,6 @@ messages a slow client loses. Clients can only read: no capability is offered.
 """
 
 import time
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -21,18 +20,13 @@ from bridge.wire.topics import SCOPE as SCOPE_TOPIC
 from cockpit.live.view import ViewUpdate
 
 HOST = "127.0.0.1"
-PORT = 8765  # default of the Foxglove and Lichtblick connection dialogs
 _FAR_NS = 500_000_000  # disagreement of the computer's and the run's clock above which the run's start is re-estimated
 
 
 class Foxglove:
-    """A server on the loopback address only; a context manager.
-
-    Args:
-        port: port to listen on; 0: any free port.
+    """A server on the loopback address only, at `port` (0: any free port); a context manager.
 
     Raises Fault ENDPOINT_BUSY, ModuleNotFoundError without the extra.
-
     """
 
     def __init__(self, port: int) -> None:
@@ -62,9 +56,7 @@ class Foxglove:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._server.stop()
 
     def send(self, step: ViewUpdate) -> None:

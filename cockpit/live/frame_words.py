@@ -5,9 +5,8 @@ from typing import Any
 
 from bridge.units import counted, quantity
 from cockpit.figures.signals import WORD_SIGNALS, WordSignal
-from cockpit.live.answer import plain_help
 from cockpit.live.listener import ROLES
-from cockpit.live.view import LIVE, EventRow
+from cockpit.live.view import LIVE, EventRow, plain_help
 
 _UNKNOWN = "-"
 _NEXT = {

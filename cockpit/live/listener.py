@@ -6,7 +6,6 @@ import threading
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 from bridge.faults import Fault
@@ -43,16 +42,10 @@ class Source:
 
 
 def connected(config: BusConfig, role: str, patience_s: float, frozen: str, absent: str, about: str = "") -> Bus:
-    """A session with a running rig.
+    """A session with a running rig. Messages of the role `operator` wait for a slow link instead of being dropped.
 
-    Args:
-        role: role of the session; messages of an `operator` wait for a slow link instead of being dropped.
-        frozen: remedy for a rig that accepts connections but does not answer.
-        absent: remedy if no rig answers.
-        about: begin of the fault's message.
-
-    Raises Fault NO_PEER.
-
+    Raises Fault NO_PEER, whose message begins with `about` and ends with a remedy: `frozen` for a rig that accepts connections
+    but does not answer, `absent` without an answer.
     """
     try:
         return Bus(config, role, lockstep=role == "operator", patience_s=patience_s)
@@ -68,7 +61,7 @@ def connected(config: BusConfig, role: str, patience_s: float, frozen: str, abse
 
 
 def listen(bus: Bus, inbox: Inbox) -> None:
-    """Receive all that a view shows."""
+    """Receive all signals and events that a view shows; a full inbox still takes 256 events per topic."""
     for topic in (SENSORS, APPLIED, TRACE):
         bus.listen(topic, inbox.push)
     for topic in EVENTS:
@@ -85,12 +78,7 @@ def configurations(bus: Bus, roles: Sequence[str], timeout_s: float, stop: threa
 
 
 class Listener(Source):
-    """Follows a bus in a separate thread; a context manager.
-
-    Args:
-        config: connection to the bus.
-
-    """
+    """Follows a bus in a separate thread; a context manager."""
 
     def __init__(self, config: BusConfig) -> None:
         super().__init__(Inbox(LIMIT), Presence(False, frozenset(), ""))
@@ -102,9 +90,7 @@ class Listener(Source):
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._over.set()
         self._thread.join(2.0 * _DIAL_S)
 

@@ -2,20 +2,20 @@
 "use strict";
 
 const OLD_S = 1; // age of the data from which on the headline names it
-const GONE_S = 3; // age from which on they are hidden; a connection without a frame for as long is reopened
-const LOOK_MS = 250;
-const AGAIN_MS = 500;
-const READ_MS = 200; // between two updates of the figures, so that they can be read
-const DRIFT_MS = 0.01; // of the clocks of server and browser, which may be two computers, in a frame: 200 ppm
+const GONE_S = 3; // age of the data from which on they are hidden; a connection without a frame for as long is reopened
+const LOOK_MS = 250; // interval at which connection and age of the data are checked
+const AGAIN_MS = 500; // pause before a reconnection
+const READ_MS = 200; // least time between two updates of the figures, so that they can be read
+const DRIFT_MS = 0.01; // largest drift per frame between the clocks of server and browser, maybe two computers: 200 ppm
 const NO_SERVER = "no connection to `stickslip serve`: the state is unknown, and STOP reaches no rig; use `stickslip stop` in a terminal, or the amplifier's switch";
-const LATE = "this browser is too slow or its connection is; STOP still works";
+const LATE = "this browser or its connection is too slow to show current data; STOP still works";
 const WINDOWS_S = [2, 10, 30, 60];
 const EVENTS_SHOWN = 200;
 const element = (id) => document.getElementById(id);
 
 let hello = null, store = null, scope = null, axis = null, socket = null, helps = new Map();
 let plots = [], window_s = 10, follows = true, dirty = false, phase = "", said = "", read_ms = 0;
-let latest = null, heard_ms = performance.now(), fresh_ms = heard_ms, offset_ms = null, full = ""; // the newest frame and its times
+let latest = null, heard_ms = performance.now(), fresh_ms = heard_ms, offset_ms = null, full = ""; // newest frame; times of its arrival and of its data
 const commands = new Commands(() => socket, () => phase);
 
 /** Build the display of a run; `step_s` is null without a run. */
@@ -70,7 +70,7 @@ function refresh() {
   element("follow").classList.toggle("on", follows);
 }
 
-/** Note a frame: when its data were current, by the server's clock. The fastest frame gives the difference of the clocks. */
+/** Keep a frame, and the time of its data on this browser's clock. The fastest frame gives the difference of both clocks. */
 function note(now) {
   const delay_ms = performance.now() - 1e3 * now.sent_s;
   offset_ms = offset_ms === null ? delay_ms : Math.min(delay_ms, offset_ms + DRIFT_MS);
@@ -87,7 +87,7 @@ function show() {
   element("age").textContent = full || age_s <= OLD_S ? "" : gone ? `no data for ${age_s.toFixed(0)} s: ` : `${age_s.toFixed(0)} s old: `;
   document.querySelector("main").classList.toggle("off", now.phase !== "live");
   element("answer").className = `verdict ${now.answer.level === "good" && age_s > OLD_S ? "look" : now.answer.level}`;
-  if (said !== now.answer.text) element("said").replaceChildren(...rich((said = now.answer.text))); // once: it is read aloud
+  if (said !== now.answer.text) element("said").replaceChildren(...rich((said = now.answer.text))); // only a new text: a screen reader reads it aloud
   element("whose").textContent = [now.rig && `rig ${now.rig}`, now.roles?.length ? `on the bus: ${now.roles.join(", ")}` : "no process on the bus"].filter(Boolean).join("; ");
   document.title = `${now.phase === "live" ? (now.guard_state === "FAULT" ? "FAULT" : (now.mode ?? "no controller")) : now.phase}: stickslip`;
   if (now.phase === phase && performance.now() - read_ms < READ_MS) return;
@@ -179,7 +179,7 @@ let looked_ms = performance.now();
 setInterval(() => {
   const late_ms = performance.now() - looked_ms - LOOK_MS;
   looked_ms = performance.now();
-  // a page that stalled itself has unread frames
+  // close a silent connection, unless this page itself stalled and so has unread frames
   if (late_ms < LOOK_MS && looked_ms - heard_ms > 1e3 * GONE_S && !full) socket?.close();
   commands.retry();
   show();

@@ -24,10 +24,11 @@ _DIAL_S = 2.0
 # amplifier comes later.
 _ANSWER_S = 5.0
 _POLL_S = 0.05  # longest wait for a message, after which timeouts are checked
-_AGAIN_S = 0.5  # interval at which an unconfirmed command is repeated: an overloaded computer loses 1 in 300
-_SILENT_S = 1.0  # the last state is outdated after this silence; a rig sends a thousand messages per second
+_AGAIN_S = 0.5  # interval at which an unconfirmed command is repeated: an overloaded computer loses 1 command in 300
+_SILENT_S = 1.0  # silence of the rig after which its last state is outdated; it sends a thousand messages per second
 _NOTHING_M = 1e-12  # a smaller amplitude counts as zero: rounding at the end of a ramp
-_KEPT_S = 0.1  # wait after a stop for the rig's event that it cannot keep the stop over a restart
+# Wait after a stop for the rig's event that it cannot keep the stop over a restart; also for the controller on the bus.
+_KEPT_S = 0.1
 _REFUSED_S = 1.0  # a rig that is in FAULT for this long after ARM refuses it
 _ARMS = (wire.Operator.ARM, wire.Operator.ACCEPT_GAIN)
 _QUIETING = (wire.Operator.STOP, wire.Operator.DISARM)
@@ -40,7 +41,7 @@ class CommandOutcome(NamedTuple):
 
     endpoint: str
     word: str  # the command
-    done: bool
+    done: bool  # the rig reached the wanted state
     state: str  # state of the rig's guard
     cause: str  # cause of this state
     help: str  # meaning of the cause

@@ -1,52 +1,53 @@
-"""Operator commands from the page: STOP for every viewer; arm, disarm and reset for holders of the token."""
+"""Operator commands from the page: STOP for every viewer; arm, disarm and reset for holders of the token.
+
+The token is readable on the terminal and in a file of this user only.
+"""
 
 import asyncio
-import json
+import contextlib
+import os
 import secrets
+import tempfile
 import time
-from typing import Any, NamedTuple
+from collections.abc import Generator
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+from pydantic import TypeAdapter, ValidationError
 
 from bridge.faults import Fault
 from bridge.plain import plain
+from bridge.wire.loopback_users import folders, is_private_folder
 from bridge.wire.zenoh_link import BusConfig
 from cockpit.live.operator import send_command
 
 STOP, SCOPE = "STOP", "SCOPE"
-_WITH_TOKEN = ("ARM", "DISARM", "RESET")
 _WRONG_S = 1.0  # time for which a wrong token blocks further attempts, against guessing
 _STOP_S = 3.0  # time for which an undelivered STOP is repeated; the last attempt takes 2 s more
 _STOP_AGAIN_S = 0.2  # pause before a repetition
+_BYTES = 18  # random bytes of the token; 24 characters in base64
 
 
 class Wish(NamedTuple):
     """A command requested by a page."""
 
-    word: str
-    token: str
+    word: Literal["STOP", "SCOPE", "ARM", "DISARM", "RESET"]
+    token: str = ""
+
+
+_WISH = TypeAdapter(Wish)
 
 
 def wish_of(message: str | bytes) -> Wish | None:
-    """Parse a message; None if it is malformed."""
+    """Parse a message of a page; None if it is malformed."""
     try:
-        table: Any = json.loads(message)
-    except (ValueError, RecursionError):
+        return _WISH.validate_json(message, strict=True)
+    except ValidationError:
         return None
-    if not isinstance(table, dict):
-        return None
-    word, token = table.get("word"), table.get("token", "")
-    if word not in (STOP, SCOPE, *_WITH_TOKEN) or not isinstance(token, str):
-        return None
-    return Wish(word, token)
 
 
 class Words:
-    """Sends commands to the rig as the role operator, one at a time. STOP never waits for another command.
-
-    Args:
-        bus: bus of the rig.
-        token: token that the page must send.
-
-    """
+    """Sends commands of pages with `token` to the rig, one at a time. STOP needs no token and waits for no other command."""
 
     def __init__(self, bus: BusConfig, token: str) -> None:
         self._bus, self._token = bus, token
@@ -87,3 +88,35 @@ class Words:
 
 def _answer(command: str, done: bool, lines: list[str]) -> dict[str, Any]:
     return {"word": command, "done": done, "lines": [plain(line) for line in lines]}
+
+
+@contextlib.contextmanager
+def kept_token(port: int) -> Generator[tuple[str, Path]]:
+    """A new token and its file, mode 0600, deleted at the end of the context.
+
+    Raises Fault NOT_SECURE without a folder that other users cannot read.
+    """
+    token = secrets.token_urlsafe(_BYTES)
+    path = _write_private(f"page-{port}.token", token)
+    try:
+        yield token, path
+    finally:
+        with contextlib.suppress(OSError):
+            if path.read_text() == token:  # unless a later server of this port has replaced it
+                path.unlink()
+
+
+def _write_private(name: str, token: str) -> Path:
+    for folder in folders():
+        with contextlib.suppress(OSError):
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if not is_private_folder(folder):
+                continue
+            handle, part = tempfile.mkstemp(dir=folder)  # mode 0600
+            with os.fdopen(handle, "w") as file:
+                file.write(token)
+            os.replace(part, folder / name)
+            return folder / name
+    places = ", ".join(str(folder) for folder in folders())
+    line = f"no private folder for the page's token: {places} must belong to this user, mode 0700"
+    raise Fault("NOT_SECURE", f"{line}; set XDG_RUNTIME_DIR to such a folder")

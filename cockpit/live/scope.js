@@ -1,7 +1,7 @@
 // The scope: samples at full rate around a slip. Shows the newest capture unless the operator holds one.
 "use strict";
 
-const CAPTURES = 8; // kept for selection
+const CAPTURES = 8; // captures kept for selection
 
 class ScopeView {
   constructor(hello) {

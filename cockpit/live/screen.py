@@ -16,15 +16,14 @@ from rich.text import Text
 from bridge.results import strict_json
 from bridge.wire.event_codes import FAILURE
 from bridge.wire.zenoh_link import BusConfig
-from cockpit.live.answer import BAD, GOOD, LOOK, OFF
 from cockpit.live.frame_words import event_line, rows
 from cockpit.live.listener import Listener
-from cockpit.live.view import LIVE, EventRow, View
+from cockpit.live.view import BAD, GOOD, LIVE, LOOK, OFF, EventRow, View
 
-_PERIOD_S = 0.1
+_PERIOD_S = 0.1  # time between two updates of the screen
 _STYLES = {GOOD: "bold green", LOOK: "bold yellow", BAD: "bold red", OFF: "bold"}
 _HEAD_LINES = 20  # lines of the screen above the events
-_FEWEST_EVENTS = 3
+_FEWEST_EVENTS = 3  # events shown even if the terminal has no room for them
 
 
 def lines(bus: BusConfig, stop: threading.Event, every_s: float) -> None:

@@ -3,32 +3,34 @@
 import asyncio
 import contextlib
 import http
+import json
 import logging
 import socket
+import struct
 import threading
 import time
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from bridge.faults import Fault
+from bridge.results import strict_json
 from bridge.wire.channels import CHANNELS
 from bridge.wire.words import words
 from bridge.wire.zenoh_link import BusConfig
 from cockpit.figures.signals import PANELS, Panel
 from cockpit.live.buckets import COLUMNS, Buckets
-from cockpit.live.frames import frame
-from cockpit.live.gate import NO_METHOD, PAGE, refusal
 from cockpit.live.listener import Listener
 from cockpit.live.operator_link import SCOPE, Words, wish_of
-from cockpit.live.page import Page
+from cockpit.live.page import NO_METHOD, PAGE, Page, refusal
 from cockpit.live.trigger import Capture
 from cockpit.live.view import View, ViewUpdate
-from cockpit.live.viewers import MOST_VIEWERS, Viewers
 
 HOST = "127.0.0.1"
 PERIOD_S = 0.05  # time between two frames
@@ -47,6 +49,9 @@ _HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Connection": "close",
 }
+_ALIGNED = 4  # a browser reads float32 only at offsets divisible by 4
+MOST_VIEWERS = 12  # most pages that receive data; further pages may still send commands to the rig
+_QUEUED = 60  # queued frames, 3 s. Larger: a slow browser shows older data. Smaller: a slowly drawing one is dropped
 
 
 def listening(port: int) -> socket.socket:
@@ -59,15 +64,7 @@ def listening(port: int) -> socket.socket:
 
 
 class Server:
-    """The page of one rig.
-
-    Args:
-        bus: bus of the rig.
-        token: permits arming from the page.
-        port: port of the socket passed to `run`.
-        also: called with each update of the view, for a second server.
-
-    """
+    """The page of one rig at `port`; `token` permits arming from it. `also` receives each update of the view."""
 
     def __init__(self, bus: BusConfig, token: str, port: int, also: Callable[[ViewUpdate], None] | None = None) -> None:
         self._port, self._also = port, also
@@ -78,7 +75,7 @@ class Server:
         self._viewers = Viewers()
         self._connections = 0
         self._silent: dict[ServerConnection, None] = {}  # connections without a page yet, oldest first
-        self._latency_s = 0.0
+        self._latency_s = 0.0  # time of the last histogram
 
     def run(self, sock: socket.socket, stop: threading.Event, ready: Callable[[], None]) -> None:
         """Serve until `stop` is set; `ready` is called once requests are accepted."""
@@ -95,7 +92,7 @@ class Server:
         outer = self
 
         class Counted(ServerConnection):
-            """Counts the connections; a new one beyond the limit closes an idle one."""
+            """Counts the connections; a new connection beyond the limit closes the oldest without a page."""
 
             def connection_made(self, transport: asyncio.BaseTransport) -> None:
                 outer._connections += 1
@@ -234,3 +231,54 @@ def _captured(capture: Capture) -> bytes:
 def _panel(panel: Panel) -> dict[str, Any]:
     curves = [signal.for_page() | {"factor": signal.factor} for signal in panel.signals]
     return panel.heading() | {"curves": curves}
+
+
+def frame(kind: str, table: dict[str, Any], columns: npt.NDArray[np.float32] | None = None) -> bytes:
+    """Bytes of one frame: JSON with its kind, a table and both counts of the columns; the columns, [columns, values]."""
+    rows, count = columns.shape if columns is not None else (0, 0)
+    header = {"kind": kind, **table, "rows": rows, "count": count}
+    text = json.dumps(strict_json(header), allow_nan=False, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % _ALIGNED)
+    data = np.ascontiguousarray(columns, "<f4").tobytes() if columns is not None else b""
+    return struct.pack("<I", len(text)) + text + data
+
+
+class Viewers:
+    """All connected browsers."""
+
+    def __init__(self) -> None:
+        self.dropped = 0  # number of browsers dropped as too slow
+        self._queues: dict[ServerConnection, asyncio.Queue[bytes]] = {}
+
+    def __len__(self) -> int:
+        return len(self._queues)
+
+    def broadcast(self, frame: bytes) -> None:
+        """Queue a frame for all; drop a browser whose queue is full."""
+        for page, queue in [*self._queues.items()]:
+            try:
+                queue.put_nowait(frame)
+            except asyncio.QueueFull:
+                self.dropped += 1
+                del self._queues[page]
+                # `close` would wait for the stalled reader
+                page.transport.abort()
+
+    @contextlib.asynccontextmanager
+    async def added(self, socket: ServerConnection, first: list[bytes]):
+        """Send a browser `first`, then each frame, until the end of the context."""
+        queue: asyncio.Queue[bytes] = asyncio.Queue(_QUEUED)
+        for frame in first:
+            queue.put_nowait(frame)
+        self._queues[socket] = queue
+        sending = asyncio.create_task(self._send(socket, queue))
+        try:
+            yield
+        finally:
+            self._queues.pop(socket, None)
+            sending.cancel()
+
+    async def _send(self, socket: ServerConnection, queue: asyncio.Queue[bytes]) -> None:
+        with contextlib.suppress(ConnectionClosed):
+            while True:
+                await socket.send(await queue.get())

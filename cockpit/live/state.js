@@ -42,7 +42,7 @@ function tilesOf(now) {
   ];
 }
 
-/** Words with their meanings. */
+/** Rows of the state table: title, current word and its meaning. */
 function stateRows(now, helps) {
   const rows = [["guard", "guard_state", now.guard_state], ["cause", "cause", now.cause], ["held back by", "cause", now.guard_limit === "NO_CAUSE" ? undefined : now.guard_limit],
     ["mode", "mode", now.mode], ["reason", "reason", now.reason], ["limit", "limit", now.limit], ["contact", "state", now.state]];
@@ -54,11 +54,11 @@ function lostWords(now) {
   if (!now.lost) return "";
   const { controller, viewer, dropped, commands, late, refused } = now.lost;
   return `Since this server joined the run: ${controller} blocks lost before the controller; of ${commands} commands ${late} later than 1 ms, ${refused} refused by the rig; `
-    + `${viewer} blocks lost before this page's server, ${dropped} messages dropped there because it was too slow, ${now.unreadable} unreadable. `
+    + `${viewer} blocks lost before this page's server, ${dropped} messages dropped there because it was too slow, ${now.unreadable} reports of unreadable ones. `
     + `Stalls of the computer, counted by the recorder: ${now.pauses}. Open pages: ${now.viewers}; dropped as too slow: ${now.viewers_dropped}.`;
 }
 
-/** The newest event first. */
+/** The table row of an event. */
 function eventRow(event) {
   const cells = [fixed(event.t_s, 3), event.at, event.source, event.code, event.weight, event.text, event.help];
   const row = made("tr", cells.map((text, at) => {

@@ -11,8 +11,8 @@ from cockpit.live.listener import LIMIT, ROLES, Presence, Source, configurations
 _DIAL_S = 0.4  # a rig on this computer answers within milliseconds, in the same network within tens of milliseconds
 _ROLES_S = 0.2  # wait for the roles on the bus; only a missing role costs this time
 _HEADER_S = 0.2  # timeout for the headers of rig and controller
-_LISTEN_S = 0.3  # three times the delay of a rig that is late by 0.1 s; events within this time are shown
-_BUSY_S = 1.0  # longest time without a block of a rig on a busy computer
+_LISTEN_S = 0.3  # time for which messages are collected: three times the delay of a rig that is late by 0.1 s
+_BUSY_S = 1.0  # longest further wait for a block of a rig that a busy computer delays
 
 
 class Status(NamedTuple):
@@ -26,7 +26,7 @@ class Status(NamedTuple):
     reason: str | None
     limit: str | None
     contact: str | None
-    slips: int | None  # since the start of the controller, possibly over several runs of the rig
+    slips: int | None  # counted since the start of the controller, possibly over several runs of the rig
     drive_force_N: float | None
     drive_velocity_mps: float | None
     vibration_velocity_mps: float | None
@@ -38,7 +38,7 @@ class Status(NamedTuple):
     cause: str | None  # cause of `state`
     guard_limit: str | None  # limit of the guard that restricts the command now
     heat_share: float | None  # modelled temperature rise of the exciter, as a share of the largest allowed
-    events: list[str]  # received within 0.3 s
+    events: list[str]  # received while listening: 0.3 s, or longer on a busy computer
 
     @property
     def controlled(self) -> bool:
@@ -83,6 +83,6 @@ def _status(now: dict[str, Any], events: list[str]) -> Status:
         "state": now.get("guard_state"),
         "events": events,
     }
-    for name in ("velocity_ratio", "frequency_Hz"):  # 0 for none, as in the messages
+    for name in ("velocity_ratio", "frequency_Hz"):  # 0 if unknown, as in the messages; None without a message
         figures[name] = now[name] or 0.0 if name in now else None
     return Status(**figures)

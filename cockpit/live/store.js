@@ -1,7 +1,7 @@
 // Received data: signals on an even grid of buckets, states as stretches with a word each, slips and events.
 "use strict";
 
-const KEPT_S = 60; // of curves; the server keeps as much for newly opened pages
+const KEPT_S = 60; // length of the kept curves; the server keeps as much for newly opened pages
 
 /** The last minute of one run. */
 class Store {
@@ -9,7 +9,6 @@ class Store {
     this.names = hello.columns;
     this.step_s = step_s;
     this.factor = new Map();
-    this.unknown = new Map();
     for (const curve of hello.panels.flatMap((panel) => panel.curves)) {
       for (const name of [curve.name, ...["least", "mean", "most"].map((which) => `${curve.name}.${which}`)]) this.factor.set(name, curve.factor);
     }
@@ -54,7 +53,7 @@ class Store {
     while (this.log.events.length && this.log.events[0].t_s < least) this.log.events.shift();
   }
 
-  /** Extend the stretches of one row. */
+  /** Extend the stretches of one row of states, such as the modes, by the words of new buckets. */
   band(row, first, count, values) {
     const at = this.names.indexOf(row.column) * count;
     for (let bucket = 0; bucket < count; bucket++) {

@@ -5,11 +5,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Records
 from bridge.wire.channels import CHANNELS
-from bridge.wire.messages import Records
 
-BEFORE_S, AFTER_S = 0.1, 0.1  # captured around the trigger: a slip takes a few ms, the stick before it a few 0.1 s
-_AGAIN_S = 0.5  # least time between two captures; an operator can read no more
+BEFORE_S, AFTER_S = 0.1, 0.1  # captured before and after the trigger; a slip takes a few ms
+_AGAIN_S = 0.5  # least time between two captures; an operator cannot read more of them
 BY_HAND = "by hand"
 BY_SLIP = "a slip"
 
@@ -23,16 +23,11 @@ class Capture(NamedTuple):
     before_s: float  # time from the first sample to `t_s`
     sample_s: float
     samples: npt.NDArray[np.float32]  # [channels, samples], SI units; nan where a block is missing
-    missing: int  # missing blocks
+    missing: int  # blocks missing in `samples`
 
 
 class Scope:
-    """Triggers on the slips of one run.
-
-    Args:
-        block_ns: duration of a block.
-
-    """
+    """Captures samples around the slips that the controller counts in one run, with blocks of `block_ns`."""
 
     def __init__(self, block_ns: int) -> None:
         self._block_ns = block_ns

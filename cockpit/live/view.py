@@ -1,4 +1,4 @@
-"""State of a rig for display: new buckets, events and captures, with the current words and figures."""
+"""State of a rig for display: new buckets, events and captures, the current words and figures, and one sentence."""
 
 import collections
 import contextlib
@@ -8,34 +8,35 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from bridge.arrays import Records
 from bridge.faults import Fault
-from bridge.log.pause_events import CORE_PAUSE, PAUSE
+from bridge.log.metadata import value_at
 from bridge.log.screen import Screen
+from bridge.log.watches.event_watch import CORE_PAUSE, PAUSE
 from bridge.plain import plain
+from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.block_numbers import WINDOW
 from bridge.wire.complaints import Complaints
-from bridge.wire.event_codes import SEVERITIES, event_code
-from bridge.wire.messages import APPLIED, TRACE, Records
+from bridge.wire.event_codes import FAILURE, SEVERITIES, TRIPS, WEAK_REASONS, event_code, harms
+from bridge.wire.messages import APPLIED, TRACE
 from bridge.wire.payloads import parsed
-from bridge.wire.words import word_of
+from bridge.wire.words import OUTSIDE, help_of, word_of
 from bridge.wire.zenoh_link import Received
 from cockpit.figures.signals import SIGNALS, WORD_SIGNALS, stroke_limits
-from cockpit.live.answer import BAD, OFF, Answer, of_a_live_rig
-from cockpit.live.buckets import Bucketing, Buckets, block_numbers
+from cockpit.live.buckets import Bucketing, Buckets, SensorTables, Tally, block_numbers, table_of
 from cockpit.live.listener import Source
-from cockpit.live.tables import SensorTables, table_of
-from cockpit.live.tally import Tally
 from cockpit.live.trigger import Capture, Scope
 
 SILENT_S = 0.5  # age of a message from which its values are hidden. Longer: old values are shown as current
 _AT_ONCE = 1 << 13  # most messages taken per step; more than the queue holds
 _FAR = 12_000  # buckets without a block (one minute) after which a new run is assumed
-_EVENTS_KEPT = 200
+_EVENTS_KEPT = 200  # events kept for newly opened pages
 _EVENTS_AT_ONCE = 50  # events listed per step; further events are only counted
-_LONGEST_TEXT = 500
+_LONGEST_TEXT = 500  # characters of an event's text; the rest is cut off
 _SLIPS_S = 10.0  # window for the count of recent slips
 WAITING, LIVE, SILENT, LEFT, ENDED = "waiting", "live", "silent", "left", "ended"
+GOOD, LOOK, BAD, OFF = "good", "look", "bad", "off"
 
 
 class EventRow(NamedTuple):
@@ -61,6 +62,13 @@ class ViewUpdate(NamedTuple):
     tables: Mapping[str, Records]  # new messages by topic: sensors, trace, applied; topics without any are absent
 
 
+class Answer(NamedTuple):
+    """State of the rig in one sentence."""
+
+    level: str  # GOOD, LOOK, BAD; OFF: no rig to report on
+    text: str
+
+
 class _Run:
     """State that starts with each run."""
 
@@ -69,23 +77,16 @@ class _Run:
         self.buckets = Bucketing(block_ns)
         self.scope = Scope(block_ns)
         self.tally = Tally()
-        self.slips: collections.deque[tuple[float, int]] = collections.deque()
-        self.newest = {"sensors": -1, "trace": -1, "applied": -1}
+        self.slips: collections.deque[tuple[float, int]] = collections.deque()  # time [s] and count, of the last 10 s
+        self.newest = {"sensors": -1, "trace": -1, "applied": -1}  # newest block number by topic
 
 
 class View:
-    """Follows a source, step by step.
-
-    Args:
-        source: delivers the messages.
-        where: endpoint of the bus, for messages.
-        clock: returns the time [s].
-
-    """
+    """Follows a source of messages from the endpoint `where`, step by step; `clock` returns the time [s]."""
 
     def __init__(self, source: Source, where: str, clock: Callable[[], float] = time.monotonic) -> None:
         self._source, self._where, self._clock = source, where, clock
-        self.unreadable = 0  # malformed messages, or of unauthenticated clients
+        self.unreadable = 0  # reports of malformed messages or unauthenticated clients, at most one per second and kind
         self.pauses = 0  # stalls of the computer reported by the recorder; counted, not listed as events
         self.run: _Run | None = None
         self.events: collections.deque[EventRow] = collections.deque(maxlen=_EVENTS_KEPT)
@@ -106,7 +107,7 @@ class View:
         waiting: dict[str, list[bytes]] = {"sensors": [], "trace": [], "applied": []}
         events: list[Received] = []
         for _ in range(_AT_ONCE):
-            received = self._source.inbox.get_nowait()
+            received = self._source.inbox.get()
             if received is None:
                 break
             for message in self._screen.passed(received):
@@ -183,7 +184,7 @@ class View:
         if topic == "applied":
             self.run.tally.add_applied(table)
             return
-        self.run.tally.add_trace(table)
+        self.run.tally.controller += int(table["gap_blocks"].sum())
         slips = table["slips"].astype(np.int64)
         self.run.scope.add_slips(slips, numbers)
         self.run.slips.append((self._clock(), int(slips[-1])))
@@ -228,24 +229,24 @@ class View:
         """All current figures and words; None if unknown."""
         presence, run, phase = self._source.presence, self.run, self.phase()
         figures = self._figures() if phase == LIVE else {}
-        recent = self._slips_of_late()
+        recent, lost, late_us = self._slips_of_late(), None, None
+        if run is not None:
+            lost = {name: getattr(run.tally, name) for name in ("controller", "viewer", "commands", "late", "refused")}
+            lost["dropped"] = self._source.inbox.dropped
+            latency_us = run.tally.latency_us
+            late_us = {"p50": latency_us.quantile(0.5) or None, "p99": latency_us.quantile(0.99) or None}
         return {
             "endpoint": self._where,
             "phase": phase,
             "silent_s": round(self._clock() - self._heard_s.get("sensors", self._began_s), 1),
             "answer": self.answer(phase, figures)._asdict(),
-            "rig": plain(str(_inside(self._source.headers, "plant", "rig", "name") or "")[:80]),
+            "rig": plain(str(value_at(self._source.headers, "plant.rig.name") or "")[:80]),
             "roles": sorted(presence.roles),
             "limits": [{"words": label, "value": value} for label, value in stroke_limits(self._source.headers)],
             "slips_of_late": recent[0] if "slips" in figures else None,
             "slips_over_s": recent[1] if "slips" in figures else None,
-            "lost": run.tally.lost(self._source.inbox.dropped)._asdict() if run is not None else None,
-            "late_us": {
-                "p50": run.tally.percentile_us(0.5),
-                "p99": run.tally.percentile_us(0.99),
-            }
-            if run is not None
-            else None,
+            "lost": lost,
+            "late_us": late_us,
             "unreadable": self.unreadable,
             "pauses": self.pauses,
             **figures,
@@ -276,7 +277,7 @@ class View:
         return figures
 
     def answer(self, phase: str, figures: Mapping[str, Any]) -> Answer:
-        """State in one sentence, with the remedy."""
+        """Connection, or state of a live rig, in one sentence, with the remedy for a fault."""
         silent_s = self._clock() - self._heard_s.get("sensors", self._began_s)
         presence = self._source.presence
         if presence.trouble:
@@ -297,7 +298,7 @@ class View:
         return of_a_live_rig(figures, *self._slips_of_late())
 
     def _slips_of_late(self) -> tuple[int, float]:
-        """Recent slips and their window [s], shorter than usual shortly after the start."""
+        """Number of slips in the last 10 s, and the actual window [s], which is shorter after the start of the run."""
         slips = self.run.slips if self.run is not None else ()
         return (slips[-1][1] - slips[0][1], round(slips[-1][0] - slips[0][0], 1)) if slips else (0, 0.0)
 
@@ -321,15 +322,38 @@ def _number(value: Any) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _inside(table: Any, *keys: str) -> Any:
-    for key in keys:
-        table = table.get(key) if isinstance(table, dict) else None
-    return table
-
-
 def _block_ns(table: Records, numbers: Any) -> int | None:
     """Duration of a block, from two blocks; None with fewer, or if implausible."""
     if len(numbers) < 2 or numbers[-1] <= numbers[0]:
         return None
     length_ns = (int(table["t_ns"][-1]) - int(table["t_ns"][0])) / (int(numbers[-1]) - int(numbers[0]))
     return round(length_ns) if 1e4 <= length_ns <= 1e9 else None
+
+
+def plain_help(column: str, word: str) -> str:
+    """Meaning of a word in a column, for a screen or a page: without backticks."""
+    return help_of(column, word).replace("`", "")
+
+
+def of_a_live_rig(figures: Mapping[str, Any], slips: int, over_s: float) -> Answer:
+    """Answer for a rig that sends blocks; `slips`: count over the last `over_s` [s]."""
+    guard, cause = figures.get("guard_state"), figures.get("cause")
+    mode, reason = figures.get("mode"), figures.get("reason")
+    if guard == "FAULT":
+        why = plain_help("cause", str(cause))
+        more = "" if "reset" in why else "; nothing vibrates until a reset, then arm"
+        return Answer(BAD, f"FAULT: {cause}: {why.partition(': ')[2]}{more}")
+    if mode is None:
+        return Answer(BAD, "no controller: the rig fades out by itself")
+    if figures.get("fallback") and guard in {"ARMED", "ACTIVE", "NO_GUARD"}:
+        return Answer(BAD, "the rig has no fresh command and ramps the vibration to zero by itself")
+    if guard in {"DISARMED", "CHECKING", "READY"}:
+        severity, _, why = plain_help("cause", str(cause)).partition(": ")
+        more = f"; since {cause}: {why}" if severity in {SEVERITIES[FAILURE], SEVERITIES[OUTSIDE]} else ""
+        return Answer(LOOK, f"{guard}: {plain_help('guard_state', guard)}{more}")
+    summary = f"{mode}: {plain_help('mode', str(mode))}"
+    if over_s >= 1.0:
+        summary = f"{counted(slips, 'slip') if slips else 'no slip'} in the last {over_s:.0f} s; {summary}"
+    if reason in {*WEAK_REASONS, *TRIPS}:
+        return Answer(BAD if harms(str(reason)) else LOOK, f"{reason}: {plain_help('reason', str(reason))}; {summary}")
+    return Answer(LOOK if slips else GOOD, summary)

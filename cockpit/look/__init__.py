@@ -1,13 +1,9 @@
 """`stickslip look`: estimates from a measured file.
 
-source   reads the file and the given facts into one record; writes the assumptions as a map
-tare     zero of the force sensor, from a stretch of rest at the beginning
-hints    rig numbers that contradict the record
-result   the numbers with the findings on the file
-page     one offline page
-plots    pictures of the page, also as separate figures
+source   reads the file and the given facts into one record, and its result; writes the assumptions as a map
+page     one offline page, and its pictures, also as separate figures
 cycles   the slips as a table
-findings  findings about omitted rows
+findings findings about omitted rows; zero of the force sensor, from a stretch of rest at the beginning
 quantity a number with its unit on the command line
-evidence the record as an evidence folder
+evidence the record as an evidence folder; rig numbers that contradict the record
 """

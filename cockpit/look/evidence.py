@@ -1,23 +1,39 @@
-"""A record as evidence: rig numbers estimated from the record, with tolerances from their scatter."""
+"""A record as evidence: rig numbers estimated from the record, with tolerances from their scatter; numbers that contradict it."""
 
+import math
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from bridge.config import validate
 from bridge.faults import Fault
+from bridge.log.finding import Finding
 from cockpit.look.source import MeasuredRecord
 from diagnosis.evidence.assumed import with_assumed
 from diagnosis.evidence.import_table import write_run
-from diagnosis.evidence.manifest import RigTable, RunTable
-from diagnosis.evidence.manifest_text import rig_lines
+from diagnosis.evidence.manifest import RigTable, RunTable, rig_lines
 from diagnosis.look.look import LookResult
 
 _LEAST_TOLERANCE = 0.01  # least relative tolerance of a number: sensors are calibrated to 1 %
 _FRICTION_TOLERANCE = 0.05  # least relative tolerance of F_s and F_k: friction differs with the load of each slip
 _STRIBECK_TOLERANCE = 0.5  # relative; one drive speed does not determine the Stribeck velocity
-_OF_90 = 1.645  # standard deviations in half a 90 % interval
-_ASSUMED_MPS = 5e-4  # assumed Stribeck velocity, as of the paper's pairs
+_OF_90 = 1.645  # half width of a 90 % interval in standard deviations
+_ASSUMED_MPS = 5e-4  # assumed Stribeck velocity, the value of the friction pairs in the paper
+_FAR = 3.0  # factor between the given and the estimated number above which the unit is questioned
+_SEEN = {
+    "mass_kg": "mass_kg",
+    "drive_stiffness_N_per_m": "stiffness_N_per_m",
+    "static_force_N": "static_force_N",
+    "coulomb_force_N": "kinetic_force_N",
+}  # estimate from the record to which a rig number is compared
+# by rig number: factors by which a value in a wrong unit is off, each with that unit
+_UNITS: Mapping[str, tuple[tuple[float, str], ...]] = {
+    "mass_kg": ((1e3, "g"), (1e-3, "t"), (9.81, "N, as a weight")),
+    "drive_stiffness_N_per_m": ((1e-3, "N/mm"), (1e-6, "N/um"), (1e3, "mN/m")),
+    "static_force_N": ((1e-3, "kN"), (1e3, "mN"), (0.102, "kgf")),
+    "coulomb_force_N": ((1e-3, "kN"), (1e3, "mN"), (0.102, "kgf")),
+}
 
 
 def rig_of(seen: LookResult, file: str) -> tuple[RigTable, list[str]]:
@@ -82,3 +98,20 @@ def write_evidence(record: MeasuredRecord, seen: LookResult, folder: Path) -> tu
     folder.mkdir(parents=True, exist_ok=True)
     write_run(folder, columns, rig, [run], assumed)
     return rig, assumed
+
+
+def hints(seen: LookResult, rig: Mapping[str, float]) -> list[Finding]:
+    """A finding for each rig number that differs by a factor of _FAR from the record."""
+    findings: list[Finding] = []
+    for name, value in rig.items():
+        number = seen.numbers.get(_SEEN.get(name, ""))
+        if number is None or not value > 0.0 or not number.value > 0.0:
+            continue
+        ratio = value / number.value
+        if 1.0 / _FAR < ratio < _FAR:
+            continue
+        unit = min(_UNITS[name], key=lambda wrong: abs(math.log(ratio / wrong[0])))
+        meant = f"; is it in {unit[1]}?" if abs(math.log(ratio / unit[0])) < math.log(_FAR) else ""
+        text = f"{value:g} is {ratio:.3g} times the {number.value:.4g} {number.unit} that the record shows{meant}"
+        findings.append(Finding("units", name, text))
+    return findings

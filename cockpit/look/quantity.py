@@ -8,7 +8,7 @@ from bridge.tables.unit_words import known_unit, si_unit
 
 _EXAMPLES = {"velocity": "0.5mm/s", "force": "94.5N", "mass": "1.5kg", "frequency": "1kHz", "time": "30s"}
 _GRAMS = {"g": 1e-3, "mg": 1e-6}  # for a mass, g means gram and not acceleration
-# quantity in place of each for a turning rig
+# by quantity of a sliding rig: the quantity of a turning rig that is accepted in its place
 _TURNING = {"velocity": "angular velocity", "mass": "inertia"}
 
 

@@ -10,20 +10,21 @@ from bridge.arrays import Floats
 from bridge.config import read_toml, validate
 from bridge.faults import Fault
 from bridge.log.finding import Finding
+from bridge.results import in_json
 from bridge.tables.kinds import kind_of
 from bridge.tables.readers import read_table
 from bridge.tables.table import Table
 from bridge.tables.unit_words import in_brackets, known_unit, weight_unit
-from cockpit.look.findings import of_time, of_values
-from cockpit.look.tare import tare_of
+from cockpit.look.findings import of_time, of_values, tare_of
 from diagnosis.evidence.import_table import ImportMap
 from diagnosis.evidence.manifest_keys import ChannelMap
 from diagnosis.evidence.mapped import calendar_unit_s, has_time, mapped
 from diagnosis.evidence.run_log import columns_of_log
 from diagnosis.look.guess import Guess, guess, no_time
 from diagnosis.look.look import LookResult, RecordFacts, look
-from diagnosis.look.record import FEWEST
+from diagnosis.look.slips import FEWEST
 from diagnosis.look.sticks import is_of_slide
+from diagnosis.look.words import headline
 
 
 class LookOptions(NamedTuple):
@@ -49,7 +50,6 @@ class MeasuredRecord(NamedTuple):
     known: RecordFacts
     findings: list[Finding]
     map_text: str  # map that reproduces this reading; empty if a map was given, or for a run log
-    of_load: bool  # the force was read from a friction coefficient, times the load if known
 
 
 def read_record(path: Path, asked: LookOptions) -> MeasuredRecord:
@@ -136,15 +136,15 @@ def read_record(path: Path, asked: LookOptions) -> MeasuredRecord:
         and asked.speed_mps is None
         and len(table.columns[guessed.speed]) == len(columns["t_s"])
     ):
-        columns["drive_position_m"] = _displacement(
-            columns["t_s"], _si(table, guessed.speed, "rad/s" if torsion else "m/s", findings)
-        )
+        speed_mps = _si(table, guessed.speed, "rad/s" if torsion else "m/s", findings)
+        steps_m = 0.5 * (speed_mps[1:] + speed_mps[:-1]) * np.diff(columns["t_s"])
+        columns["drive_position_m"] = np.concatenate([[0.0], np.nancumsum(steps_m)])
     known = RecordFacts(asked.speed_mps, load_N, asked.mass_kg, of_load and load_N is None, torsion)
-    return _record(path, columns, known, findings, map_text(table, channels, asked), of_load)
+    return _record(path, columns, known, findings, map_text(table, channels, asked))
 
 
 def looked_at(record: MeasuredRecord) -> LookResult:
-    """The numbers of a record. Raises Fault BAD_TABLE for a record that is too short."""
+    """Slips, friction, stiffness and mass from a record. Raises Fault BAD_TABLE for a record that is too short."""
     seen = look(record.t_s, record.force_N, record.position_m, record.known)
     if seen is None:
         line = f"{record.path.name}: fewer than 16 samples of a force with a time; give a longer record"
@@ -169,7 +169,6 @@ def _record(
     known: RecordFacts,
     findings: list[Finding],
     text: str,
-    of_load: bool = False,
 ) -> MeasuredRecord:
     if "drive_force_N" not in columns:
         raise Fault("BAD_TABLE", f"{path.name}: has no drive_force_N: a force is needed; map a force in [channels]")
@@ -184,7 +183,7 @@ def _record(
         not np.isfinite(position).any() or float(np.nanmax(position) - np.nanmin(position)) == 0.0
     ):
         position = None
-    return MeasuredRecord(path, columns["t_s"], columns["drive_force_N"], position, known, findings, text, of_load)
+    return MeasuredRecord(path, columns["t_s"], columns["drive_force_N"], position, known, findings, text)
 
 
 def _channels(table: Table, guessed: Guess) -> dict[str, ChannelMap]:
@@ -202,7 +201,7 @@ def _channels(table: Table, guessed: Guess) -> dict[str, ChannelMap]:
 
 
 def _as_read(channels: dict[str, ChannelMap], columns: dict[str, Floats]) -> dict[str, Floats]:
-    """Columns by their names in the table."""
+    """The values of the channels by the names of their columns in the table."""
     return {str(channel.column): columns[name] for name, channel in channels.items()}
 
 
@@ -214,12 +213,6 @@ def _si(table: Table, column: str, unit: str, findings: list[Finding]) -> Floats
         text = f"states no known unit: taken as {unit}; add {add} if it is not"
         findings.append(Finding("assumed", f"{table.path.name}: {column}", text))
     return table.column(column) * (known[1] if known else 1.0)
-
-
-def _displacement(t_s: Floats, speed_mps: Floats) -> Floats:
-    """Displacement from a speed, [samples]."""
-    steps = 0.5 * (speed_mps[1:] + speed_mps[:-1]) * np.diff(t_s)
-    return np.concatenate([[0.0], np.cumsum(np.where(np.isfinite(steps), steps, 0.0))])
 
 
 def _unitless(table: Table, channels: dict[str, ChannelMap]) -> list[Finding]:
@@ -270,3 +263,17 @@ def map_text(table: Table, channels: dict[str, ChannelMap], asked: LookOptions) 
     if asked.speed_mps is not None:
         lines += ["", "[run]", f"drive_velocity_mps = {asked.speed_mps!r}"]
     return "\n".join(lines) + "\n"
+
+
+class Looked(NamedTuple):
+    """The numbers of a file, with findings on its data and the files that were written."""
+
+    seen: LookResult
+    findings: list[Finding]
+    written: list[Path]
+    JSON_MERGED = "seen"
+
+    @in_json
+    def headline(self) -> str:
+        """The answer in one line."""
+        return headline(self.seen)

@@ -18,14 +18,14 @@ from cockpit.paper.runs import (
 
 PAPER_CLAIMS: Final = "Claims of the paper"
 
-_FORCE_PERCENT: Final = 0.3
-_PERIOD_PERCENT: Final = 1.0
-_PARAMETER_PERCENT: Final = 0.5
-_AREA_MM2: Final = 1192.0
-_FRICTION_COEFFICIENT: Final = {"C45-C45": 0.193, "C45-GGG40": 0.176}  # Table 2
+_FORCE_PERCENT: Final = 0.3  # allowed deviation of a force from the independent solution
+_PERIOD_PERCENT: Final = 1.0  # allowed deviation of a period from it
+_PARAMETER_PERCENT: Final = 0.5  # allowed deviation of a printed parameter from the paper's formula
+_AREA_MM2: Final = 1192.0  # contact area in the paper
+_FRICTION_COEFFICIENT: Final = {"C45-C45": 0.193, "C45-GGG40": 0.176}  # Table 2 of the paper
 
-# The same equations by the classic Runge-Kutta method in steps of 1 us: F_d max [N], F_d min [N], period [s];
-# without stick-slip, the settled force.
+# Independent solution of the same equations, by the classic Runge-Kutta method in steps of 1 us: F_d max [N], F_d min [N],
+# period [s]; without stick-slip only the settled force [N].
 REFERENCE: Final[dict[Key, tuple[float, float, float] | tuple[float]]] = {
     ("C45-C45 @ 0.063", 0): (17.38, 11.60, 1.028),
     ("C45-C45 @ 0.063", 1000): (16.90, 12.08, 1.015),
@@ -187,13 +187,7 @@ def parameter_rows() -> list[PaperRow]:
 
 
 def _number(
-    group: str,
-    claim: str,
-    ours: float,
-    theirs: float,
-    unit: str,
-    percent: float,
-    scatter: float | None = None,
+    group: str, claim: str, ours: float, theirs: float, unit: str, percent: float, scatter: float | None = None
 ) -> PaperRow:
     deviation_percent = 100.0 * (ours / theirs - 1.0)
     digits = max(0, 4 - len(str(int(abs(theirs)))))

@@ -1,6 +1,7 @@
 """`stickslip reproduce`: redo the paper's calculation and report line by line whether it holds."""
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,6 +12,7 @@ from bridge.pages import filled_page
 from bridge.provenance import provenance
 from bridge.results import in_json
 from cockpit.paper.claims import PAPER_CLAIMS, PaperRow, paper_claims, parameter_rows, reference_rows, slip_rows
+from cockpit.paper.plots import figures
 from cockpit.paper.runs import (
     CYCLES_FROM_S,
     PTFE_PAIRS,
@@ -46,16 +48,18 @@ class ReproduceResult(NamedTuple):
         return f"{of_the_paper}; {held} of {len(self.rows)} checks in all"
 
 
-def reproduce(out: Path, progress: bool) -> ReproduceResult:
+def reproduce(out: Path, progress: Callable[[float], None] = lambda _share: None) -> ReproduceResult:
     """Redo the paper and write the report to `out`, one self-contained HTML file.
 
-    The file is written at once, after all computations; its folder must exist. `progress` shows a bar on stderr, if stderr is
-    a terminal.
+    The file is written at once, after all computations; `progress` is called with the share done.
 
     Raises OSError when `out` cannot be written.
     """
     started_s = time.perf_counter()
-    runs = _simulate(progress)
+    runs: dict[Key, PairRun] = {}
+    for done, key in enumerate(keys := plan()):
+        progress(done / len(keys))
+        runs[key] = run(*key)
     slip = one_slip("C45-C45 @ 0.063")
     rows = paper_claims(runs) + reference_rows(runs) + slip_rows(slip) + parameter_rows()
     result = ReproduceResult(rows, time.perf_counter() - started_s)
@@ -63,24 +67,7 @@ def reproduce(out: Path, progress: bool) -> ReproduceResult:
     return result._replace(elapsed_s=time.perf_counter() - started_s)
 
 
-def _simulate(progress: bool) -> dict[Key, PairRun]:
-    from rich.console import Console
-    from rich.progress import Progress
-
-    console = Console(stderr=True)
-    with Progress(console=console, transient=True, disable=not (progress and console.is_terminal)) as bar:
-        keys = plan()
-        task = bar.add_task("", total=sum(len(starts_s(f)) for _, f in keys))
-        runs: dict[Key, PairRun] = {}
-        for pair, frequency_Hz in keys:
-            bar.update(task, description=f"{pair} N/mm², {frequency_Hz} Hz")
-            runs[pair, frequency_Hz] = run(pair, frequency_Hz, lambda: bar.advance(task))
-    return runs
-
-
 def _page(result: ReproduceResult, runs: dict[Key, PairRun]) -> str:
-    from cockpit.paper.plots import figures
-
     groups: dict[str, list[PaperRow]] = {}
     for row in result.rows:
         groups.setdefault(row.group, []).append(row)

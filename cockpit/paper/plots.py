@@ -1,15 +1,13 @@
 """The paper's Figures 2-4 and 6-9 from the simulated runs, as PNG pictures inside the page."""
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from bridge.pages import png
 from cockpit.paper.runs import DRIVE_VELOCITY_MPS, FREQUENCIES_HZ, Key, PairRun, vibration_velocity_mps
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _FORCE, _SLIDE, _DRIVE = "#1b4f72", "#b03a2e", "#808b96"
 
@@ -24,55 +22,68 @@ class PageFigure(NamedTuple):
 
 def figures(runs: Mapping[Key, PairRun]) -> list[PageFigure]:
     """Every figure of the page, in the paper's order."""
-    pictures = [_without_vibration(runs)]
-    for number, pair in (("3", "C45-C45 @ 0.063"), ("4", "C45-C45 @ 0.104")):
-        pictures.append(_sweep(runs, number, pair))
-    for number, pair in (("6", "C45-C45 @ 0.063"), ("7", "C45-GGG40 @ 0.063")):
-        pictures.append(_one_and_three_kHz(runs, number, pair))
-    for number, material in (("8", "C45-C45"), ("9", "C45-GGG40")):
-        pictures.append(_against_frequency(runs, number, material))
-    return pictures
-
-
-def _without_vibration(runs: Mapping[Key, PairRun]) -> PageFigure:
     pairs = ("C45-C45 @ 0.063", "C45-GGG40 @ 0.063", "C45-PTFE @ 0.063")
-    figure, axes = _grid(2, len(pairs), 4.6)
-    for column, pair in enumerate(pairs):
-        _courses(axes[:, column], runs[pair, 0], 0.0, 16.0, pair.split(" @ ")[0])
-    _labels(axes)
-    return PageFigure(
-        "Figure 2: without vibration",
-        "Drive force F_d, position of the slide x and of the drive s_d at 0.063 N/mm². "
-        "Steel and cast iron stick and slip; PTFE slides evenly.",
-        _png(figure),
-    )
+    return [
+        _over_time(
+            "Figure 2: without vibration",
+            "Drive force F_d, position of the slide x and of the drive s_d at 0.063 N/mm². "
+            "Steel and cast iron stick and slip; PTFE slides evenly.",
+            [(runs[pair, 0], pair.split(" @ ")[0]) for pair in pairs],
+            (0.0, 16.0),
+            4.6,
+        ),
+        *(
+            _over_time(
+                f"Figure {number}: {pair} N/mm², 0 to 5 kHz",
+                "The four seconds after the vibration starts at t = 8 s, with the same seconds without it on the "
+                "left. The swing of F_d and the steps of x shrink from left to right; from 4 kHz on both vanish.",
+                [(runs[pair, frequency_Hz], _at(frequency_Hz, "\n")) for frequency_Hz in FREQUENCIES_HZ],
+                (8.0, 12.0),
+                5.0,
+            )
+            for number, pair in (("3", "C45-C45 @ 0.063"), ("4", "C45-C45 @ 0.104"))
+        ),
+        *(
+            _over_time(
+                f"Figure {number}: {pair} N/mm² at 1 and 3 kHz",
+                "The whole run. The vibration starts at the dotted line.",
+                [(runs[pair, frequency_Hz], _at(frequency_Hz, ", ")) for frequency_Hz in (1000, 3000)],
+                (0.0, 16.0),
+                4.8,
+                starts_s=8.0,
+            )
+            for number, pair in (("6", "C45-C45 @ 0.063"), ("7", "C45-GGG40 @ 0.063"))
+        ),
+        *(_against_frequency(runs, number, material) for number, material in (("8", "C45-C45"), ("9", "C45-GGG40"))),
+    ]
 
 
-def _sweep(runs: Mapping[Key, PairRun], number: str, pair: str) -> PageFigure:
-    figure, axes = _grid(2, len(FREQUENCIES_HZ), 5.0)
-    for column, frequency_Hz in enumerate(FREQUENCIES_HZ):
-        _courses(axes[:, column], runs[pair, frequency_Hz], 8.0, 12.0, _at(frequency_Hz, "\n"))
-    _labels(axes)
-    return PageFigure(
-        f"Figure {number}: {pair} N/mm², 0 to 5 kHz",
-        "The four seconds after the vibration starts at t = 8 s, with the same seconds without it on the "
-        "left. The swing of F_d and the steps of x shrink from left to right; from 4 kHz on both vanish.",
-        _png(figure),
-    )
-
-
-def _one_and_three_kHz(runs: Mapping[Key, PairRun], number: str, pair: str) -> PageFigure:
-    figure, axes = _grid(2, 2, 4.8)
-    for column, frequency_Hz in enumerate((1000, 3000)):
-        _courses(axes[:, column], runs[pair, frequency_Hz], 0.0, 16.0, _at(frequency_Hz, ", "))
-        for axis in axes[:, column]:
-            axis.axvline(8.0, color="black", linewidth=0.8, linestyle=":")
-    _labels(axes)
-    return PageFigure(
-        f"Figure {number}: {pair} N/mm² at 1 and 3 kHz",
-        "The whole run. The vibration starts at the dotted line.",
-        _png(figure),
-    )
+def _over_time(
+    title: str,
+    caption: str,
+    columns: Sequence[tuple[PairRun, str]],
+    window_s: tuple[float, float],
+    height_in: float,
+    starts_s: float | None = None,
+) -> PageFigure:
+    """Force above positions, a column for each run with its title; a dotted line at the start of the vibration."""
+    figure, axes = _grid(2, len(columns), height_in)
+    for (force, position), (run, name) in zip(axes.T, columns, strict=True):
+        course = run.course
+        part = slice(*np.searchsorted(course.t_s, window_s))
+        t_s = course.t_s[part]
+        force.plot(t_s, course.drive_force_N[part], color=_FORCE, linewidth=0.9)
+        position.plot(t_s, course.drive_position_m[part] * 1e3, color=_DRIVE, linewidth=0.9, label="drive s_d")
+        position.plot(t_s, course.position_m[part] * 1e3, color=_SLIDE, linewidth=0.9, label="slide x")
+        force.set_title(name, fontsize=9)
+        force.set_xlim(*window_s)
+        position.set_xlabel("time t [s]")
+        for axis in (force, position) if starts_s is not None else ():
+            axis.axvline(starts_s, color="black", linewidth=0.8, linestyle=":")
+    axes[0, 0].set_ylabel("drive force F_d [N]")
+    axes[1, 0].set_ylabel("position [mm]")
+    axes[1, 0].legend(frameon=False, fontsize=8)
+    return PageFigure(title, caption, _png(figure))
 
 
 def _against_frequency(runs: Mapping[Key, PairRun], number: str, material: str) -> PageFigure:
@@ -106,35 +117,13 @@ def _at(frequency_Hz: int, separator: str) -> str:
     return f"{frequency_Hz // 1000} kHz{separator}v_a = {vibration_velocity_mps(frequency_Hz) * 1e3:.3f} mm/s"
 
 
-def _grid(rows: int, columns: int, height_in: float, share_y: bool = True) -> tuple["Figure", Any]:
-    from matplotlib.figure import Figure
-
+def _grid(rows: int, columns: int, height_in: float, share_y: bool = True) -> tuple[Figure, Any]:
     figure = Figure(figsize=(11.0, height_in), layout="constrained")
     axes = figure.subplots(rows, columns, sharex=share_y, sharey="row" if share_y else False, squeeze=False)
     return figure, axes
 
 
-def _courses(axes: Any, run: PairRun, from_s: float, to_s: float, title: str) -> None:
-    course = run.course
-    part = slice(*np.searchsorted(course.t_s, (from_s, to_s)))
-    t_s = course.t_s[part]
-    force, position = axes
-    force.plot(t_s, course.drive_force_N[part], color=_FORCE, linewidth=0.9)
-    position.plot(t_s, course.drive_position_m[part] * 1e3, color=_DRIVE, linewidth=0.9, label="drive s_d")
-    position.plot(t_s, course.position_m[part] * 1e3, color=_SLIDE, linewidth=0.9, label="slide x")
-    force.set_title(title, fontsize=9)
-    force.set_xlim(from_s, to_s)
-
-
-def _labels(axes: Any) -> None:
-    axes[0, 0].set_ylabel("drive force F_d [N]")
-    axes[1, 0].set_ylabel("position [mm]")
-    axes[1, 0].legend(frameon=False, fontsize=8)
-    for axis in axes[1]:
-        axis.set_xlabel("time t [s]")
-
-
-def _png(figure: "Figure") -> str:
+def _png(figure: Figure) -> str:
     for axis in figure.axes:
         axis.grid(alpha=0.25)
         axis.tick_params(labelsize=8)

@@ -1,7 +1,6 @@
 """The paper's runs, redone: every pair, pressure and frequency, and the measurements of each run."""
 
 import math
-from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -44,9 +43,9 @@ class Course(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """Measurements of one run: cycle means over t = 10.5-20 s, and the level of the force over t = 16-20 s.
+    """Measurements of one run: means of cycles over t = 10.5-20 s, and the mean force over t = 16-20 s.
 
-    The first five are nan without slips in that time. `late_slips` counts from RELEASED_S on.
+    The first five are nan without slips over t = 10.5-20 s. `late_slips` is the number of slips from RELEASED_S on.
     """
 
     force_max_N: float
@@ -74,7 +73,7 @@ class Slip(NamedTuple):
     duration_s: float
     peak_velocity_mps: float
     peak_accel_mps2: float
-    climb_N_per_s: float
+    climb_N_per_s: float  # rise of the drive force between two slips
 
 
 def vibration_velocity_mps(frequency_Hz: float) -> float:
@@ -98,8 +97,8 @@ def plan() -> list[Key]:
     return [(pair, f) for pair in STEEL_PAIRS for f in FREQUENCIES_HZ] + [(pair, 0) for pair in PTFE_PAIRS]
 
 
-def run(pair: str, frequency_Hz: int, done: Callable[[], None]) -> PairRun:
-    """Simulate one pair at one frequency from all its starts; `done` is called after each."""
+def run(pair: str, frequency_Hz: int) -> PairRun:
+    """Simulate one pair at one frequency from all its starts."""
     rig = paper_rig(pair)
     measured: list[Measured] = []
     course: Course | None = None
@@ -107,7 +106,6 @@ def run(pair: str, frequency_Hz: int, done: Callable[[], None]) -> PairRun:
         simulation = simulate(rig, DURATION_S, frequency_Hz, AMPLITUDE_M if frequency_Hz else 0.0, start_s)
         measured.append(measure(simulation))
         course = course or _course(simulation, rig.solver.samples_per_block)
-        done()
     assert course is not None  # noqa: S101 - every frequency has a start
     values = np.array(measured)
     return PairRun(

@@ -2,12 +2,12 @@
 "use strict";
 
 const LEFT = 72, RIGHT = 14; // margins of the plotting area in pixels, the same for all panels and the ribbon
-// drawn on a ground that is light or dark: pale colours are transparent ones
+// pale colours are transparent, as the background of the page is light or dark
 const EXCITING = "#1e844922", GRID = "#1c283316", LIMIT = "#b5402a", MARK = "#b5402a", BEGIN = "#1f2d3a";
 
 /** Decode a curve (base64 of little-endian float32) to an array; null for missing values. */
 function unpacked(text) {
-  if (Array.isArray(text)) return text; // live page
+  if (Array.isArray(text)) return text; // the live page passes numbers instead of base64
   const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   return Array.from(new Float32Array(bytes.buffer), (value) => (Number.isNaN(value) ? null : value));
 }
@@ -197,7 +197,7 @@ function plotOf(place, panel, x, logs, axis) {
   const plot = new uPlot(options, columnsOf(panel, x), place);
   const rows = [...plot.root.querySelectorAll(".u-legend .u-series")];
   for (const at of hidden) rows[at].style.display = "none";
-  for (const row of rows.slice(1)) rows[0].after(row); // back in the order of the panel
+  for (const row of rows.slice(1)) rows[0].after(row); // the legend lists the curves in the order of the panel
   for (const label of plot.root.querySelectorAll(".u-label")) label.replaceChildren(...rich(label.textContent));
   axis.listeners.push(() => plot.setScale("x", { min: axis.from, max: axis.to }));
   addEventListener("resize", () => plot.setSize({ width: width(), height: options.height }));

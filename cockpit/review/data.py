@@ -1,6 +1,8 @@
 """Content of a page for one or two logs as one JSON object; curves are base64 of little-endian float32 on an even time grid."""
 
 import base64
+import contextlib
+import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,16 +11,16 @@ from typing import Any
 import numpy as np
 
 from bridge.log.logfile import RunData, block_period_ns, read_run
+from bridge.log.storage.verdict_file import VERDICT
 from bridge.log.watches.histogram import Histogram
 from bridge.provenance import Provenance, shown_name
 from bridge.wire.event_codes import SEVERITIES, event_code
-from cockpit.figures.grid import Envelope, Grid, on_grid
-from cockpit.figures.signals import PANELS, Floats, Panel, PlottedSignal, holds, limits_of, samples_of
+from bridge.wire.words import word_of, words
+from cockpit.figures.curves import Envelope, Grid, on_grid
+from cockpit.figures.signals import BANDS, PANELS, Floats, Panel, PlottedSignal, holds, limits_of, samples_of
 from cockpit.judge.judged import judge_tables
 from cockpit.judge.verdict import RunVerdict
 from cockpit.judge.verdict_words import headline, in_words
-from cockpit.review.bands import bands_of, used_words
-from cockpit.review.differences import differences, parameters_of
 from diagnosis.slips import Cycles
 
 FORMAT = "stickslip-review/1"
@@ -33,23 +35,19 @@ def review_data(paths: Sequence[Path], made: Provenance) -> tuple[dict[str, Any]
     grid = _grid(runs)
     judged = [judge_tables(run) for run in runs]
     verdicts = [verdict for verdict, _ in judged]
-    labels = [chr(ord("A") + number) for number in range(len(runs))]
-    shown = [_log(run, *judgement, label, grid) for run, judgement, label in zip(runs, judged, labels, strict=True)]
-    parameters = [parameters_of(run) for run in runs]
-    rows = [row for run in runs for row in bands_of(run, grid)]
+    bands = [_bands(run, grid) for run in runs]
     data = {
         "format": FORMAT,
         "made": made.in_words(),
-        "grid": {"start_s": grid.start_s, "step_s": grid.step_s, "bins": grid.bins},
-        "logs": shown,
+        "grid": grid._asdict(),
+        "logs": [
+            _log(run, *judgement, letter) | {"bands": of_log}
+            for run, judgement, letter, of_log in zip(runs, judged, "AB", bands, strict=False)
+        ],
         "figures": _figures(verdicts),
         "panels": [panel for panel in (_panel(panel, runs, grid) for panel in PANELS) if panel["curves"]],
-        "words": [
-            {"row": title, "word": _lower(word.word), "help": word.help.replace("`", "")}
-            for title, word in used_words(rows)
-        ],
-        "parameters": [{"key": key, "value": value} for key, value in sorted(parameters[0].items())],
-        "differences": [difference._asdict() for difference in differences([*parameters])] if len(runs) > 1 else [],
+        "words": _words([row for of_log in bands for row in of_log]),
+        **parameters_of(runs),
     }
     return data, verdicts
 
@@ -66,7 +64,7 @@ def _grid(runs: Sequence[RunData]) -> Grid:
     return Grid(start_s, step_s, math.floor((end_s - start_s) / step_s + 0.5) + 1)
 
 
-def _log(run: RunData, verdict: RunVerdict, cycles: Cycles | None, label: str, grid: Grid) -> dict[str, Any]:
+def _log(run: RunData, verdict: RunVerdict, cycles: Cycles | None, label: str) -> dict[str, Any]:
     return {
         "label": label,
         "name": shown_name(run.path.name),
@@ -76,17 +74,9 @@ def _log(run: RunData, verdict: RunVerdict, cycles: Cycles | None, label: str, g
         "slips": []
         if cycles is None
         else np.round(np.column_stack([cycles.breakaway_t_s, cycles.breakaway_force_N]), 6).tolist(),
-        "bands": [
-            {"title": row.title, "stretches": [(start, end, _lower(word)) for start, end, word in row.stretches]}
-            for row in bands_of(run, grid)
-        ],
         "events": _events(run),
         "latency": _latency(run),
     }
-
-
-def _lower(word: str) -> str:
-    return word.lower().replace("_", " ")
 
 
 def _figures(verdicts: Sequence[RunVerdict]) -> list[dict[str, Any]]:
@@ -140,7 +130,7 @@ def _curve(run: RunData, number: int, signal: PlottedSignal, grid: Grid) -> dict
 
 
 def _held(made: Envelope, bins: int) -> Envelope:
-    """Hold each value until the next, for values that arrive every `bins` bins."""
+    """Hold each value until the next, at most for `bins` bins, the interval of the values: so their curve has no holes."""
     if bins <= 1:
         return made
     known = np.flatnonzero(np.isfinite(made.mean))
@@ -178,3 +168,79 @@ def _latency(run: RunData) -> dict[str, Any] | None:
     latency_us = Histogram()
     latency_us.add(run.applied["round_trip_ns"][run.applied["round_trip_ns"] > 0] * 1e-3)
     return latency_us.bars("us")
+
+
+def parameters_of(runs: Sequence[RunData]) -> dict[str, Any]:
+    """All settings of the processes of the first log, by keys such as `controller.limits.v_ratio`, and those that differ."""
+    tables: list[dict[str, str]] = []
+    for run in runs:
+        table: dict[str, str] = {}
+        for role in run.headers.keys() - {VERDICT}:  # a result, not a parameter
+            for name, text in run.headers[role].items():
+                value: Any = text
+                with contextlib.suppress(ValueError):  # plain text, not JSON
+                    value = json.loads(text)
+                _flatten(f"{role}.{name}".replace(".configuration", ""), value, table)
+        tables.append(table)
+    rows = [
+        (key, [table.get(key, "") for table in tables]) for key in sorted({key for table in tables for key in table})
+    ]
+    return {
+        "parameters": [{"key": key, "value": value} for key, value in sorted(tables[0].items())],
+        "differences": [{"key": key, "values": values} for key, values in rows if len({*values}) > 1],
+    }
+
+
+def _flatten(key: str, value: Any, into: dict[str, str]) -> None:
+    if isinstance(value, dict):
+        for name, inner in value.items():
+            _flatten(f"{key}.{name}", inner, into)
+        return
+    into[key] = value if isinstance(value, str) else json.dumps(value)
+
+
+def _bands(run: RunData, grid: Grid) -> list[dict[str, Any]]:
+    """Modes and limits of the controller and the rig's guard, for the topics in a log: start, end [s] and word of intervals.
+
+    An interval shorter than a grid step may be missing.
+    """
+    rows: list[dict[str, Any]] = []
+    for band in BANDS:
+        table = getattr(run, band.topic)
+        numbers = table[band.field] if len(table) else np.zeros(0)
+        if len(numbers) and (band.title in {"mode", "contact", "reason"} or numbers.any()):
+            stretches = _stretches(table["t_ns"] * 1e-9, numbers, grid, band.column)
+            rows.append({"title": band.title, "stretches": stretches})
+    return rows
+
+
+def _words(bands: Sequence[dict[str, Any]]) -> list[dict[str, str]]:
+    """Each word of a row of bands once, with its meaning, in the order of the rows."""
+    used = {(row["title"], word) for row in bands for _, _, word in row["stretches"]}
+    return [
+        {"row": band.title, "word": _lower(word.word), "help": word.help.replace("`", "")}
+        for band in BANDS
+        for word in words()
+        if word.column == band.column and (band.title, _lower(word.word)) in used
+    ]
+
+
+def _lower(word: str) -> str:
+    return word.lower().replace("_", " ")
+
+
+def _stretches(t_s: Any, numbers: Any, grid: Grid, column: str) -> list[tuple[float, float, str]]:
+    """Intervals of a constant number. Each starts one step early: numbers are reported at the end of a block."""
+    at = np.rint((t_s - grid.start_s) / grid.step_s)
+    last_of_bin = np.flatnonzero(np.diff(at, append=np.inf) != 0)
+    at, numbers = at[last_of_bin], numbers[last_of_bin]
+    starts = np.flatnonzero(np.diff(numbers.astype(np.int64), prepend=-1))
+    ends = np.append(starts[1:] - 1, len(numbers) - 1)
+    return [
+        (
+            round(grid.start_s + (float(at[start]) - 1.0) * grid.step_s, 6),
+            round(grid.start_s + float(at[end]) * grid.step_s, 6),
+            _lower(word_of(column, int(numbers[start]))),
+        )
+        for start, end in zip(starts, ends, strict=True)
+    ]

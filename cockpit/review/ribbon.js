@@ -1,8 +1,8 @@
 // The ribbon: modes and limits of controller and guard, a row each, and the events, over the time axis of the curves.
 "use strict";
 
-const ROW = 20; // pixels of height
-const QUIET = "#1c28331a", BAD = "#c0392b70"; // transparent, as the ground is light or dark
+const ROW = 20; // height of a row in pixels
+const QUIET = "#1c28331a", BAD = "#c0392b70"; // transparent, as the background is light or dark
 const COLOURS = ["#2a6fb53a", "#7d3c983a", "#148f773a", "#ca6f1e3a", "#7d8b1f3a", "#4a5fc13a"];
 
 /** Assign colours to words in the order of first use; quiet words are grey. */

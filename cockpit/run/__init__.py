@@ -2,15 +2,12 @@
 
 scenario, scenario_file     the model of a run; its files as tables
 sensor_needs                sensors that a scenario needs, checked before the run
-run, outcome                one run from its scenario to its verdict; the result of `stickslip run`
+run                         one run from its scenario to its verdict
 in_process, closed_loop     in one process, without a bus; plant and controller in turns, compiled
 simulated/                  in one process and simulated time, with faults of bus and processes
-processes, child_process    as several processes: start, supervision, end; signals and faults of each
-progress                    the progress line
-lifecycle_lines             lines on the terminal of a process that was started alone
+processes, child_process    as several processes: start, supervision, end, progress line; signals and faults of each
 replay, log_to_bus          a log through this version's controller; a log published on the bus
 soak                        a run of hours, with memory and latency
 authority                   the certificates of the roles
-open_loop_twin              a run simulated again without its controller
 writable                    checks of the files that a command writes at its end
 """

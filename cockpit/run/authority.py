@@ -1,5 +1,6 @@
 """A small certificate authority for the bus of one rig: one certificate per role, with the role as common name."""
 
+import contextlib
 import datetime
 import ipaddress
 import os
@@ -21,7 +22,7 @@ _AUTHORITY_DAYS = 3650
 # Validity of a role's certificate, the longest that browsers accept. Longer: a lost key stays valid longer. Shorter: certificates
 # are renewed more often.
 _ROLE_DAYS = 825
-_EARLIER = datetime.timedelta(minutes=5)  # certificates are valid from this time before now: clocks of computers differ
+_EARLIER = datetime.timedelta(minutes=5)  # valid from this time before now: the clock of a client may be behind
 
 
 class Made(NamedTuple):
@@ -34,15 +35,10 @@ class Made(NamedTuple):
 
 
 def make_certificates(folder: Path, hosts: list[str]) -> Made:
-    """Make the certificates of all roles, signed by the authority in the folder, or by a new one.
+    """Make the certificates of all roles, signed by the authority in the folder, or by a new one. Keys have mode 0600.
 
-    Args:
-        folder: folder for the certificates; created if missing. Keys have mode 0600.
-        hosts: further names and addresses of the rig's computer.
-
-    Raises Fault CONFIG for an invalid host name, LOG_WRITE if the folder is not writable, NOT_SECURE if a certificate exists
-    already: a new key would lock out every client with the old one.
-
+    `hosts` are further names and addresses of the rig's computer. Raises Fault CONFIG for an invalid host name, LOG_WRITE if the
+    folder is not writable, NOT_SECURE if a certificate exists already: a new key would lock out every client with the old one.
     """
     names = list(dict.fromkeys(["localhost", "127.0.0.1", "::1", socket.gethostname(), *hosts]))
     alternatives = [_alternative(name) for name in names]
@@ -63,10 +59,8 @@ def make_certificates(folder: Path, hosts: list[str]) -> Made:
 
 
 def _alternative(name: str) -> x509.GeneralName:
-    try:
+    with contextlib.suppress(ValueError):
         return x509.IPAddress(ipaddress.ip_address(name))
-    except ValueError:
-        pass
     try:
         return x509.DNSName(name)
     except ValueError:
@@ -76,7 +70,7 @@ def _alternative(name: str) -> x509.GeneralName:
 
 
 def _authority(folder: Path) -> tuple[x509.Certificate, ec.EllipticCurvePrivateKey]:
-    """The authority of a folder; created if missing."""
+    """Certificate and key of the authority in a folder; created if both files are missing."""
     certificate_path, key_path = folder / f"{AUTHORITY}.pem", folder / f"{AUTHORITY}.key"
     if certificate_path.exists() or key_path.exists():
         try:

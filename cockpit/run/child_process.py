@@ -1,4 +1,4 @@
-"""Behaviour of each process: signals, the death of the parent, one line for every fault."""
+"""Behaviour of each process: signals, the death of the parent, one line for every fault, lines of a process started alone."""
 
 import contextlib
 import errno
@@ -11,20 +11,21 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 from bridge import compiling
 from bridge.faults import Fault
-from bridge.plain import print_line
+from bridge.plain import StepReport, no_report, print_line
 from bridge.wire import realtime
 
 _PARENT_CHECK_S = 0.25  # interval at which the death of the parent is noticed
 # Work that takes longer prints a line. Larger: the operator waits without a message. Smaller: on a busy computer short runs
 # print it too.
 _LONG_S = 2.0
-# full disk, size limit, quota, closed terminal, closed file
+# errors of a write to stdout that are reported as LOG_WRITE: full disk, size limit, quota, closed terminal, closed file
 _STDOUT_REFUSED = frozenset({errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO, errno.EBADF})
-_LONGEST_NAME = 255  # characters of the longest file name; a longer text merely contains a name
+_LONGEST_NAME = 255  # characters of the longest file name; of a longer text only the invalid characters are shown
 # modules of `stickslip[all]` that a plain installation lacks
 EXTRA_MODULES = frozenset(
     {
@@ -32,6 +33,8 @@ EXTRA_MODULES = frozenset(
         "xlsxwriter",
     }
 )  # fmt: skip
+
+_LAST_LINES_S = 1.0  # longest wait at the end of a process for its queued lines on stderr
 
 
 def stop_event(parent: int = 0) -> threading.Event:
@@ -59,7 +62,7 @@ def stop_event(parent: int = 0) -> threading.Event:
 
 
 def _ending_signals() -> list[signal.Signals]:
-    """SIGTERM, and SIGHUP of a closing terminal unless nohup has set it to be ignored."""
+    """SIGTERM, and SIGHUP, which a closing terminal sends, unless the command was started with nohup."""
     hangs_up = signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN
     return [signal.SIGTERM, signal.SIGHUP] if hangs_up else [signal.SIGTERM]
 
@@ -184,7 +187,7 @@ def warn_without_priority() -> None:
 
 
 class ReportedFault(NamedTuple):
-    """A fault as JSON."""
+    """A fault as the JSON object that `--json` prints."""
 
     fault: str  # code
     line: str
@@ -257,3 +260,30 @@ def _status(work: Callable[[], int | None], as_json: bool) -> int:
         extra = "foxglove" if module == "foxglove" else "all"
         line = f"this command needs {module}, which is not installed; pip install 'stickslip[{extra}]'"
         return report(Fault("MISSING_EXTRA", line), as_json)
+
+
+@contextmanager
+def step_reports(quiet: bool) -> Generator[StepReport]:
+    """A function that prints a line on stderr, e.g. `waiting  for a rig`, in a thread: Ctrl-S must not stall a control loop.
+
+    Args:
+        quiet: print nothing, as a child of `stickslip run`.
+
+    """
+    if quiet:
+        yield no_report
+        return
+    lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+
+    def print_lines() -> None:
+        while (line := lines.get()) is not None:
+            print_line(line)
+
+    # Started before the process claims its priority for all its threads, this one too: the loop may wait for its Python lock.
+    thread = threading.Thread(target=print_lines, name="step lines", daemon=True)
+    thread.start()
+    try:
+        yield lambda label, text: lines.put(f"{label:<8} {text}")
+    finally:
+        lines.put(None)
+        thread.join(_LAST_LINES_S)

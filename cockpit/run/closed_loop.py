@@ -1,18 +1,17 @@
-"""Plant and controller in turns, many blocks per call of compiled code: the interpreter does not slow a run down."""
+"""Plant and controller in turns, many blocks per call of compiled code, as a call per block from Python would be slower."""
 
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from bridge.arrays import Floats
+from bridge.arrays import Floats, Records
 from bridge.guard.states import apply_order
 from bridge.kernel import kernel, unlocked_kernel
 from bridge.kernel_cache import compile_once
 from bridge.wire.channels import CHANNELS
-from bridge.wire.messages import ANNOUNCED, APPLIED, BLOCK, COMMAND, TRACE, Records, sensor_block
+from bridge.wire.messages import ANNOUNCED, APPLIED, BLOCK, COMMAND, TRACE, sensor_block
 from controller.announced import take_announcement
 from controller.config import ControllerConfig
 from controller.core import step as controller_step
@@ -25,11 +24,11 @@ from plant.records import build as plant_records
 from plant.step import act, report
 
 _VELOCITY = TRUTH.index("true_velocity_mps")
-Pair = tuple[npt.NDArray[Any], npt.NDArray[Any]]  # parameters and memory, one record each
+Pair = tuple[Records, Records]  # parameters and memory, one record each
 
 
 class Stretch(NamedTuple):
-    """Messages and truth of one stretch of a run; each has [blocks], except the announcements."""
+    """Messages of one stretch of a run, and the simulated truth; each array has [blocks], except the announcements."""
 
     sensors: Records
     applied: Records
@@ -39,11 +38,11 @@ class Stretch(NamedTuple):
     truth: Floats  # [blocks, 6, samples], rows as `plant.records.TRUTH`
     v_a_mps: Floats  # v_a of the base at the end of each block
     frequency_Hz: Floats  # frequency of the exciter
-    gain: Floats  # v_a for one metre of commanded amplitude at that frequency
+    gain: Floats  # v_a over commanded amplitude at that frequency [1/s]
 
 
 def advancing(answer: Callable[..., None]) -> Callable[..., int]:
-    """The kernel that advances a rig and a subject; the subject answers each sensor block by the kernel `answer`.
+    """Make the kernel that advances a rig and a subject, such as a controller, which answers each block by the kernel `answer`.
 
     Args:
         answer: fills row `i` of `made.command` and `made.trace`; its arguments are subject, i, announce, events, made.
@@ -114,15 +113,7 @@ _advance_both = advancing(_controller_answer)
 
 
 class ClosedLoop:
-    """A rig and its controller in lockstep.
-
-    Args:
-        rig: the rig file.
-        seed: seed of the sensor noise.
-        config: the controller's configuration, with the `block_s` and `samples_per_block` of the rig.
-        arm: whether the rig starts ARMED.
-
-    """
+    """A rig and its controller in lockstep; `config` has the `block_s` and `samples_per_block` of the rig."""
 
     def __init__(self, rig: RigConfig, seed: int, config: ControllerConfig, arm: bool) -> None:
         self.block = 0  # number of the next block

@@ -6,8 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy.typing as npt
-
+from bridge.arrays import Records
 from bridge.guard.config import wider
 from bridge.guard.events import GuardEvents, changes
 from bridge.log.runlog import RunLog
@@ -35,8 +34,8 @@ from plant.node import no_number
 if TYPE_CHECKING:
     from cockpit.judge.run_judge import RunJudge
 
-# Blocks per call of compiled code and per chunk of the log, 1 MB: a stretch ends with the controller's snapshot. A kill loses at
-# most one stretch, 7 ms of work.
+# Blocks per call of compiled code and per chunk of the log, 1 MB. A stretch ends where the controller's snapshot is due. If the
+# process is killed, at most one stretch is lost, 7 ms of work.
 _STRETCH_BLOCKS = SNAPSHOT_EVERY
 
 
@@ -61,8 +60,7 @@ def run_onboard(
 
     Args:
         progress: called after every stretch of blocks with the simulated time [s].
-        changes: changes of the controller's configuration during the run, in order of time.
-        words: operator commands during the run, in order of time.
+        changes, words: changes of the controller's configuration and operator commands, in order of time.
         stopped: called before every stretch of blocks; True ends the run as at its full duration.
         judge: receives every message when it is written; the log is not read back.
 
@@ -128,7 +126,7 @@ def log_of(scenario: Scenario, path: Path, about: dict[str, Any]) -> RunLog:
 
 
 def _first_step(loop: ClosedLoop, t_ns: int) -> int:
-    """Number of the first block that ends at `t_ns` or after it."""
+    """Number of the first block that ends at or after the time of a change or command: it takes effect there."""
     return max(-(-t_ns // loop.block_ns) - 1, 0)
 
 
@@ -160,7 +158,7 @@ class _Events:
         return {block: news for block, news in events.items() if news}
 
 
-def _write(log: RunLog, publish: _Events, end: int, block_ns: int, made: Stretch, memory: npt.NDArray[Any]) -> None:
+def _write(log: RunLog, publish: _Events, end: int, block_ns: int, made: Stretch, memory: Records) -> None:
     """Write the messages of a stretch that ends before block `end`, with the state and snapshot messages that are due."""
     begin = end - len(made.trace)
     for row in range(len(made.announce)):

@@ -1,6 +1,7 @@
-"""A run of several processes: starts plant, controller and recorder, supervises them, and ends them all."""
+"""A run of several processes: starts plant, controller and recorder, supervises them, and ends them all; its progress line."""
 
 import contextlib
+import math
 import os
 import signal
 import socket
@@ -8,25 +9,35 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from pathlib import Path
 from typing import Any
 
+from rich.console import Console
+from rich.live import Live
+from rich.text import Text
+
 from bridge.compiling import Progress, left_in
 from bridge.faults import FAULTS, Fault
-from bridge.plain import ANOTHER_COMPILES, LOADED, print_line
+from bridge.log.watches.event_watch import pauses_of
+from bridge.plain import ANOTHER_COMPILES, plain, print_line
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.event_codes import harms, is_listed
+from bridge.wire.payloads import parsed
+from bridge.wire.topics import STATE
+from bridge.wire.words import word_of
+from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
+from cockpit.live.listener import EVENTS, ROLES
 from cockpit.run.child_process import endings_handled
 from cockpit.run.writable import stamp_of
 
 _GRACE_S = 6.0  # time for a child to fade out, leave the bus and close the log, before it is killed
 _LOOK_S = 0.05  # interval of the checks of the children
 _REPORT_S = 30.0  # time between two lines about a run that has not begun
-_FOREVER_S = 1e6  # time for which a child waits for the others: the parent supervises them, and ends the child
+_FOREVER_S = 1e6  # wait of a child for the others: unlimited in practice, as the parent supervises and ends it
 _WARNING = "stickslip: warning: "  # prefix of a child's line that is passed on to the operator at once
-# progress of a child, as printed
-STARTS, COMPILES, READY = "starts", "compiles", ""
-# order in which the processes are asked to stop: the plant first fades the vibration out and sends END to the others
-_ROLES = ("plant", "controller", "recorder")
+_UPDATE_S = 0.1  # interval of the updates of the progress line, and of attempts to reach the bus
+_SHOWN_S = 3.0  # time for which the progress line shows an event; it shows a harmful event to the end of the run
 
 
 class Child:
@@ -45,7 +56,6 @@ class Child:
             start_new_session=True,
         )
         self._lines: list[str] = []
-        self.still = STARTS
         self.left = (0, 0)  # number of kernels left to compile, and of all that need compilation
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -55,20 +65,12 @@ class Child:
             with self.process.stderr as lines:
                 for line in lines:
                     self._lines.append(line.rstrip())
-                    words = line.removeprefix("stickslip: ")
-                    waits = words.startswith(ANOTHER_COMPILES)
-                    if left := left_in(line):
-                        self.left = left
-                        self.still = COMPILES if left[0] else STARTS
-                    elif waits:
-                        self.still = COMPILES
-                    elif words.rstrip() == LOADED:
-                        self.still = READY
-                    if waits or line.startswith(_WARNING):
+                    self.left = left_in(line) or self.left
+                    if line.startswith((_WARNING, f"stickslip: {ANOTHER_COMPILES}")):
                         print_line(line.rstrip())
 
     def last_words(self) -> str:
-        """The last line on stderr."""
+        """The last line that the process wrote to stderr, which names its fault."""
         self._reader.join(1.0)
         return next((line for line in reversed(self._lines) if line.strip()), "")
 
@@ -102,7 +104,7 @@ def run_processes(
         arguments: command line of a child that gives the same scenario.
         endpoint: address of the bus; it must be free.
         watch: follows the run on the bus until its event is set; runs in a separate thread.
-        wait_s: longest time until the log begins; None: no limit, with a line every 30 s.
+        wait_s: longest time until the log begins; None: no limit. A line every 30 s reports that the run has not begun.
 
     Raises Fault ENDPOINT_BUSY, NO_PEER after `wait_s`, the Fault of the child that failed first, PEER_DIED if a child was killed,
     KeyboardInterrupt after Ctrl-C.
@@ -115,7 +117,8 @@ def run_processes(
     watcher = threading.Thread(target=watch, args=(over,), daemon=True)
     try:
         with _ctrl_c_afterwards():
-            for role in _ROLES:
+            # also the order of the stop: the plant first fades the vibration out and sends END to the others
+            for role in ROLES:
                 extra = ["--log", str(log)] if role == "recorder" else []
                 wait_for = ["--wait-for", "controller,recorder"] if role == "plant" else []
                 children.append(Child(role, [*arguments, *more, *extra, *wait_for]))
@@ -146,7 +149,7 @@ def _ctrl_c_afterwards() -> Generator[None]:
 
 
 class StartWatch:
-    """Reports every 30 s, until the log begins, which processes still start or compile.
+    """Prints, until the log begins, the number of kernels left to compile, or every 30 s that the run has not begun.
 
     A first start compiles for up to a minute, on a busy or small computer for several minutes. So no time limit is set.
     """
@@ -162,8 +165,9 @@ class StartWatch:
         self._progress = Progress()
 
     def look(self) -> None:
-        """Report the missing processes when a line is due. Raises Fault NO_PEER after the longest time."""
-        self._progress.show(*(sum(counts) for counts in zip(*(child.left for child in self._children), strict=True)))
+        """Print a line when it is due. Raises Fault NO_PEER after the longest time."""
+        left, total = (sum(counts) for counts in zip(*(child.left for child in self._children), strict=True))
+        self._progress.show(left, total)
         now_s = time.monotonic()
         late = self._wait_s is not None and now_s > self._since_s + self._wait_s
         if self._begun or not (late or now_s > self._due_s):
@@ -171,30 +175,25 @@ class StartWatch:
         self._begun = stamp_of(self._log) != self._before
         if self._begun:
             return
-        waited_s, missing = now_s - self._since_s, self._missing()
+        since = f"{now_s - self._since_s:.0f} s"
+        missing = (
+            "kernels are still compiled" if left else "plant, controller and recorder have not connected to each other"
+        )
         if late:
-            raise Fault("NO_PEER", f"{missing} after {waited_s:.0f} s; allow more time with --wait S, or omit --wait")
-        if not any(child.still == COMPILES for child in self._children):  # the progress shows compilation
-            print_line(f"waiting  {missing}, since {waited_s:.0f} s; Ctrl-C ends it")
+            raise Fault("NO_PEER", f"{missing} after {since}; allow more time with --wait S, or omit --wait")
+        if not left:  # the progress shows compilation
+            print_line(f"waiting  {missing}, since {since}; Ctrl-C ends it")
         self._due_s = now_s + _REPORT_S
-
-    def _missing(self) -> str:
-        parts: list[str] = []
-        for still in (COMPILES, STARTS):
-            roles = [child.role for child in self._children if child.still == still]
-            if roles:
-                parts.append(f"the {' and the '.join(roles)} still {still if len(roles) == 1 else still[:-1]}")
-        return ", ".join(parts) or "plant, controller and recorder have not connected to each other"
 
 
 def _until_the_end(children: list[Child], beginning: StartWatch) -> None:
-    """Wait until all children have ended with status 0. Raises the Fault of the child that failed first."""
+    """Wait until all children have ended with status 0. Raises the Fault of the child whose failure ended the others."""
     while True:
         beginning.look()
         ended = [child for child in children if child.process.poll() is not None]
         failed = [child for child in ended if child.process.returncode != 0]
         if failed:
-            # the first failure makes the others fail; a killed child, or a child that names a cause, is reported
+            # the first failure makes the others fail with PEER_DIED or NO_PEER: `_fault` picks a killed child or another fault
             time.sleep(_LOOK_S)
             failed = [child for child in children if child.process.poll() not in {None, 0}]
             raise _fault(failed)
@@ -207,8 +206,7 @@ def _fault(failed: list[Child]) -> Fault:
     for child in failed:
         if child.process.returncode < 0:
             return Fault(
-                "PEER_DIED",
-                f"the {child.role} was killed by signal {-child.process.returncode}; the run was stopped",
+                "PEER_DIED", f"the {child.role} was killed by signal {-child.process.returncode}; the run was stopped"
             )
     followers = {FAULTS["PEER_DIED"].exit_status, FAULTS["NO_PEER"].exit_status}
     first = next((child for child in failed if child.process.returncode not in followers), failed[0])
@@ -231,3 +229,75 @@ def _stop(children: list[Child]) -> None:
         except subprocess.TimeoutExpired:
             child.process.kill()
             child.process.wait()
+
+
+def progress_line(
+    state: wire.State, duration_s: float, pauses: int = 0, paused_ms: float = 0.0, warnings: Iterable[str] = ()
+) -> str:
+    """The state of the run in one line, with the number and total length of the computer's stalls."""
+    t_s = state.t_ns * 1e-9
+    # a run without an end has no bar
+    bar = f"[{'#' * round(20 * min(t_s / duration_s, 1.0)):<20}] " if duration_s else ""
+    ratio = f"v_a/v_d {state.velocity_ratio:4.2f}" if state.velocity_ratio > 0.01 else "no vibration"
+    paused = f"  computer stalled {pauses} x, {paused_ms:.0f} ms" if pauses else ""
+    warned = "".join(f"  {warning}" for warning in warnings)
+    return (
+        f"{t_s:6.1f} s {bar}{word_of('state', state.state):<10} {word_of('mode', state.mode):<8} "
+        f"F_d {state.drive_force_N:5.2f} N  {ratio:<12}  slips {state.slips}{paused}{warned}"
+    )
+
+
+def follower(config: BusConfig, duration_s: float) -> Callable[[threading.Event], None]:
+    """A watcher for `run_processes`: shows the progress line on a terminal, prints nothing elsewhere."""
+
+    def follow(over: threading.Event) -> None:
+        if not sys.stderr.isatty():
+            return
+        while not over.is_set():
+            try:
+                with Bus(config, "cockpit", lockstep=False, stop=over) as bus:
+                    _show(bus, duration_s, over)
+            except Fault:
+                time.sleep(_UPDATE_S)
+
+    return follow
+
+
+class _EventWatch:
+    """Events that the progress line shows for a while, and number and length of the computer's stalls."""
+
+    def __init__(self) -> None:
+        self.pauses, self.paused_ms = 0, 0.0
+        self._shown_until_s: dict[str, float] = {}  # end of display of an event, by its code
+
+    def note(self, received: Received) -> None:
+        """Count a stall of the computer, or show an event. Raises Fault BAD_MESSAGE."""
+        event = parsed(wire.Event, received.payload, received.topic.name)
+        if is_listed(event.code):
+            self._shown_until_s[event.code] = math.inf if harms(event.code) else time.monotonic() + _SHOWN_S
+        for pause in pauses_of([event]):
+            self.pauses, self.paused_ms = self.pauses + 1, self.paused_ms + (pause.until_ns - pause.from_ns) * 1e-6
+
+    def shown(self) -> list[str]:
+        """Codes to show now."""
+        return [code for code, until_s in self._shown_until_s.items() if time.monotonic() < until_s]
+
+
+def _show(bus: Bus, duration_s: float, over: threading.Event) -> None:
+    inbox, watch, state = Inbox(1000), _EventWatch(), None
+    for topic in (STATE, *EVENTS):
+        bus.listen(topic, inbox.push)
+    # shown from the first state message on; before, the terminal shows the progress of compilation
+    live = Live(console=Console(stderr=True), refresh_per_second=8, transient=True)
+    with contextlib.ExitStack() as shown:
+        while not over.wait(_UPDATE_S):
+            while (received := inbox.get()) is not None:
+                with contextlib.suppress(Fault):  # skip malformed messages of other clients
+                    if received.topic is STATE:
+                        state = parsed(wire.State, received.payload, STATE.name)
+                    else:
+                        watch.note(received)
+            if state is not None:
+                if not live.is_started:
+                    shown.enter_context(live)
+                live.update(Text(plain(progress_line(state, duration_s, watch.pauses, watch.paused_ms, watch.shown()))))

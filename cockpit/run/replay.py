@@ -1,4 +1,4 @@
-"""`stickslip replay`: compare a log with this version's controller, or simulate its run with other settings."""
+"""`stickslip replay`: feed a log to this version's controller and compare, or simulate its run again with other settings."""
 
 import contextlib
 import math
@@ -30,7 +30,7 @@ _LATEST_S = 1e9  # 32 years; a log counts nanoseconds in 64 bits, 1.8e10 s
 
 
 def time_s(option: str, text: str, example: str) -> float:
-    """The seconds of a time in an option. Raises Fault CONFIG."""
+    """The time in an option, such as 12.5s, in seconds. Raises Fault CONFIG."""
     try:
         t_s = float(text.removesuffix("s"))
     except ValueError:
@@ -42,7 +42,7 @@ def time_s(option: str, text: str, example: str) -> float:
 
 
 def changes_of(run: RunData, settings: list[str]) -> list[Change]:
-    """The recorded configuration, then every `key=value[@TIMEs]` setting from its time on. Raises Fault CONFIG."""
+    """The controller's recorded configuration, and the one after each `key=value[@TIMEs]` setting. Raises Fault CONFIG."""
     return _changes_of(run.headers, run.path, settings, int(run.trace["t_ns"].max(initial=0)))
 
 
@@ -78,17 +78,14 @@ def _recorded_changes(headers: Headers, path: Path) -> list[str]:
 
 
 def _commands_of(run: RunData) -> "list[TimedAction]":
-    """Operator commands to controller and rig, with their times."""
+    """Operator commands in a log, with their times: STOP and RESET from the trace, ARM and DISARM from the rig's causes."""
     from cockpit.run.in_process import TimedAction
 
     bits = ((STOP, wire.Operator.STOP), (RESET, wire.Operator.RESET))
     commands = [
         TimedAction(int(row["t_ns"]), action) for row in run.trace for bit, action in bits if int(row["events"]) & bit
     ]
-    causes: dict[int, int] = {
-        wire.ARMED_BY_PERSON: wire.Operator.ARM,
-        wire.DISARMED_BY_PERSON: wire.Operator.DISARM,
-    }
+    causes: dict[int, int] = {wire.ARMED_BY_PERSON: wire.Operator.ARM, wire.DISARMED_BY_PERSON: wire.Operator.DISARM}
     began = run.applied[np.flatnonzero(np.diff(run.applied["cause"], prepend=0))]
     commands += [
         TimedAction(int(row["t_ns"]), causes[int(row["cause"])]) for row in began if int(row["cause"]) in causes
@@ -145,7 +142,7 @@ def replay_log(path: Path, from_s: float, settings: list[str]) -> Replayed:
     if not steps:
         raise Fault("BAD_LOG", f"{path}: holds no trace: no controller was recorded; replay another log")
     changes = _changes_of(reader.metadata, path, settings, end_ns)
-    if result is None or held != changes:  # messages out of order, or a late configuration
+    if result is None or held != changes:  # messages out of order, or a late configuration: read it all
         result = replay(read_run(path), changes, from_s)
     if result.compared == 0:
         line = f"{path}: no step from {from_s:g} s on can be rebuilt: the log ends before, or holds no usable snapshot"
@@ -172,7 +169,7 @@ def _one_pass(
     """
     steps = end_ns = 0
     changes, replayer = None, None
-    waiting: list[Piece] = []  # pieces read before the configuration
+    waiting: list[Piece] = []  # pieces read before the controller's configuration
     out_of_order = False
     for piece in iter_pieces(reader, _REPLAYED):
         if piece.topic == "trace" and len(piece.records):
@@ -205,7 +202,7 @@ def _add(replayer: Replayer, piece: Piece) -> None:
 
 
 def likely_reason(headers: Headers, path: Path, settings: list[str]) -> str:
-    """The likely reason of a difference, in words."""
+    """Likely reason for which a replay differs from its log, in words: settings, versions, or changed code."""
     from cockpit.run.scenario import versions
 
     if settings:
@@ -219,7 +216,7 @@ def likely_reason(headers: Headers, path: Path, settings: list[str]) -> str:
 
 
 def _installed(version: str) -> str:
-    """Instruction to install the version that wrote a log."""
+    """Instruction to install the version that wrote a log, with which the replay is identical."""
     if not re.fullmatch(r"[\w.+-]+", version, re.ASCII):
         return "the log does not name the version that wrote it"
     wheel = f"stickslip-{version}-py3-none-any.whl"
@@ -232,10 +229,10 @@ def _installed(version: str) -> str:
 class RunFigures(NamedTuple):
     """Figures of a run, for the comparison of two runs."""
 
-    slips: int
-    swing_N: float
-    velocity_ratio_min: float
-    drive_work_J: float
+    slips: int  # counted by the controller
+    swing_N: float  # swing of the drive force after hand-over
+    velocity_ratio_min: float  # smallest v_a / v_d during vibration
+    drive_work_J: float  # integral of drive force times drive velocity
     vibration_dose_mm2_per_s: float  # integral of v_a squared
 
 

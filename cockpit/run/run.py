@@ -5,31 +5,28 @@ import shutil
 import sys
 import time
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, NamedTuple
 
 from bridge.faults import Fault
-from bridge.log.live import refuse_a_live_log
+from bridge.log.storage.part_file import refuse_a_live_log
 from bridge.log.storage.parts import parts_of
 from bridge.log.storage.verdict_file import verdict_path
 from bridge.plain import print_line
 from bridge.results import strict_json
 from bridge.wire.session import rig_security
 from cockpit.run.child_process import left_on_ctrl_c, stop_event, warn_without_priority
-from cockpit.run.scenario import (
-    Scenario,
-    load_scenario,
-    refuse_faults,
-    refuse_short_blocks,
-)
+from cockpit.run.scenario import LogTable, Scenario, load_scenario, refuse_faults, refuse_short_blocks
 from cockpit.run.writable import LOG, check_output, stamp_of
 
 if TYPE_CHECKING:
+    from cockpit.judge.judged import RunOutcome
+    from cockpit.judge.phases import Phase
     from cockpit.judge.run_judge import RunJudge
-    from cockpit.run.outcome import RunOutcome
 
 
-# A run without an end in one process writes some 2 GB per minute and ends below this free space. Larger: it ends earlier.
-# Smaller: the judging of the log and other programs meet a full disk.
+# A run without an end in one process writes some 2 GB per minute. It ends when less disk space than this is free. Larger: it ends
+# earlier. Smaller: the judging of the log and other programs meet a full disk.
 _LEAST_FREE_BYTES = 1 << 30
 
 
@@ -57,7 +54,7 @@ def keep_aside(path: Path) -> None:
 
 
 def about_run(scenario: Scenario, lockstep: bool) -> dict[str, object]:
-    """Metadata of a log about its run, in addition to the configurations."""
+    """Metadata that a log holds about its run, in addition to the configurations: names, seed and clock."""
     return {
         "scenario": scenario.name,
         "description": scenario.description,
@@ -78,9 +75,8 @@ def run_scenario(
 ) -> "RunOutcome":
     """Run a scenario and judge it. Ctrl-C, SIGTERM or SIGHUP ends a run without an end, which is then judged like any other.
 
-    Args:
-        wait_s: longest time until the log of a run of several processes begins; None: no limit.
-        without: also simulate the same run without the controller, after the verdict.
+    `wait_s` is the longest time until the log of a run of several processes begins, None without a limit. `without`: after the
+    run, also simulate it without the controller, for the judged stretch.
 
     Raises Fault INTERRUPTED if a run with an end was stopped before its end, and the fault that ended a run in one process early.
     In both cases the verdict on the recorded part is printed on stderr first.
@@ -108,8 +104,7 @@ def run_scenario(
             made = _in_process(scenario, path)
             interrupted = made.stopped
         else:
-            from cockpit.run.processes import run_processes
-            from cockpit.run.progress import follower
+            from cockpit.run.processes import follower, run_processes
 
             arguments = ["--scenario", name, *(part for setting in settings for part in ("--set", setting))]
             follow = follower(scenario.bus, scenario.duration_s)
@@ -133,7 +128,7 @@ class _InProcessRun(NamedTuple):
     """Results of a run in one process, in addition to its log."""
 
     judge: "RunJudge | None"  # has received every message; None if the log must be read
-    events: list[str]  # events that the log lacks
+    events: list[str]  # events that are not in the log: the run ended for lack of disk space
     stopped: bool  # the run was stopped by Ctrl-C or a signal
 
 
@@ -156,29 +151,21 @@ def _judged(scenario: Scenario, path: Path, interrupted: str, without: bool, mad
     from bridge.log.damage import Damage
     from bridge.log.storage.checksums import checksums_of
     from bridge.log.storage.verdict_file import write_verdict
-    from cockpit.judge.judged import judge_log
+    from cockpit.judge.judged import RunOutcome, judge
     from cockpit.judge.setup import settled_from_s
     from cockpit.judge.verdict_words import in_words, noted
-    from cockpit.run.outcome import RunOutcome
 
     if interrupted and scenario.duration_s:
         _print_verdict(path)
         raise Fault("INTERRUPTED", interrupted)
-    effects = list(scenario.rig.effects)
-    if made.judge is not None:
-        judge = made.judge
-        verdict = judge.result(Damage(0, 0, closed=True), checksums_of(path), {})
-    else:
-        verdict, _, judge = judge_log(path)
+    closed = Damage(0, 0, closed=True)
+    verdict = judge(path) if made.judge is None else made.judge.result(closed, checksums_of(path), {})
     if interrupted and not verdict.blocks:
         raise Fault("INTERRUPTED", f"{interrupted} and holds no block")
-    margins = judge.margins() if effects else None
     verdict = verdict._replace(told=[*verdict.told, *made.events])
     alone = None
     if without and verdict.after is not None:
-        from cockpit.run.open_loop_twin import without_controller
-
-        alone = without_controller(scenario, settled_from_s(verdict.enabled_from_s), verdict.seconds)
+        alone = _without_controller(scenario, settled_from_s(verdict.enabled_from_s), verdict.seconds)
     fields = noted(verdict) | ({"without": strict_json(alone)} if alone is not None else {})
     try:
         write_verdict(path, verdict.checksums.sha256, fields)
@@ -186,11 +173,27 @@ def _judged(scenario: Scenario, path: Path, interrupted: str, without: bool, mad
         print_line("\n".join(in_words(verdict, verbose=False, without=alone)))
         raise
     verdict = verdict._replace(checksums=verdict.checksums._replace(verdict="fits"))
-    return RunOutcome(verdict, scenario.rig.name, effects, margins, alone)
+    return RunOutcome(verdict, scenario.rig.name, list(scenario.rig.effects), alone)
+
+
+def _without_controller(scenario: Scenario, from_s: float, seconds: float) -> "Phase | None":
+    """Simulate a run of `seconds` without vibration; return its figures from `from_s` on, None without a block. Raises Fault."""
+    from cockpit.judge.judged import judge_log
+    from cockpit.run.in_process import run_onboard
+    from cockpit.run.simulated.run import run_with_faults
+
+    policy = scenario.controller.policy.model_copy(update={"enabled_from_s": seconds + 1.0})
+    controller = scenario.controller.model_copy(update={"policy": policy})
+    log = LogTable(file_MB=0.0, file_s=0.0)
+    alone = scenario.model_copy(update={"controller": controller, "duration_s": seconds, "log": log})
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "without.mcap"
+        (run_with_faults if scenario.fault else run_onboard)(alone, path, {})
+        return judge_log(path, stretch_from_s=from_s).judge.stretch
 
 
 def _free_bytes(path: Path) -> int:
-    """Free space on the disk of a log that exists or will be written."""
+    """Free bytes on the disk that holds, or will hold, the log at `path`."""
     return shutil.disk_usage(next(parent for parent in path.absolute().parents if parent.exists())).free
 
 
@@ -215,7 +218,7 @@ def _in_process(scenario: Scenario, path: Path) -> _InProcessRun:
 
     from cockpit.judge.run_judge import RunJudge
     from cockpit.run.in_process import run_onboard
-    from cockpit.run.simulated.log import run_with_faults
+    from cockpit.run.simulated.run import run_with_faults
 
     columns = (
         Progress.get_default_columns() if scenario.duration_s else (TextColumn("{task.completed:.1f} s simulated"),)

@@ -23,7 +23,7 @@ from plant.config_limits import refuse_what_no_rig_does
 from plant.faults.kinds import PROCESS
 from plant.faults.table import FaultTable
 
-# Shortest block in real time. Shorter: the command for a block arrives after the next block is due.
+# Shortest allowed block in real time. With a shorter one the command for a block would arrive after the next block is due.
 _SHORTEST_IN_REAL_TIME_S = 1e-3
 
 
@@ -38,7 +38,7 @@ class LogTable(Strict):
     """Limits of a file of the log; the log continues in `NAME-0001.mcap` and so on."""
 
     file_MB: Annotated[float, Field(ge=0)] = Field(default=1000.0, description="Largest size of a file; 0: no limit.")
-    file_s: Annotated[float, Field(ge=0)] = Field(default=3600.0, description="Longest run in a file; 0: no limit.")
+    file_s: Annotated[float, Field(ge=0)] = Field(default=3600.0, description="Longest time in a file; 0: no limit.")
 
     @property
     def rotation(self) -> Rotation:
@@ -47,11 +47,11 @@ class LogTable(Strict):
 
 
 class Scenario(Strict):
-    """One run, with every default filled in."""
+    """Configuration of one run: rig, controller, duration, bus, log and faults. Its validation checks that they fit together."""
 
     name: Annotated[str, AfterValidator(_plain)] = "unnamed"
     description: str = ""
-    duration_s: Annotated[float, Field(ge=0)] = Field(default=16.0, description="0: until Ctrl-C or SIGTERM.")
+    duration_s: Annotated[float, Field(ge=0)] = Field(default=16.0, description="Length; 0: until Ctrl-C or SIGTERM.")
     seed: Annotated[int, Field(ge=0)] = 1
     arm: bool = Field(
         default=False,
@@ -100,7 +100,7 @@ class Scenario(Strict):
 
 
 class _Runnable(Scenario):
-    """A scenario whose sensors can show its motion. Scenarios of the bench and of replayed logs are exempt."""
+    """A scenario whose sensors can show its motion: required of each started run, not of the bench and of replayed logs."""
 
     @model_validator(mode="after")
     def _sensors_see(self) -> "_Runnable":
@@ -122,7 +122,7 @@ def refuse_short_blocks(scenario: Scenario) -> None:
 def refuse_faults(scenario: Scenario, lockstep: bool) -> None:
     """Raise Fault CONFIG for faults that a run of several processes cannot have.
 
-    In lockstep these are faults of bus and processes; in real time faults of processes, which only the operator may end.
+    In lockstep these are faults of bus and processes; in real time faults of processes, as a scenario cannot end real processes.
     """
     for number, table in enumerate(scenario.fault):
         if lockstep and table.needs_time:
@@ -169,7 +169,7 @@ def processor() -> str:
 
 
 def versions() -> dict[str, str]:
-    """Versions on which the bits of a run depend."""
+    """Versions of packages, Python, libc and processor: with equal ones a run in simulated time repeats bit for bit."""
     packages = {name: version(name) for name in ("stickslip", "numpy", "numba", "protobuf", "eclipse-zenoh", "mcap")}
     return packages | {
         "python": platform.python_version(),

@@ -13,7 +13,7 @@ from bridge.config import Strict, made_with, read_toml, validate, with_overrides
 from bridge.faults import Fault
 from bridge.wire.zenoh_link import BusConfig
 
-RIG_FILE = "rig={file="  # begin of the setting that names another rig
+RIG_FILE = "rig={file="  # prefix of a `--set` setting that replaces the scenario's rig file
 
 
 class _BusTable(Strict):
@@ -28,8 +28,8 @@ def deploy_folder() -> Path:
     return installed if installed.is_dir() else Path(__file__).parents[2] / "deploy"
 
 
-def find(name: str, kind: str) -> Path:
-    """A file by path, or by the name of a shipped file. Raises Fault CONFIG."""
+def find(name: str, kind: str, key: str = "") -> Path:
+    """Path of a scenario or rig: `name` is a .toml path or a shipped file; `key` begins the fault line. Raises Fault CONFIG."""
     given = Path(name)
     if given.suffix == ".toml":
         return given
@@ -37,7 +37,7 @@ def find(name: str, kind: str) -> Path:
     if name not in known:
         raise Fault(
             "CONFIG",
-            f"{name}: no such {kind.removesuffix('s')}; known: {', '.join(known)}; or give the path of a .toml file",
+            f"{key}{name}: no such {kind.removesuffix('s')}; known: {', '.join(known)}; or give the path of a .toml file",
         )
     return known[name]
 
@@ -72,7 +72,8 @@ def with_rig(path: Path, table: dict[str, Any]) -> tuple[dict[str, Any], str]:
     overrides = {key: value for key, value in rig.items() if key != "file"}
     rig_name = str(rig["file"])
     relative = path.parent / rig_name
-    rig_path = relative if relative.suffix == ".toml" and relative.is_file() else find(rig_name, "rigs")
+    is_file = relative.suffix == ".toml" and relative.is_file()
+    rig_path = relative if is_file else find(rig_name, "rigs", f"{path.name}: rig.file: ")
     return table | {"rig": merged(rig_table(rig_path), overrides)}, f"{path.name} with {rig_path.name}"
 
 

@@ -1,8 +1,8 @@
 """Checks before a run that its sensors have the range, noise, resolution and bandwidth to show the described motion.
 
-So no verdict rests on a sensor that cannot show the motion. A refusal recommends a value with a margin: 1.25 times the largest
-force or travel, twice the largest acceleration or the frequency, half of a limit of noise, a quarter of a limit of resolution.
-Faults (`[[fault]]`) do not belong to the description. Figures below: shipped and drawn axes, docs/method/sensors.md.
+So no verdict rests on a sensor that cannot show the motion. A refusal recommends a value with a margin: a range of 1.25 times the
+largest force or travel or twice the largest acceleration, a bandwidth of twice the frequency, half of the noise limit, a quarter
+of the resolution limit. Faults (`[[fault]]`) do not belong to the description. Figures below: docs/method/sensors.md.
 """
 
 import math
@@ -15,23 +15,23 @@ from plant.config import RigConfig, SensorsConfig
 from plant.drive_motion import DriveMotion, lowest_mps, reach_m
 from plant.records import build
 
-# Recommended range over the largest value. Smaller: noise and overshoot reach its end. Larger: coarser sensors are advised.
+# Recommended range over the largest force or travel. Smaller: noise and overshoot reach its end. Larger: coarser sensors.
 _MARGIN = 1.25
-# Least size of a slip in rms noises of a sample, for force and positions. Larger: force sensors with 9 are refused, which show
+# Least size of a slip in rms noises of a sample, for force and positions. Larger: a force sensor with 9 is refused, which shows
 # each slip. Smaller: with 4.5 the controller doubts the force, with 2.2 the judge counts no slip.
 _NOISES_A_SLIP = 5.0
-# Least acceleration of the base in rms noises of a sample. Larger: 44 is refused, with which v_a is held. Smaller: with 22 the
-# controller goes to open loop, and the axis slips.
+# Least acceleration of the base in rms noises of a sample. Larger: an accelerometer with 44 is refused, with which the controller
+# holds v_a. Smaller: with 22 the controller goes to open loop, and the axis slips.
 _NOISES_AN_AMPLITUDE = 32.0
 # Least size of a slip, or acceleration of the base, in steps of the resolution. Larger: 99 is refused, which shows each slip.
-# Smaller: with 81 a channel counts as frozen, clipped or of a wrong scale. Noise hides steps up to twice its size, even where a
-# slip is as small as a step.
+# Smaller: with 81 a channel counts as frozen, clipped or of a wrong scale. Steps up to twice the rms noise are always allowed, as
+# the noise hides them, even where a slip is as small as a step.
 _STEPS, _HIDDEN = 96.0, 2.0
-# Time in which the travel of the drive counts like a slip for the noise of its position. Larger: noise of 10 um passes on a ball
-# screw, and hides slips. Smaller: a feed of 0.02 mm/s without slips is refused, which the controller follows.
+# A position's noise may be a fifth of a slip, or of the drive's travel in this time if that is longer. Larger: noise of 10 um
+# passes on a ball screw, and hides slips. Smaller: a feed of 0.02 mm/s without slips is refused, which the controller follows.
 _TRAVEL_S = 0.125
-# Least bandwidth over the frequency of the slide on its spring. Larger: 0.5 is refused, which shows each slip. Smaller: 0.46
-# passes.
+# Least bandwidth of force and position sensors over the natural frequency of the slide on its spring. Larger: 0.5 is refused,
+# which shows each slip. Smaller: 0.46 passes.
 _LEAST_BAND = 0.5
 
 
@@ -69,7 +69,7 @@ def refuse_out_of_travel(rig: RigConfig, duration_s: float) -> None:
 
 
 def _until_s(rig: RigConfig, motion: DriveMotion, duration_s: float) -> float:
-    """End of the checked motion; without an end of the run one cycle, or the time until its last velocity left every range."""
+    """End of the checked motion: of the run if it has one, else of one cycle, else when the last velocity leaves every range."""
     if duration_s or math.isfinite(motion.period_s):
         return duration_s or motion.period_s
     last_mps, span_m = abs(float(motion.velocity_mps[-1])), rig.sensors.position_range_m - rig.sensors.position_lowest_m
@@ -105,10 +105,10 @@ def _needs(rig: RigConfig, duration_s: float) -> _Needs:
     speeds_mps = rig.drive.speeds_mps() or [0.0]
     k_d, mass_kg, fastest_mps = float(p.k_d), float(p.m), speeds_mps[-1]
     impedance_Ns_per_m = math.sqrt(k_d * mass_kg)
-    drift = max(float(p.drift_per_s) * until_s, float(p.drift_ratio) if p.drift_settling_s > 0.0 else 0.0, 0.0)
+    drift = max(float(p.drift_rate_per_s) * until_s, float(p.drift_ratio) if p.drift_settling_s > 0.0 else 0.0, 0.0)
     ratios = drift, max(p.forward_ratio, p.backward_ratio, 0.0), p.position_ratio, p.load_ratio, p.roughness_ratio
     level = math.prod(1.0 + abs(float(ratio)) for ratio in ratios)
-    # force of a start: the spring limits it to the force of a step of the velocity
+    # force to accelerate the slide; the spring limits it to the force for a step of the drive velocity
     begins_N = min(mass_kg * float(np.abs(motion.acceleration_mps2).max()), impedance_Ns_per_m * fastest_mps)
     viscous_N = (float(p.h_v) + float(p.quadratic_Ns2_per_m2) * fastest_mps) * fastest_mps
     friction_N = max(level * float(p.F_s), level * float(p.F_c) + viscous_N + begins_N)
@@ -155,7 +155,7 @@ def _force(rig: RigConfig, needs: _Needs) -> None:
 
 
 def _resolves(sensors: SensorsConfig, channel: str, unit: str, most_noise: float, size: float, signal: str) -> None:
-    """Noise and resolution of a channel, against a signal of this size."""
+    """Refuse a channel whose noise exceeds `most_noise`, or whose resolution is too coarse for a signal of `size`."""
     noise, step = (getattr(sensors, f"{channel}_{quantity}_{unit}") for quantity in ("noise", "resolution"))
     for quantity, value, most, harm, share in (
         ("noise", noise, most_noise, "noise above {} hides it", 0.5),
@@ -184,7 +184,7 @@ def _positions(sensors: SensorsConfig, slip_m: float, way_m: float, natural_Hz: 
 def _base(
     rig: RigConfig, controller: ControllerConfig, slip_mps2: float, slowest_mps: float, fastest_mps: float
 ) -> None:
-    """The base accelerometer, by which v_a is measured, at the frequency that the controller would choose."""
+    """Check range, bandwidth, noise and resolution of the accelerometers at the frequency that the controller would choose."""
     sensors, limits = rig.sensors, controller.limits
     candidates_Hz = np.array(candidate_frequencies_Hz(controller))
 

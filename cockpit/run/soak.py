@@ -16,32 +16,33 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Records
 from bridge.faults import Fault
-from bridge.log.damage import Damage
+from bridge.log.damage import of_all_files
 from bridge.log.log_reader import LogReader
 from bridge.log.logfile import feed
+from bridge.log.storage.checksums import Checksums
 from bridge.log.storage.parts import parts_of
 from bridge.processes import pid_here
 from bridge.results import in_json
 from bridge.units import counted
-from bridge.wire.messages import Records
 from bridge.wire.zenoh_link import Bus, BusConfig
 from cockpit.judge.run_judge import RunJudge
 from cockpit.judge.verdict import RunVerdict
 from cockpit.judge.verdict_words import in_words
 from cockpit.judge.watches import LatencyWatch
+from cockpit.live.listener import ROLES
 from cockpit.run.processes import run_processes
 
-ROLES = ("plant", "controller", "recorder")
 _LOOK_S = 0.5  # time between two samples of the memory
-_MOST_PERIODS = 60  # rows of the report; fewer if periods would be shorter than 10 s
+_MOST_PERIODS = 60  # most periods, rows of the report's latency table; fewer if periods would be shorter than 10 s
 _SHORTEST_PERIOD_S = 10.0
 _WARM_SHARE, _WARM_MOST_S = 0.2, 60.0  # warm-up in which memory may grow: share of the soak, and longest time
 _NICE = 10  # niceness of the judging thread, so that the loop has the processors first
 
 
 class Period(NamedTuple):
-    """A stretch of a soak."""
+    """A stretch of a soak, with the latency from a block to its command."""
 
     until_s: float
     blocks: int
@@ -56,10 +57,10 @@ class Memory(NamedTuple):
     """Memory of one process."""
 
     role: str
-    begin_MB: float  # resident, after its warm-up
+    begin_MB: float  # resident memory after the warm-up
     end_MB: float
-    slope_MB_per_h: float
-    slope_sigma_MB_per_h: float
+    slope_MB_per_h: float  # of a straight line through the samples after the warm-up
+    slope_sigma_MB_per_h: float  # standard error
 
 
 class Soaked(NamedTuple):
@@ -77,7 +78,13 @@ class Soaked(NamedTuple):
     def good(self) -> bool:
         """Whether the soak ran to its end and its log is complete."""
         v = self.verdict
-        return not self.interrupted and v.blocks > 0 and v.lost_messages == 0 and v.all_losses_known
+        return (
+            not self.interrupted
+            and v.blocks > 0
+            and v.lost_messages == 0
+            and v.all_losses_known
+            and not v.checksums.changed
+        )
 
     def in_words(self) -> list[str]:
         """Lines for the operator."""
@@ -122,16 +129,10 @@ def soak(
 ) -> Soaked:
     """Run plant, controller and recorder, watch their memory and judge their log.
 
-    Args:
-        scenario: name of the scenario.
-        arguments: command line of a child that gives the scenario, without its duration.
-        bus: the bus of the processes.
-        seconds: duration.
-        log: path of the log; None: in a temporary folder, where all files after the first are deleted once judged.
-        progress: called with the share done.
+    `arguments` is the command line of a child that gives the scenario, without its duration; `progress` is called with the share
+    done. Without `log` the log is in a temporary folder, where all files after the first are deleted once judged.
 
     Raises Fault ENDPOINT_BUSY, INTERRUPTED before anything was recorded, or the fault that ended a process.
-
     """
     with tempfile.TemporaryDirectory(prefix="stickslip-soak-", ignore_cleanup_errors=True) as folder:
         watch = _Watch(bus, seconds, log or Path(folder) / "soak.mcap", log is None, progress)
@@ -144,7 +145,7 @@ def soak(
 
 
 class _Watch:
-    """Watches a run until its end, in a separate thread, and takes the messages of its log."""
+    """In a separate thread, samples the processes' memory until the end of the run, and judges the closed files of its log."""
 
     def __init__(
         self, config: BusConfig, seconds: float, path: Path, thin_out: bool, progress: Callable[[float], None]
@@ -156,6 +157,7 @@ class _Watch:
         self._periods: dict[int, LatencyWatch] = {}
         self._judge = RunJudge(path, {})
         self._readers: dict[Path, LogReader] = {}  # by judged file
+        self._checksums: list[Checksums] = []
         self._judging = threading.Lock()
 
     def __call__(self, over: threading.Event) -> None:
@@ -179,7 +181,7 @@ class _Watch:
                     continue
                 reader = self._readers[file] = LogReader(file, alone=True)
                 self._judge.begin(reader.metadata)
-                self._checksums = feed(reader, self)
+                self._checksums.append(feed(reader, self))
                 if self._thin_out and file != self.path:
                     file.unlink(missing_ok=True)
 
@@ -200,9 +202,12 @@ class _Watch:
         self._judge_files(still_open=0)
         if not self._readers:
             raise Fault("INTERRUPTED", "stopped before anything was recorded")
-        damages = (reader.damage for reader in self._readers.values() if not reader.damage.whole)
-        damage = next(damages, Damage(0, 0, closed=True))
-        verdict = self._judge.result(damage, self._checksums, {})
+        checksums = self._checksums[-1]._replace(
+            damaged=[name for file in self._checksums for name in file.damaged],
+            complete=all(file.complete for file in self._checksums),
+        )
+        damage = of_all_files([reader.damage for reader in self._readers.values()])
+        verdict = self._judge.result(damage, checksums, {})
         memory = [_memory(role, points) for role, points in self._memory.items() if points]
         periods = [
             Period(
@@ -228,7 +233,7 @@ def _resident(t_s: float, pid: int) -> list[tuple[float, float]]:
 
 
 def _memory(role: str, points: list[tuple[float, float]]) -> Memory:
-    """The straight line through the memory after the warm-up."""
+    """Resident memory after the warm-up, from `points` of time [s] and memory [MB]; NaN slope with fewer than three."""
     t_s, resident_MB = np.array(points).T
     warm = t_s >= min(_WARM_SHARE * float(t_s[-1]), _WARM_MOST_S)
     t_h, resident_MB = t_s[warm] / 3600.0, resident_MB[warm]

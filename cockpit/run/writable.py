@@ -1,4 +1,4 @@
-"""Checks, at the start of a command, of the files that it writes at its end; one clear line if a write fails."""
+"""Checks at the start of a command that it can write its files at its end; one clear line if a write fails."""
 
 import os
 from collections.abc import Callable, Generator
@@ -8,7 +8,7 @@ from pathlib import Path
 from bridge import files
 from bridge.faults import Fault
 from bridge.files import refuse_to_replace
-from bridge.log.storage.verdict_file import refuse_to_lose_json
+from bridge.log.storage.verdict_file import refuse_to_lose_other_file
 
 # suffixes of the files that commands write, by kind
 LOG = (".mcap",)
@@ -25,7 +25,7 @@ _NEVER_LOST: dict[tuple[str, ...], str] = {
     PICTURE: files.PICTURE,
     PAGE: files.PAGE,
 }  # an existing file with such a suffix is replaced only if its content is of that kind
-_NO_FOLDER = {*LOG, *PICTURE, *PAGE, *RIG, *JSON, *TABLE, ".tdms", ".txt"}
+_NO_FOLDER = {*LOG, *PICTURE, *PAGE, *RIG, *JSON, *TABLE, ".tdms", ".txt"}  # suffixes refused for a new folder
 
 
 def check_output(option: str, path: Path, suffixes: tuple[str, ...]) -> None:
@@ -35,7 +35,7 @@ def check_output(option: str, path: Path, suffixes: tuple[str, ...]) -> None:
         if suffixes == known or path.suffix.lower() in known:
             refuse_to_replace(path, kind, f"{option} {path}")
     if path.suffix.lower() in LOG:
-        refuse_to_lose_json(path)
+        refuse_to_lose_other_file(path)
     if path.is_dir():
         raise Fault("CONFIG", f"{option} {path}: must be a file, not a folder; choose another")
     if path.suffix.lower() not in suffixes:

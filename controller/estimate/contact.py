@@ -14,7 +14,7 @@ from bridge.layouts import ControllerMemory, ControllerParams
 from bridge.wire.stickslip_pb2 import CHECKING, SLIP, SMOOTH, STANDSTILL, STICK, UNKNOWN
 from controller.estimate.windows import BINS, DRIVE, FORCE, OF_STEP, SLIDE, WELL_KNOWN
 
-_SIGMAS = 6.0  # detection limit: error rate of 1e-9 a window, less than one in 100 hours of windows of 1 ms
+_SIGMAS = 6.0  # detection limit in sigmas: error rate of 1e-9 a window, one in 100 hours of windows of 1 ms at most
 _HALF = 0.5  # difference of stick and sliding that a window must resolve, over v_d
 _FINE = 0.06  # resolution of the longer window that separates a swing of v_s from noise, over v_d
 # v_s / v_d below which the slide sticks. Larger: a slide that lags behind a step of the drive counts as stuck. Smaller: less
@@ -25,10 +25,10 @@ _SLIP = 1.5  # v_s / v_d at which a slip begins
 _SLIP_ENDS = 1.2  # v_s / v_d at which a slip ends
 _UNSEEN_MPS = 1e-5  # smallest slip velocity while the drive seems to be at rest
 _STANDS_S = 0.1  # standstill at the start of the run after which a slide that moves alone counts as a slip
-_AFTER_STOP_S = 0.01  # least upper limit of the window length after a stop
-_SCORE_S = 0.005  # time constant of the score
+_AFTER_STOP_S = 0.01  # longest window just after a stop; later, windows begin after the stop
+_SCORE_S = 0.005  # time constant of the low-pass on the score
 _LONGEST_WINDOW_S = 1.0  # longest window: with a longer one a stick is detected too late to prevent the slip
-_EXPECTED_SWING = 0.2  # expected swing over the force until the first slip: the swing at F_s = 1.1 F_c
+_EXPECTED_SWING = 0.2  # fall of the force in a slip, over the force, until the first slip: as for F_s = 1.1 F_c
 # Time without a window that resolves a stick until the controller is blind. Shorter: it is blind at every start of a move, while
 # the windows fill. Longer: slips are missed without a report.
 _BLIND_S = 0.3
@@ -37,7 +37,7 @@ _EXCITER_PERIODS = 2.0  # least length of a window during vibration, in periods 
 
 @kernel
 def contact(p: ControllerParams, s: ControllerMemory, force_N: float, tick_s: float) -> None:
-    """Judge the contact after `tick_s` more seconds; `force_N` is the mean over them."""
+    """Judge the contact after `tick_s` more seconds; `force_N` is the mean force over them."""
     speed_mps = math.fabs(s.drive_velocity_mps)
     direction = float(s.direction)
     least_s = _EXCITER_PERIODS / s.allowed_Hz if s.allowed_m > 0.0 else 0.0

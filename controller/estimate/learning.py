@@ -12,10 +12,10 @@ from controller.estimate.windows import BINS, DRIVE, FEWEST, FORCE, SLIDE
 _SIGMAS = 6.0
 _KEPT = 0.9983  # factor of the weight of earlier windows at each new window: a half after 400 windows
 _FEWEST = 5.0  # fewest windows until the learnt stiffness replaces the configured stiffness
-_TOLD_SIGMA = 0.5  # relative sigma of a configured stiffness
+_TOLD_SIGMA = 0.5  # relative sigma of a configured stiffness; a learnt one must be below it
 _STEADY_S = 0.05  # duration of constant v_d until a climbing force bounds the stiffness
 _MOST_OFF = 100.0  # largest factor between configured and learnt stiffness: a larger factor means wrong channels
-_SLIP_SHARE = 0.3  # weight of a new slip in the learnt breakaway and swing
+_SLIP_SHARE = 0.3  # weight of a new slip in the learnt breakaway force and in the learnt fall of the force
 _SLIDING_S = 0.3  # time constant of the learnt sliding force
 
 
@@ -30,7 +30,7 @@ def stiffness(p: ControllerParams, s: ControllerMemory) -> None:
         return
     best, best_level = _SIGMAS * _SIGMAS, -1
     for level in range(p.levels if p.use_slide_position == 1 else 0):
-        # over seconds the positions drift, which exceeds an extrapolated white noise and looks like a stick
+        # over seconds the positions drift by more than the extrapolated white noise, which looks like a stick
         if s.pushed[level] < 2 * BINS or (s.stiffness_learnt == 1 and s.differences[level] < FEWEST):
             break
         variance = s.noise[SLIDE, level] * s.noise[SLIDE, level] + s.noise[DRIVE, level] * s.noise[DRIVE, level]

@@ -7,12 +7,12 @@ from bridge.layouts import ControllerMemory, ControllerParams
 from controller.estimate.windows import BINS, DRIVE, FORCE, SLIDE, WELL_KNOWN
 
 _SIGMAS = 6.0  # least slope of a moving drive, in sigmas: error rate of 1e-9 a window at rest
-_UNSURE_SIGMAS = 9.0  # same limit while the noise of the window is known from few differences
+_UNSURE_SIGMAS = 9.0  # the same limit while the noise is known from fewer than 40 differences
 _AGREE_SIGMAS = 5.0  # largest difference of neighbouring windows of the same velocity, in sigmas of the shorter window
-_AFTER_STOP_S = 0.01  # least upper limit of the window length after a stop
+_AFTER_STOP_S = 0.01  # longest window just after a stop; later, windows begin after the stop
 _EXACT = 0.005  # noise over v_d at which no longer window is needed
-_SURE = 0.03  # largest noise over v_d at which v_d is held: the first windows of a move are wrong by a third
-_STEADY = 0.04  # smallest relative change of v_d at which the drive is not steady
+_SURE = 0.03  # largest noise over v_d at which `held_mps` rises: the first windows of a move are wrong by a third
+_STEADY = 0.04  # smallest relative change of v_d that restarts the time of constant v_d
 # Standstill after which the slide counts as at rest. Shorter: a slide that still slides counts as stuck when the drive only
 # became too slow to be detected at once.
 _RESTED_S = 0.2
@@ -20,9 +20,7 @@ _SURELY_SIGMAS = 3.3  # sigmas of v_d that are added to the v_d that vibration m
 _ROUGHLY = 0.1  # largest noise over velocity of a window that may show an acceleration of the drive
 _MOST_AHEAD = 1.3  # largest extrapolation over a window's velocity: it overshoots at the end of an acceleration
 _OF_TWO = 1.8  # sigma of (twice a slope minus the slope of the window twice as long), over the sigma of the slope
-_RISE_SIGMAS = (
-    5.0  # sigmas that are subtracted for a lower bound; with 3, v_a jumps once a second and the slide runs ahead
-)
+_RISE_SIGMAS = 5.0  # sigmas of a lower bound of v_d; with 3, v_a jumps once a second and the slide runs ahead
 _HUM_S = 0.1  # five periods of mains hum, after which its noise is known
 _EXCITER_PERIODS = 2.0  # least length of a window of the force, in periods of the exciter
 _LONGEST_RISE = 3  # number of levels above the level of v_d that are searched for an acceleration
@@ -44,7 +42,7 @@ def drive_velocity(p: ControllerParams, s: ControllerMemory, tick_s: float) -> N
     for level in range(p.levels):
         if s.pushed[level] < BINS:
             break
-        # windows that reach back before a stop hold the move; they end up to one bin ago
+        # windows that reach back before a stop contain the move; they end up to one bin ago
         if s.moving == 0 and p.window_s[level] * (1.0 + 1.0 / BINS) > max(s.stood_s, _AFTER_STOP_S):
             break
         sigma = s.noise[DRIVE, level]
@@ -140,7 +138,7 @@ def _pulling(p: ControllerParams, s: ControllerMemory) -> float:
 
 @kernel
 def _stopped(s: ControllerMemory, level: int) -> bool:
-    """Whether a window shorter than `level` resolves the velocity and does not show it: the drive has stopped."""
+    """Whether the drive stopped: a window shorter than `level` resolves half of its velocity and shows less."""
     for i in range(level):
         sigma = s.noise[DRIVE, i]
         slope = s.slope[DRIVE, level]
@@ -165,7 +163,7 @@ def _winds_up(s: ControllerMemory, level: int) -> bool:
 
 @kernel
 def _stands(p: ControllerParams, s: ControllerMemory) -> bool:
-    """Whether a window since the start of the move resolves half of the last velocity, and does not show it.
+    """Whether the drive stopped: the first window of the move that resolves half of its last velocity shows less.
 
     Without this test a drive that starts is detected and lost in turns, as windows that reach back before the start disagree.
     """

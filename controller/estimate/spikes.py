@@ -20,11 +20,9 @@ BENDS = 9.0
 _STEPS = 4.0  # least bend of a spike, over the resolution: a step up and down again bends by two
 _ROUNDED = 2e-7  # relative rounding of a float32 in a message
 _LEFT = 0.25  # share of the bend that may remain next to a replaced spike; after a step or a kink half remains
-_NEAR = (
-    0.25  # if no sample is farther from the sample before the block than this share of a spike's bend, none is a spike
-)
+_NEAR = 0.25  # no spike if all samples are within this share of a spike's bend of the last sample before the block
 _LARGEST = 3e38  # largest bend that a float32 holds
-_LEARN = 0.125  # weight of a new measurement of the noise
+_LEARN = 0.125  # weight of a new mean bend in the learnt noise
 _GROWS = 2.0  # largest factor by which the noise grows in a block
 
 
@@ -80,7 +78,7 @@ def _learn(p: ControllerParams, s: ControllerMemory, row: int, samples: Record) 
 
 @kernel
 def _look(p: ControllerParams, s: ControllerMemory, row: int, samples: Record) -> int:
-    """Search one channel; return the number of NaN or infinite samples."""
+    """Search one channel for a spike; return the number of NaN or infinite samples."""
     count, bad = samples.shape[0], 0
     if _count_far(s.tail[row, 1], samples, _NEAR * s.most_bend[row]) > 0:
         bad = _look_closer(p, s, row, samples)

@@ -23,27 +23,25 @@ MOST_FRESH = 16  # most bins that are added in a call
 LEVELS = 16  # most levels; `levels` of the parameters is the number in use
 FORCE, SLIDE, DRIVE = 0, 1, 2  # rows: drive force [N], slide position [m], drive position [m]
 ROWS = 3
-_OF_BEND = 6.0**-0.5  # sigma of a slope over the sigma of a - 2 b + c
+_OF_BEND = 6.0**-0.5  # sigma of a slope over the sigma of a - 2 b + c of three successive slopes
 _QUARTILE = 0.3186  # lower quartile of |d| of a normal distribution, over its sigma
 _WHITE = 2.0**-1.5  # noise of a slope over the noise at half the window, for white noise
 # Differences until the level's measured noise is used; before, the noise of shorter windows is extrapolated as white noise.
 FEWEST = 10
 WELL_KNOWN = 40  # differences after which the error of a level's noise is only some per cent
 _CARRIED = 1.3  # factor of extrapolated noise: ten differences have an error of 20 %, and no noise is quite white
-_FIRST_SHARE, _LEAST_SHARE = 4.0, 0.005  # change of log sigma by a difference, first and least; 0.005 scatters by 6 %
-_LEAST_SHARE_OF_LAW = (
-    0.02  # least change of log sigma of the deviation from the spring's law, whose stiffness is still being learnt
-)
+_FIRST_SHARE, _LEAST_SHARE = 4.0, 0.005  # change of log sigma: first, and least, at which sigma scatters by 6 %
+_LEAST_SHARE_OF_LAW = 0.02  # least change for the deviation from the spring's law, whose stiffness is still learnt
 # Factors of sigma at the least changes, and the number of differences after which they apply.
 _UP, _MANY = math.exp(0.25 * _LEAST_SHARE), round(_FIRST_SHARE / _LEAST_SHARE)
 _UP_OF_LAW, _MANY_OF_LAW = math.exp(0.25 * _LEAST_SHARE_OF_LAW), round(_FIRST_SHARE / _LEAST_SHARE_OF_LAW)
-# Largest error of a slope by a quantisation step q over a window is q / W; uniform in a step it is 0.29 of that.
+# A quantisation step q causes an error of a slope of at most q / W in a window W; its sigma is 0.29 of that.
 OF_STEP = 0.29
 
 
 @kernel
 def push(p: ControllerParams, s: ControllerMemory, count: int, learn: bool) -> None:
-    """Add `count` bins, whose means are in `fresh`, to all levels; `learn`: they are measured, so their noise counts."""
+    """Add `count` bins, whose means are in `fresh`, to all levels; `learn`: false for bins that only bridge lost blocks."""
     fresh, bins, slope = s.fresh, s.bins, s.slope
     per_s = 0.1 / p.bin_s
     for level in range(p.levels):
@@ -105,7 +103,7 @@ def _note_window(p: ControllerParams, s: ControllerMemory, level: int, learn: bo
 @kernel
 def _moved(sigma: float, apart: float, up: float, count: int) -> float:
     """The scale after a further difference `apart`: a step `up`, or three steps down; balanced at the lower quartile."""
-    if count <= 4 or sigma == 0.0:  # the mean of the first four
+    if count <= 4 or sigma == 0.0:  # the scale begins as the mean of the first four
         return sigma + (1.25 * apart - sigma) / min(count, 4)
     return sigma / (up * up * up) if apart < _QUARTILE * sigma else sigma * up
 

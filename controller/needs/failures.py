@@ -10,8 +10,8 @@ from bridge.kernel import kernel
 from bridge.layouts import ControllerMemory
 from bridge.wire.stickslip_pb2 import CANNOT_HELP, HELD
 
-_FEWEST = 2  # fewest slips until CANNOT_HELP is reported: a single slip may be chance
-_REMEMBERED_S = 30.0  # time after the last slip until the count restarts
+_FEWEST = 2  # fewest slips or surges until CANNOT_HELP is reported: a single one may be chance
+_REMEMBERED_S = 30.0  # time after the last failure until their count restarts
 
 
 @kernel

@@ -9,13 +9,13 @@ import math
 from bridge.kernel import kernel
 from bridge.layouts import ControllerMemory, ControllerParams
 
-_STEP = 0.02  # step of the ratio: the transition at the edge is 0.02 to 0.04 wide
+_STEP = 0.02  # step of v_a / v_d at an edge, below which the slide slips: the transition is 0.02 to 0.04 wide
 _MARGIN = 1.5  # safety factor on the swing of friction
 _PACE = 0.2  # share of v_d by which the slide may run ahead or lag while the ratio changes
-_SLOW_S = 5.0  # settling time from which the ratio does not wait for the spring
+_SLOW_S = 5.0  # settling time of the spring above which the ratio changes without waiting for it
 _FASTEST_S = 0.5  # shortest time in which the ratio changes by a factor of e
-_EDGE_HELD_S = 30.0  # time until an edge is tried again; doubles
-_AROUND = 1.25  # factor up and down in speed for which a verdict holds
+_EDGE_HELD_S = 30.0  # time until ratios below an edge are tried again; doubles with each failure
+_AROUND = 1.25  # a verdict at a speed holds for speeds up to this factor higher (needed) or lower (not needed)
 
 
 @kernel
@@ -65,7 +65,7 @@ def note_needless(s: ControllerMemory, speed_mps: float) -> None:
 
 @kernel
 def raise_ratio(p: ControllerParams, s: ControllerMemory, by: float) -> None:
-    """Raise v_a / v_d, as the present one was too small, and store it as the edge."""
+    """Raise v_a / v_d, and store the present ratio, which was too small, as the edge."""
     way = way_of(s)
     before = s.ratio[way]
     s.edge_ratio[way] = max(s.edge_ratio[way], before)
@@ -93,7 +93,7 @@ def margin(ratio: float) -> float:
 
 @kernel
 def swing_held(ratio: float) -> float:
-    """The relative swing of friction for which a ratio is sufficient."""
+    """The largest relative swing of friction for which a ratio is sufficient."""
     return margin(ratio) / _MARGIN
 
 
@@ -133,7 +133,7 @@ def follow_swing(p: ControllerParams, s: ControllerMemory, tick_s: float, settle
     before = s.ratio[way]
     floor = p.least_ratio
     if s.edge_ratio[way] > 0.0:
-        # with every failure the distance from the edge doubles, and the time until it is tried again
+        # each failure doubles the distance from the edge, and the time until ratios below it are tried again
         floor = max(floor, min(s.edge_ratio[way] + _STEP * s.edge_held_s[way] / _EDGE_HELD_S, p.most_ratio))
     pace = min(_PACE * tick_s / settle_s, tick_s / _FASTEST_S)
     if swing_held(before) < s.swing:

@@ -27,22 +27,20 @@ from controller.needs.wobble import (
 from controller.needs.wobble import wobble as ask
 
 STEADY_S = 0.2  # duration of constant v_d before and during a probe
-_LAST = 1.02  # ratio of a fading vibration down to which the mean friction grows
+_LAST = 1.02  # v_a / v_d at which the last part of a fade begins; below, the mean friction grows little
 _CAUGHT_UP = 0.04  # share of v_d by which the slide may lag when the last part of a fade begins
-_BEHIND = (
-    0.1  # share of v_d by which the slide may lag when a wobble begins: before, the spring still takes up the friction
-)
-# Share of v_d by which the slide may lag in the last part, while the spring takes up the rest. More: it surges from lower down.
+_BEHIND = 0.1  # share of v_d by which the slide may lag when a wobble begins; if more, the spring still winds up
+# Share of v_d by which the slide may lag in the last part, while the spring takes up the rest. Larger: surges from a lower v_a.
 _LAST_LAG = 0.12
-_LAG, _SWING = 0.5, 0.2  # shares of v_d by which the slide may lag in the first part of a fade, and be off in the last
+_LAG, _SWING = 0.5, 0.2  # over v_d: allowed lag in the first part of a fade; allowed difference in the last part
 # Longest settling time for a probe, which takes about ten settling times; at feeds far below the speed at which friction falls,
 # the fall is too small to be detected.
 _SLOWEST_S = 5.0
-_NEARLY = 0.98  # share of the least ratio of a wobble from which a wobble may begin
+_NEARLY = 0.98  # share of the ratio LEAST_ASKED from which a wobble may begin
 # A slide swings increasingly about its mean before it sticks or runs ahead. The swing is v_s of short windows minus v_s of
 # windows 2^4 times as long, averaged over two of the long windows.
 _LONGER, _MEMORY = 4, 2.0
-_GROWN, _FELT = 2.0, 0.1  # smallest swing (rms): over its least value since the fade began, and over v_d
+_GROWN, _FELT = 2.0, 0.1  # rms swing at which a fade ends: over its least value since the fade began, and over v_d
 _ASKED_FASTER = 2.0  # speed of a fade after a wobble without a fall of friction, over the speed of a trial fade
 
 
@@ -107,11 +105,11 @@ def _still_needed(p: ControllerParams, s: ControllerMemory, way: int, speed_mps:
 
 @kernel
 def probe(p: ControllerParams, s: ControllerMemory, way: int, speed_mps: float, block_s: float) -> None:
-    """Fade the vibration out while the slide follows."""
+    """Fade the vibration out while the slide follows; end the probe once its result is known."""
     if s.steady_s < STEADY_S:
         enter(s, EXCITE, HELD)
         return
-    # below v_d the slide may be as slow as v_a, until the spring pulls with all of the friction
+    # with v_a below v_d the slide may be as slow as v_a, until the spring pulls with all of the friction
     off_mps = _SWING * speed_mps + 3.0 * s.fine_sigma_mps
     slow = s.fade < _LAST and s.fine_mps < min(s.vibration_velocity_mps, speed_mps) - off_mps
     _note_swing(p, s, speed_mps)

@@ -19,9 +19,9 @@ TWO_PI = 2.0 * math.pi
 DEPTH = 0.08  # amplitude of the wobble over v_a: a ratio of 1.2 falls to 1.10
 # Ratios about which v_a wobbles. Lower: v_a is near v_s, which then changes by more. Higher: falling friction has less effect.
 LEAST_ASKED, MOST_ASKED = 1.2, 1.3
-PERIODS = 4.0  # periods of a round
+PERIODS = 4.0  # periods of the wobble after which its result is judged: a round
 _NOISE = 0.02  # largest noise of v_s over v_d in the used windows: a quarter of the wobble
-_WINDOWS, _BLOCKS = 6.0, 8.0  # fewest windows and blocks in a period: a window then reduces the wobble by 3 %
+_WINDOWS, _BLOCKS = 6.0, 8.0  # fewest windows and blocks in a period: a window then attenuates the wobble by 3 %
 _EXCITER_PERIODS = 2.0  # fewest periods of the exciter in a window
 _SMOOTHED = 0.973  # share of a wobble that passes windows of a sixth of its period
 # Limits of (relative change of v_s) / (relative change of v_a). Above the first, friction falls with speed; below the second, it
@@ -35,7 +35,7 @@ _ASIDE = 0.25  # largest response a quarter period out of phase, over v_s / v_a;
 
 @kernel
 def can_ask(p: ControllerParams, longest_s: float) -> bool:
-    """Whether a period of at most `longest_s` is long enough for the least noise."""
+    """Whether the shortest windows and the blocks allow a wobble with a period of at most `longest_s`."""
     return max(_WINDOWS * p.window_s[0], _BLOCKS * p.block_s) <= longest_s
 
 
@@ -67,7 +67,7 @@ def begin_wobble(p: ControllerParams, s: ControllerMemory, speed_mps: float, lon
 
 @kernel
 def wobble_factor(s: ControllerMemory) -> float:
-    """Present factor of the wobble on v_a."""
+    """Present factor of the wobble on v_a; 1 without a wobble."""
     return 1.0 + DEPTH * math.cos(TWO_PI * s.wobble_s / s.wobble_period_s) if s.wobbles == 1 else 1.0
 
 
@@ -75,9 +75,8 @@ def wobble_factor(s: ControllerMemory) -> float:
 def wobble(p: ControllerParams, s: ControllerMemory, speed_mps: float) -> bool:
     """Add a block's v_a and v_s; return whether a round is complete: after each `PERIODS`."""
     turn_rad = TWO_PI * s.wobble_s / s.wobble_period_s
-    late_rad = (
-        math.pi * (p.window_s[s.wobble_level] - p.block_s) / s.wobble_period_s
-    )  # from the middle of the window to the middle of the block
+    # angle from the middle of the window of v_s to the middle of the block of v_a
+    late_rad = math.pi * (p.window_s[s.wobble_level] - p.block_s) / s.wobble_period_s
     weight = 1.0 - math.cos(turn_rad / PERIODS)
     v_s = weight * slide_mps(p, s, s.wobble_level, speed_mps)
     s.wobble_a[0] += weight * s.fast_mps * math.cos(turn_rad)

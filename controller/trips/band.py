@@ -11,16 +11,16 @@ import math
 from bridge.kernel import kernel
 from bridge.layouts import ControllerMemory, ControllerParams
 
-# Time of even vibration over which the known gain is averaged; shorter: noise of a single fit; longer: later bounded
+# Time of even vibration over which the known gain is averaged. Shorter: more noise. Longer: the stroke is bounded later.
 KNOWN_S = 0.1
 
-CHECK_BLOCKS = 16  # after a check, in which its tones come; there are 8 at most
-OTHER_REPORTED_S = 2.0  # for which GAIN_OTHER is reported: the check's gain differs from the configured one
+CHECK_BLOCKS = 16  # blocks after a loop check that carry its result, a tone each; 8 tones at most, so each comes twice
+OTHER_REPORTED_S = 2.0  # time for which GAIN_OTHER is reported: the check's gain differs from the configured gain
 
 
 @kernel
 def begin_known(p: ControllerParams, s: ControllerMemory) -> None:
-    """Start from the configured gain alone."""
+    """Start from the configured gain alone; without one, no gain is known."""
     for i in range(p.candidates):
         s.known_gain[i] = p.told_gain
         s.known_steps[i] = p.known_steps if p.told_gain > 0.0 else 0
@@ -69,7 +69,7 @@ def _checked(p: ControllerParams, s: ControllerMemory, i: int) -> tuple[float, f
     j = i
     while s.tone_gain[j, 0] == 0.0 or s.tone_gain[j, 1] == 0.0:
         j -= way
-        if j < 0 or j >= p.candidates:  # there is a single tone
+        if j < 0 or j >= p.candidates:  # the check had a single tone
             only = max(s.tone_gain[i, 0], s.tone_gain[i, 1])
             return only, only
     low, high = min(s.tone_gain[j, 0], s.tone_gain[j, 1]), max(s.tone_gain[j, 0], s.tone_gain[j, 1])

@@ -17,23 +17,19 @@ from controller.trips.doubts import CONTACT, trip
 from controller.trips.doubts import DRIVE as DRIVE_DOUBT
 
 WINDOW_S = 0.05  # shortest window; v_a cannot change faster
-_LONGER = 4  # number of longer levels for feeds below the noise
-_EXACT = 0.05  # largest noise of both positions over v_d
-_APART = 1.2  # ratio of the two velocities from which they disagree; errors of scale are smaller
-_MARGIN = 1.1  # margin on the confirmed velocity while they disagree
-_RISES_S = (
-    1.0  # time constant of a rise of the confirmed share while they disagree, as a change of v_a moves slide and force
-)
-_WINDOWS = (
-    5.0 * BINS
-)  # fewest windows of a learnt stiffness: BINS windows overlap, and under hum five may agree by chance
+_LONGER = 4  # number of window lengths to try, each twice the one before: slow feeds need longer windows
+_EXACT = 0.05  # largest noise of both positions together in a used window, over v_d
+_APART = 1.2  # ratio of v_d to the v_d by slide and force from which they disagree; errors of scale are smaller
+_MARGIN = 1.1  # factor on the confirmed v_d while drive, slide and force disagree
+_RISES_S = 1.0  # time constant of a rise of the confirmed share during a disagreement: v_a itself moves slide and force
+_WINDOWS = 5.0 * BINS  # fewest windows of a learnt stiffness: BINS windows overlap, under hum five agree by chance
 _SURE = 0.03  # largest relative sigma of a learnt stiffness; the first values are a third too large
 # Share of v_d below which the slide sticks, and the share that counts as confirmed then: the rest depends on the stiffness.
 _STICKS, _STUCK = 0.25, 0.4
-_SOFTER = 2.0  # largest stiffness of the spring over its present stiffness
+_SOFTER = 2.0  # factor by which the spring may have become softer than `stiffest_N_per_m`
 _TWICE = 2.0  # ratio of two changes from which only the larger counts as a change
-_SAME = 0.08  # smallest change of a velocity over v_d: less than half of the difference at a trip
-_NONE = -1  # no row: unknown signal
+_SAME = 0.08  # smallest change of a velocity that counts, over v_d: less than half of the difference at a trip
+_NONE = -1  # in place of a row: no single signal changed, or it is unknown
 TRIP_S = 0.3  # time of disagreement until a trip; longer than a reversing drive needs to cross its backlash
 
 
@@ -46,7 +42,7 @@ def watch_confirmed(p: ControllerParams, s: ControllerMemory) -> None:
     if s.stiffness_learnt == 1 and s.stiffness_sigma < _SURE and s.taught >= _WINDOWS:
         s.stiffest_N_per_m = max(s.stiffest_N_per_m, s.stiffness_N_per_m)
     level = _level(p, s)
-    if s.doubted & CONTACT and s.trip != POSITIONS_APART:  # a doubted force or slide confirms nothing
+    if s.doubted & CONTACT and s.trip != POSITIONS_APART:  # a doubted force or slide position cannot confirm v_d
         s.apart_s, s.confirmed = 0.0, 1.0
         return
     if s.moving == 0:

@@ -16,15 +16,15 @@ from controller.vibration import velocity_of
 
 _TWO_PI = 2.0 * math.pi
 SOME = 4  # steps between two slow checks
-_EVEN = 0.05  # largest change of an even commanded v_a, over its low-pass
+_EVEN = 0.05  # largest difference of an even expected v_a from its low-pass, over v_a
 HOLD_S = 0.05  # time of too small a v_a until a trip; until then the band bounds v_a
 LOUD_HOLD_S = 0.1  # time of too large a v_a until RESONANCE; a slip that shakes the base is shorter
-GROWN_HOLD_S = 1.0  # time above the square root of the band until RESONANCE: a gain that grows slowly
+GROWN_HOLD_S = 1.0  # time of a gain above the square root of the band until RESONANCE: it grows slowly
 PASSED_S = 1.0  # time without too large a v_a until RESONANCE ends
-FOLLOW_S = 1.0  # time constant of the gain with which a sudden loss is compared
-_NO_SINE = 0.25  # mean square of the rest over the mean square of the sine, from which an acceleration is not a sine
-_NOISIER = 16.0  # smallest growth of the mean square of the rest at a trip
-_AT_EXTREME = 0.99  # share of the largest sample of a block from which a sample is at the extreme
+FOLLOW_S = 1.0  # time constant of the followed gain, with which a sudden loss is compared
+_NO_SINE = 0.25  # mean square of the rest over the wanted sine's, from which an acceleration is not a sine
+_NOISIER = 16.0  # factor by which the mean square of the rest grows before a trip
+_AT_EXTREME = 0.99  # share of a block's largest sample from which a sample counts as an extreme
 _CLIPPED_SHARE = 0.3  # share of samples at the extremes from which a block is clipped; a sine has 0.09
 _MOST_OFF = 1.6  # largest deviation from the known gain, as a factor, of a slide accelerometer swapped with the base's
 
@@ -38,7 +38,7 @@ def note_command(s: ControllerMemory, expected_mps: float) -> None:
 
 @kernel
 def is_even(p: ControllerParams, s: ControllerMemory) -> bool:
-    """Whether the measured v_a can be compared with the commanded v_a, for any of the measured delays.
+    """Whether the command was even for long enough to compare the measured v_a with it, for any likely loop delay.
 
     Until a vibration is first detected, its delay may be any delay that the loop is designed for.
     """
@@ -49,7 +49,7 @@ def is_even(p: ControllerParams, s: ControllerMemory) -> bool:
 
 @kernel
 def watch_delivered(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> None:
-    """Compare v_a; trip if it is too small for the hold time, and count the steps for which it is too large."""
+    """Compare v_a with the command; trip if it is too small for the hold time, and count the steps for which it is too large."""
     i = s.candidate
     if s.followed != i or not is_known(p, s, i):
         s.followed, s.followed_gain, s.low_steps = i, s.known_gain[i], 0
@@ -127,5 +127,5 @@ def watch_rest(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> No
 
 @kernel
 def is_loud(s: ControllerMemory) -> bool:
-    """Whether v_a is, or was within PASSED_S, larger than by the known gain."""
+    """Whether v_a is, or was within PASSED_S, larger than the known gain and its band allow."""
     return s.high_steps < 0

@@ -16,7 +16,7 @@ from controller.trips.reset import forget_motion, forget_needs
 from controller.trips.stall import is_judged
 
 ACCELEROMETER, CONTACT, DRIVE = 1, 2, 4  # bits of `s.doubted`
-OF_FORCE, OF_SLIDE, OF_DRIVE, OF_BASE = range(4)  # channels, in `s.same_steps`
+OF_FORCE, OF_SLIDE, OF_DRIVE, OF_BASE = range(4)  # channels: indices of `s.same_steps`
 CHANNELS = 4
 
 

@@ -26,19 +26,17 @@ from controller.trips.doubts import (
 from controller.trips.jumps import watch_jumps
 from controller.trips.noise import look_at_noise
 
-HOLD_S, FEWEST = (
-    0.05,
-    40,
-)  # time and number of blocks with equal first samples until a trip: with a noise of one step, half of all samples are equal
-# If all channels repeat for this part of HOLD_S, their reader hangs: treated as a silent rig.
+# Time and number of blocks with equal first samples until a trip: with a noise of one step, half of all samples are equal.
+HOLD_S, FEWEST = 0.05, 40
+# If all channels repeat their number for HOLD_S divided by this, their reader hangs: all signals are doubted.
 _ALL_PARTS = 2
-_FASTEST_MPS = 100.0  # largest velocity of a drive; a faster change of position is a wrong unit or channel
-_LOOK_STEPS = 16  # blocks between the checks of the noise of a channel and of the next channel
+_FASTEST_MPS = 100.0  # largest velocity of a drive; a faster change of its position is a wrong unit or channel
+_LOOK_STEPS = 16  # steps from the check of one channel's noise to the check of the next channel
 _LOOKS = 8  # number of checks until a channel may count as noisy
-_LIVELY = 0.9  # share of the checks that must show noise
-_DROPS_S, _MOST_DROPS = 1.0, 3.5  # time constant of the count of dropouts, and the largest count
-_DEAD_S = 0.3  # time of motion after which a force must have changed since the start of the run
-_SAME = 4  # number of equal successive samples from which a check gives no information on the noise
+_LIVELY = 0.9  # share of the checks above which a channel counts as noisy
+_DROPS_S, _MOST_DROPS = 1.0, 3.5  # time constant of the count of dropouts, and the largest allowed count
+_DEAD_S = 0.3  # duration of a motion after which a force that never changed in the run is frozen
+_SAME = 4  # blocks in a row with the same first sample from which a channel is not checked for noise
 
 
 @kernel
@@ -116,7 +114,7 @@ def _look_at_one(s: ControllerMemory, block: SensorRow) -> None:
 
 @kernel
 def _state(s: ControllerMemory, channel: int) -> int:
-    """The condition on which the noise of a channel depends: whether the base vibrates, or the drive moves."""
+    """The condition on which a channel's noise depends: 1 if the base vibrates (accelerometer) or the drive moves (others)."""
     if channel == OF_BASE:
         return 1 if s.allowed_m > 0.0 else 0
     return s.moving

@@ -9,19 +9,19 @@ from controller.estimate.windows import BINS, clear_windows
 from controller.estimate.windows import DRIVE as DRIVE_ROW
 from controller.trips.doubts import DRIVE, OF_DRIVE, trip
 
-_FARTHER = 10.0  # smallest jump over the steps in the blocks before and after
-_BENDS = 20.0  # smallest jump over the mean second difference in a block, the noise
-_ANOTHER = 0.3  # relative change of v_d at a jump from which the unit changed
-_SIGMAS = 3.0  # sigmas of v_d that are added to this limit
-_STEPS = 4.0  # smallest jump over the resolution
-HOLD_S = 0.1  # time for which v_d keeps its value before the jump, while the windows refill
-_MOST = 2.5  # count of jumps from which the position is doubted
+_FARTHER = 10.0  # smallest jump, over the changes of position in the blocks before and after it
+_BENDS = 20.0  # smallest jump, over the noise: the mean second difference within a block
+_ANOTHER = 0.3  # relative change of v_d at a jump from which the position has another unit
+_SIGMAS = 3.0  # sigmas of the noise of v_d that are added to this limit
+_STEPS = 4.0  # smallest jump, over the quantisation step of the position
+HOLD_S = 0.1  # time for which v_d keeps its value from before a jump, while the windows refill
+_MOST = 2.5  # count of jumps above which the drive position is doubted
 FORGET_S = 1.0  # time constant of this count
 
 
 @kernel
 def watch_jumps(p: ControllerParams, s: ControllerMemory, place_m: float, blocks: int) -> None:
-    """Process the first position of a block, `blocks` after the last block; judge the step before the present step."""
+    """Process the first position of a block, `blocks` after the last block; judge whether the last but one change is a jump."""
     if s.jumped_s > 0.0:
         s.jumped_s = max(s.jumped_s - p.block_s, 0.0)
         if s.jumped_s == 0.0 and _is_another_speed(p, s):

@@ -11,7 +11,7 @@ from controller.estimate.windows import DRIVE, LEVELS
 from controller.trips.delivered import SOME
 
 _LOUDER = 4.0  # growth of the drive position's second difference that counts as a new noise level
-_LEARN = 1.0 / 16.0  # weight of a new measurement
+_LEARN = 1.0 / 16.0  # weight of a new second difference in its mean
 _SLIPS_S = 1.0  # time constant of the count of slips
 # Slips count as noise above this number, and above this factor times the slips for which the spring could wind up.
 _MOST_SLIPS, _TIMES = 8.0, 3.0

@@ -18,15 +18,15 @@ from controller.trips.doubts import CONTACT, trip
 from controller.trips.doubts import DRIVE as DRIVE_DOUBT
 
 SHORTEST_S = 0.01  # shortest window; in a shorter one a force with a delay of 2 ms breaks the law in every slip
-HOLD_S, _WINDOWS = 0.05, 2.0  # time plus number of windows for which the law is broken until a trip
-FIRST_S = 0.015  # first part of HOLD_S, which decides the doubted signal
+HOLD_S, _WINDOWS = 0.05, 2.0  # time for which the law is broken until a trip; number of windows added to it
+FIRST_S = 0.015  # first part of HOLD_S, whose changes of v_d and v_s decide which signal is doubted
 _SIGMAS = 8.0  # least ratio of half of v_d to the noise in a window
-# Largest difference of the two sides, over the larger side: for a spring that is softer or stiffer by a factor of 5; by a factor
+# Largest difference of the law's two sides, over the larger: for a spring that is softer or stiffer by a factor of 5; by a factor
 # of 20 while k_d is configured and not learnt yet.
 _OFF, _TOLD_OFF = 0.8, 0.95
-_SURE = 0.06  # largest relative sigma of a learnt stiffness that replaces the last one
-_HALF = 0.5  # smallest difference that counts, over v_d
-_TWICE = 2.0  # change of v_d over the change of v_s from which the drive is doubted
+_SURE = 0.06  # largest relative sigma of a learnt stiffness that replaces the stiffness used here
+_HALF = 0.5  # smallest difference of the law's two sides that counts, over v_d
+_TWICE = 2.0  # change of v_d over change of v_s to doubt the drive; v_s over v_d or F' / k_d to doubt the slide
 
 
 @kernel
@@ -36,9 +36,7 @@ def watch_spring(p: ControllerParams, s: ControllerMemory) -> None:
     if level < 0:
         return
     known = s.kept_N_per_m > 0.0 and s.stiffness_learnt == 1 and s.stiffness_sigma > _SURE
-    if (
-        s.broken_steps == 0 and not known
-    ):  # during a fault, or by noise if no spring winds up, a wrong stiffness is learnt
+    if s.broken_steps == 0 and not known:  # during a fault, or by noise if no spring winds up, k_d is learnt wrongly
         s.kept_N_per_m = s.stiffness_N_per_m
     by_force_mps = s.slope[FORCE, level] / s.kept_N_per_m
     drive_mps, slide_mps = s.slope[DRIVE, level], s.slope[SLIDE, level]
@@ -56,7 +54,7 @@ def watch_spring(p: ControllerParams, s: ControllerMemory) -> None:
     if s.broken_steps == 0:
         s.broken_drive, s.broken_slide = 0, 0
     s.broken_steps += SOME
-    if s.broken_steps <= p.first_steps:  # later the slide changes, too, as the vibration follows v_d
+    if s.broken_steps <= p.first_steps:  # after that the slide changes, too, as the vibration follows v_d
         s.broken_drive += 1 if drive_by_mps > _TWICE * slide_by_mps else -1
     fastest_mps = max(math.fabs(drive_mps), math.fabs(s.kept_mps[DRIVE]), math.fabs(by_force_mps))
     s.broken_slide += 1 if math.fabs(slide_mps) > _TWICE * fastest_mps else -1  # a slip is over before it trips

@@ -5,17 +5,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from bridge.arrays import Records
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.event_codes import TRIPS, WEAK_REASONS
 from bridge.wire.words import help_of, word_of
 
 _LIMITS: dict[int, str] = {wire.RANGE: "STROKE_MAX", wire.GAIN_LIMIT: "GAIN_LIMIT"}
 _HELD_S = 0.2  # duration of a limit until it is reported: every start of a vibration meets some limits
-_STALLED = "; but the computer or the link stalled within the last second: look at that first"
+_STALLED = "; the computer or the link stalled within the last 0.15 s: check this cause first"
 _AGAIN_S = 1.0  # least time between two reports of the same code
 
 
-def changes(trace: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+def changes(trace: Records) -> npt.NDArray[np.int64]:
     """Rows of a trace that may cause events: the first, rows that differ from the row before, and the last."""
     new = np.zeros(len(trace), bool)
     new[:1] = new[-1:] = True
@@ -42,7 +43,7 @@ class TripEvents:
 
         Args:
             trace: the record.
-            stalled: whether computer or link stalled within the last second, which may be their cause.
+            stalled: whether computer or link stalled within the last 0.15 s, which may be the cause.
 
         """
         reason, limit = int(trace.reason), int(trace.limit)

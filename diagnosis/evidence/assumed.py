@@ -32,7 +32,10 @@ def with_assumed(given: dict[str, Any], mass_kg: float | None = None) -> tuple[d
     static_N = _positive(table.get("static_force_N"))
     radius_m = _positive(table.get("radius_m", 1.0)) if turns else 1.0
     if "mass_kg" not in table:
-        assumed["mass_kg"] = mass_kg or _mass_kg(table.get("drive_stiffness_N_per_m"), static_N)
+        # a mass that slips in a tenth of a second; with a force drive, a mass that its friction decelerates by 10 m/s²
+        stiffness = table.get("drive_stiffness_N_per_m")
+        slips_kg = static_N / 10.0 if stiffness is None else _positive(stiffness) * (_SLIP_S / math.pi) ** 2
+        assumed["mass_kg"] = mass_kg or slips_kg
     # on a rotary rig the way in rad is the way in m over the radius
     assumed["stribeck_velocity_mps"] = _STRIBECK_MPS / radius_m
     mass = _positive(table.get("mass_kg", assumed.get("mass_kg")))
@@ -47,13 +50,6 @@ def with_assumed(given: dict[str, Any], mass_kg: float | None = None) -> tuple[d
         if unsure or "tolerance" in table:
             table["tolerance"] = unsure | table.get("tolerance", {})
     return assumed | table, filled
-
-
-def _mass_kg(stiffness_N_per_m: Any, static_N: float) -> float:
-    """A mass that slips in a tenth of a second; with a force drive, a mass that its friction decelerates by 10 m/s²."""
-    if stiffness_N_per_m is None:
-        return static_N / 10.0
-    return _positive(stiffness_N_per_m) * (_SLIP_S / math.pi) ** 2
 
 
 def _positive(value: Any) -> float:

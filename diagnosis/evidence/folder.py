@@ -17,14 +17,12 @@ from bridge.tables.readers import Table, read_table
 from bridge.units import counted
 from bridge.wire.channels import SENSOR_CHANNELS
 from diagnosis.evidence.assumed import WIDE
-from diagnosis.evidence.beside import with_beside
 from diagnosis.evidence.column_checks import checked
-from diagnosis.evidence.exciter_harmonics import DISTORTED, distortion
-from diagnosis.evidence.force_pickup import PICK_UP, pick_up
+from diagnosis.evidence.conversion import as_sliding, run_as_sliding, told, with_beside
+from diagnosis.evidence.foreign_vibration import foreign_vibrations
 from diagnosis.evidence.manifest import MANIFEST, Manifest, RigTable, RunTable, described
 from diagnosis.evidence.manifest_keys import STANDARD, VIBRATION, ChannelMap, Columns
 from diagnosis.evidence.mapped import has_time, mapped
-from diagnosis.evidence.rotary import as_sliding, run_as_sliding, told
 from diagnosis.evidence.run import Evidence, MeasuredRun
 from diagnosis.evidence.run_log import columns_of_log
 from diagnosis.evidence.split import split
@@ -35,9 +33,8 @@ _NEVER_EXACT = ("coulomb_force_N", "static_force_N", "stribeck_velocity_mps", "d
 # Similarity of two column names (`difflib`) from which one may be a misspelling of the other: one letter, or the case, differs.
 # Too small: unrelated columns are offered. Too large: misspellings stay unseen.
 _SIMILAR = 0.85
-SHAKE_RATE_HZ = (
-    8000.0  # lowest sampling rate at which the rms within 1 ms is compared: lower rates have too few samples
-)
+# lowest sampling rate at which the rms within 1 ms is compared: lower rates have too few samples
+SHAKE_RATE_HZ = 8000.0
 
 
 def load_evidence(folder: Path) -> Evidence:
@@ -175,15 +172,9 @@ def examine(columns: Columns, rig: RigTable, table: RunTable) -> tuple[MeasuredR
             findings.append(Finding("missing", f"{table.name}: {name}", f"missing: {consequence}"))
     t_s = usable.pop("t_s")
     findings += [Finding(kind, f"{table.name}: {name}", text) for kind, name, text in _vibration(usable, t_s)]
-    vibrates = pick_up(rig, t_s, usable)
-    if vibrates:
-        findings.append(Finding(PICK_UP, f"{table.name}: drive_force_N", vibrates.text))
-    distorted = distortion(t_s, usable)
-    if distorted:
-        findings.append(Finding(DISTORTED, f"{table.name}: base_accel_mps2", distorted.text))
-    return MeasuredRun(
-        table.name, t_s, usable, clipped, table.drive_velocity_mps, table.holdout, vibrates, distorted
-    ), findings
+    foreign = foreign_vibrations(rig, t_s, usable)
+    findings += [Finding(shaken.kind, f"{table.name}: {shaken.column}", shaken.text) for shaken in foreign]
+    return MeasuredRun(table.name, t_s, usable, clipped, table.drive_velocity_mps, table.holdout, foreign), findings
 
 
 def _vibration(columns: Columns, t_s: Floats) -> Iterator[tuple[str, str, str]]:

@@ -27,11 +27,10 @@ from bridge.units import counted, unit_of
 from bridge.wire.messages import sensor_block
 from bridge.wire.topics import SENSORS
 from diagnosis.evidence.assumed import with_assumed
-from diagnosis.evidence.beside import with_beside
+from diagnosis.evidence.conversion import with_beside
 from diagnosis.evidence.folder import examine
-from diagnosis.evidence.manifest import MANIFEST, DriveVelocity, RigTable, RunTable, read_manifest
+from diagnosis.evidence.manifest import MANIFEST, DriveVelocity, RigTable, RunTable, manifest_text, read_manifest
 from diagnosis.evidence.manifest_keys import USUAL, ChannelMap, Columns, check_channel_names
-from diagnosis.evidence.manifest_text import manifest_text
 from diagnosis.evidence.mapped import mapped
 from diagnosis.evidence.unknown_mass import shown_mass_kg
 

@@ -1,10 +1,12 @@
-"""The keys of `manifest.toml` in an evidence folder: the rig with its tolerances, the channels and the runs."""
+"""`manifest.toml` of an evidence folder, its keys and its text: the rig with its tolerances, the channels and the runs."""
 
+import json
 import math
 from collections import Counter
+from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path, PurePath
-from typing import Annotated, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, model_validator
 
@@ -20,7 +22,7 @@ MANIFEST = "manifest.toml"
 RUN_SUFFIXES = (
     ".parquet", ".csv", ".txt", ".dat", ".lvm", ".tsv", ".asc", ".mat", ".tdms", ".xlsx", ".xls", ".ods", ".h5", ".mcap",
 )  # fmt: skip
-_SPRING_ONLY = ("drive_stiffness_N_per_m", "drive_damping_Ns_per_m")
+_NOT_WITH_FORCE = ("drive_stiffness_N_per_m", "drive_damping_Ns_per_m")
 
 # Highest natural frequency of the mass on a stiffness. Larger: the plant's step becomes unstable in fits, which vary mass and
 # stiffness within their tolerances; the plant refuses such numbers. Smaller: stiff rigs are refused.
@@ -44,8 +46,8 @@ class RigTable(Strict):
         description='With drive = "torsion": radius at which the results are given in N and m; 1 if not given.',
     )
     mass_kg: Positive = Field(description="If not given, the mass that the runs show.")
-    drive_stiffness_N_per_m: Positive | None = Field(default=None, description='With drive = "spring" only.')
-    drive_damping_Ns_per_m: NotNegative | None = Field(default=None, description='With drive = "spring" only.')
+    drive_stiffness_N_per_m: Positive | None = Field(default=None, description='Not with drive = "force".')
+    drive_damping_Ns_per_m: NotNegative | None = Field(default=None, description='Not with drive = "force".')
     contact_stiffness_N_per_m: Positive
     contact_damping_Ns_per_m: NotNegative
     viscous_damping_Ns_per_m: NotNegative
@@ -61,7 +63,7 @@ class RigTable(Strict):
 
     @model_validator(mode="after")
     def _fits_together(self) -> "RigTable":
-        for key in _SPRING_ONLY:
+        for key in _NOT_WITH_FORCE:
             given = getattr(self, key) is not None
             if self.drive != "force" and not given:
                 raise ValueError(f'{key}: missing; a rig with drive = "{self.drive}" needs it')
@@ -109,6 +111,37 @@ class RigTable(Strict):
         }
 
 
+# number of [rig] -> table and key of a rig file; the tail of the Stribeck curve is refitted, and no manifest states it
+_PLACES: Final = {
+    "mass_kg": ("slide", "mass_kg"),
+    "drive_stiffness_N_per_m": ("drive", "stiffness_N_per_m"),
+    "drive_damping_Ns_per_m": ("drive", "damping_Ns_per_m"),
+} | {
+    name: ("contact", name.removeprefix("contact_"))
+    for name in (
+        "contact_stiffness_N_per_m", "contact_damping_Ns_per_m", "viscous_damping_Ns_per_m", "coulomb_force_N",
+        "static_force_N", "stribeck_velocity_mps", "stribeck_tail",
+    )
+}  # fmt: skip
+
+
+def rig_file_tables(values: Mapping[str, float | None]) -> dict[str, dict[str, float]]:
+    """Numbers of [rig] in the tables of a rig file; the static force is at least the Coulomb force, as the plant needs."""
+    tables: dict[str, dict[str, float]] = {}
+    for name, (part, key) in _PLACES.items():
+        if (value := values.get(name)) is not None:
+            tables.setdefault(part, {})[key] = value
+    tables["contact"]["static_force_N"] = max(tables["contact"]["static_force_N"], tables["contact"]["coulomb_force_N"])
+    return tables
+
+
+def rig_numbers(rig: Any) -> dict[str, float]:
+    """The numbers of [rig], from the configuration of a plant's rig."""
+    return {
+        name: getattr(getattr(rig, part), key) for name, (part, key) in _PLACES.items() if name in RigTable.model_fields
+    }
+
+
 class RunTable(Strict):
     """One run of the manifest."""
 
@@ -131,18 +164,10 @@ class RunTable(Strict):
         return str(path.with_name(f"{path.stem}-{self.from_s:g}-to-{until}{path.suffix}"))
 
     @model_validator(mode="after")
-    def _stretch_is_right(self) -> "RunTable":
+    def _is_right(self) -> "RunTable":
+        check_channel_names(self.channels)
         if self.until_s is not None and self.until_s <= self.from_s:
             raise ValueError(f"until_s = {self.until_s:g}: must be above from_s = {self.from_s:g}; exchange them")
-        return self
-
-    @model_validator(mode="after")
-    def _names_are_right(self) -> "RunTable":
-        check_channel_names(self.channels)
-        return self
-
-    @model_validator(mode="after")
-    def _file_is_in_the_folder(self) -> "RunTable":
         path = PurePath(self.file)
         if path.is_absolute() or ".." in path.parts:
             raise ValueError(f"file = {self.file!r}: must lie in the evidence folder; copy it there")
@@ -232,3 +257,34 @@ def described(folder: Path, mass_kg: float | None = None) -> tuple[Manifest, lis
         return validate(Manifest, table, MANIFEST), assumed
     except Fault as fault:
         raise Fault("BAD_EVIDENCE", fault.line) from None
+
+
+def manifest_text(rig: RigTable, runs: list[RunTable], assumed: list[str]) -> str:
+    """Text of a `manifest.toml` with this rig and these runs; rig numbers in `assumed` are marked as assumed."""
+    lines = [f"format = {_value(FORMAT)}", "", *rig_lines(rig, assumed)]
+    for run in runs:
+        lines += ["", "[[run]]"]
+        plain = run.model_dump(exclude={"channels"})
+        usual = {"from_s": 0.0, "tare_N": 0.0}
+        lines += [f"{name} = {_value(value)}" for name, value in plain.items() if value not in (None, usual.get(name))]
+        for name, channel in run.channels.items():
+            keys = [f"{key} = {_value(value)}" for key, value in channel.model_dump(exclude_defaults=True).items()]
+            lines.append(f"channels.{name} = {{ {', '.join(keys)} }}")
+    return "\n".join(lines) + "\n"
+
+
+def rig_lines(rig: RigTable, assumed: list[str]) -> list[str]:
+    """The lines of [rig] and [rig.tolerance]."""
+    lines = ["[rig]", f"drive = {_value(rig.drive)}"]
+    numbers = {"radius_m": rig.radius_m, **rig.values(), "force_per_current_N_per_A": rig.force_per_current_N_per_A}
+    for name, value in numbers.items():
+        if value is not None:
+            lines.append(f"{name} = {_value(value)}" + ("  # assumed, not measured" if name in assumed else ""))
+    if rig.tolerance:
+        lines += ["", "[rig.tolerance]", *(f"{name} = {_value(value)}" for name, value in rig.tolerance.items())]
+    return lines
+
+
+def _value(value: Any) -> str:
+    """A number, a truth value or a text in TOML: as in JSON, except DEL; `repr` keeps every digit of a number."""
+    return repr(value) if isinstance(value, float) else json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

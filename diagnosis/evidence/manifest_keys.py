@@ -47,15 +47,11 @@ class ChannelMap(Strict):
         return table
 
     @model_validator(mode="after")
-    def _unit_is_known(self) -> "ChannelMap":
+    def _scale_is_right(self) -> "ChannelMap":
         if self.unit and known_unit(self.unit) is None:
             raise ValueError(f"unit = {self.unit!r}: must be a known unit, such as mm, kN, g or ms; else give a scale")
         if self.unit and self.scale is not None:
             raise ValueError("scale and unit: must be one of them; remove the other")
-        return self
-
-    @model_validator(mode="after")
-    def _scale_is_not_zero(self) -> "ChannelMap":
         if self.scale == 0.0:
             raise ValueError("scale = 0: must not be 0, it would erase the column; 1 keeps it unchanged")
         return self

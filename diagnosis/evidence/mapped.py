@@ -1,8 +1,10 @@
-"""The standard columns of a table, in SI units and on one clock."""
+"""The standard columns of a table, in SI units, on one clock, without values that a program writes for a missing measurement."""
 
+import re
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from bridge.arrays import Floats
 from bridge.faults import Fault
@@ -12,7 +14,6 @@ from bridge.tables.table import Table
 from bridge.tables.unit_words import in_brackets, known_unit, si_unit, weight_unit
 from bridge.units import counted
 from diagnosis.evidence.manifest_keys import STANDARD, ChannelMap, Columns
-from diagnosis.evidence.sentinels import without_sentinels
 
 # Values from which a column of times without a unit counts calendar time, not time of the run, with its unit [s]
 _SINCE_1970 = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3), (1e8, 1.0))
@@ -20,6 +21,11 @@ _SINCE_1970 = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3), (1e8, 1.0))
 # less than 2e-5 is a rate above 50 kHz in seconds, and above 0.6 rows a second in days.
 _DAYS = ((36526.0, 73051.0), (730486.0, 767011.0))
 _DAY_S, _LONGEST_STEP = 86400.0, 2e-5
+# Distance from the median, in spreads (5th to 95th percentile), from which a value is a sentinel: any value; a number of nines
+# such as -9999, or a repeated value such as full scale. A slip moves a force or a position by a few spreads.
+_FAR_AWAY, _FAR_ALIKE = 1000.0, 20.0
+_NO_VALUE = 1e20  # 1e30 and the largest float32 mean "no value"
+_NINES = re.compile(r"0*9{3,}0*")
 
 
 class Mapped(NamedTuple):
@@ -157,3 +163,47 @@ def calendar_unit_s(times_s: Floats) -> float | None:
     if np.ptp(finite) < _LONGEST_STEP * len(finite) and any(least <= finite[0] < most for least, most in _DAYS):
         return _DAY_S
     return next((unit_s for least, unit_s in _SINCE_1970 if finite[0] > least), None)
+
+
+def without_sentinels(values: Floats, where: str, smooth: bool) -> tuple[Floats, list[Finding]]:
+    """A column with NaN in place of sentinels, [rows].
+
+    Args:
+        values: the column of the file, [rows].
+        where: file and column, for the finding.
+        smooth: whether the measured quantity has no spikes.
+
+    """
+    small = np.where(np.abs(values) < _NO_VALUE, values, np.nan)
+    if not np.isfinite(small).any():
+        return small, []
+    low, middle, high = np.nanquantile(small, (0.05, 0.5, 0.95))
+    spread = float(high - low)
+    away = np.abs(small - middle)
+    bad = np.isfinite(values) & ~np.isfinite(small)
+    if spread > 0.0 and float(np.nanmax(away)) > _FAR_ALIKE * spread:
+        far = _leaps(small, away > _FAR_ALIKE * spread, 0.5 * _FAR_ALIKE * spread)
+        if smooth:
+            bad |= far & (away > _FAR_AWAY * spread)
+        numbers, times = np.unique(values[~bad & far], return_counts=True)
+        for value, again in zip(numbers.tolist(), (times > 1).tolist(), strict=True):
+            if (smooth and again) or _NINES.fullmatch(f"{abs(value):.6f}".replace(".", "")):
+                bad |= far & (values == value)
+    rows = np.flatnonzero(bad)
+    if not len(rows):
+        return values, []
+    text = f"{counted(len(rows), 'outlier')}, first row {rows[0] + 1} = {values[rows[0]]:.6g}: no measurement; left out"
+    return np.where(bad, np.nan, values), [Finding("outlier", where, text, len(rows))]
+
+
+def _leaps(values: Floats, far: npt.NDArray[np.bool_], least: float) -> npt.NDArray[np.bool_]:
+    """Marks stretches of one constant far value that begin and end with a jump, [rows], which no motion does.
+
+    A far value alone is not enough: a slide that rests for long and then moves goes far, too.
+    """
+    edges = np.diff(np.concatenate(([0], far.astype(np.int8), [0])))
+    leaps = np.concatenate(([True], ~(np.abs(np.diff(values)) <= least), [True]))
+    kept = np.zeros(len(values), np.bool_)
+    for begin, end in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
+        kept[begin:end] = leaps[begin] and leaps[end] and (values[begin:end] == values[begin]).all()
+    return kept

@@ -5,8 +5,7 @@ from typing import NamedTuple
 
 from bridge.arrays import Floats
 from bridge.log.finding import Finding
-from diagnosis.evidence.exciter_harmonics import Distortion
-from diagnosis.evidence.force_pickup import PickUp
+from diagnosis.evidence.foreign_vibration import ForeignVibration
 from diagnosis.evidence.manifest import RigTable
 
 
@@ -20,8 +19,7 @@ class MeasuredRun(NamedTuple):
     clipped: dict[str, tuple[float, float]]
     drive_velocity_mps: float | None  # velocity in the manifest
     holdout: bool  # whether the run is held out: not fitted, only predicted
-    pick_up: PickUp | None = None  # a vibration in the force signal that no spring carries
-    distortion: Distortion | None = None  # a base that vibrates at other frequencies than the commanded one
+    foreign: tuple[ForeignVibration, ...] = ()  # vibrations that no effect of the library makes
 
 
 class Evidence(NamedTuple):

@@ -1,4 +1,4 @@
-"""Split of a single long run into parts to fit and a held-out part, where the manifest holds out no run."""
+"""Split of a single long run into parts to fit and a held-out part; shortening of long records before simulation."""
 
 import math
 
@@ -7,11 +7,14 @@ import numpy.typing as npt
 
 from bridge.arrays import Floats
 from bridge.log.finding import Finding
-from diagnosis.evidence.run import MeasuredRun
+from diagnosis.evidence.run import Evidence, MeasuredRun
 
 _SHORTEST_S = 12.0  # shortest run that is split: a third of it must hold some slips
 _WINDOW_S = 0.1  # window over which speed and vibration count as constant
 _PARTS = 3  # equal parts of the run; one of them is held out
+# Total simulated time of the fitted and of the held-out runs. Less: few slips. More: minutes of work.
+_FITTED_S, _HELD_OUT_S = 60.0, 30.0
+_SHORTEST_EXCERPT_S = 5.0  # shortest simulated time of a run
 
 
 def split(run: MeasuredRun) -> tuple[list[MeasuredRun], list[Finding]]:
@@ -79,3 +82,26 @@ def _common(held: npt.NDArray[np.int64], rest: npt.NDArray[np.int64]) -> float:
     keys, counts = np.unique(held, return_counts=True)
     share = counts / len(held)
     return float(sum(min(part, float((rest == key).mean())) for key, part in zip(keys, share, strict=True)))
+
+
+def excerpt(evidence: Evidence) -> Evidence:
+    """The evidence with every run shortened by the same share if their sum is too long, and a finding about it."""
+    allowed = {
+        holdout: most_s / max(sum(_seconds(run) for run in evidence.runs if run.holdout == holdout), most_s)
+        for holdout, most_s in ((False, _FITTED_S), (True, _HELD_OUT_S))
+    }
+    if min(allowed.values()) == 1.0:
+        return evidence
+    runs = tuple(
+        run
+        if allowed[run.holdout] == 1.0
+        else cut(run, 0.0, max(_seconds(run) * allowed[run.holdout], _SHORTEST_EXCERPT_S))
+        for run in evidence.runs
+    )
+    kept_s, total_s = (sum(_seconds(run) for run in group) for group in (runs, evidence.runs))
+    text = f"{kept_s:.3g} of {total_s:.4g} s are simulated, from the start of every run; relations and shares use all of it"
+    return evidence._replace(runs=runs, findings=(*evidence.findings, Finding("excerpt", "fits", text)))
+
+
+def _seconds(run: MeasuredRun) -> float:
+    return float(run.t_s[-1] - run.t_s[0])

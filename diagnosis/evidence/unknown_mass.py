@@ -9,9 +9,8 @@ from diagnosis.evidence.manifest_keys import Columns
 from diagnosis.look.look import RecordFacts, look
 
 _WINDOW_S = 0.03  # window of the cubic that smooths a position before it is differentiated twice
-_SLOW = (
-    0.1  # share of the fastest speed below which samples are left out: friction turns, and is not linear in the speed
-)
+# share of the fastest speed below which samples are left out: friction turns, and is not linear in the speed
+_SLOW = 0.1
 
 
 def shown_mass_kg(rig: RigTable, table: RunTable, columns: Columns) -> float | None:

@@ -1,6 +1,5 @@
 """The next run to measure, or the next check by hand.
 
 candidate_runs   runs that could be measured next
-proposal         the run that separates the two leading explanations
-checks_by_hand   checks by hand, without a run
+proposal         the run that separates the two leading explanations, or a check by hand
 """

@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.feature import Scales
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.features.segments import Segment
@@ -59,7 +58,9 @@ def plans(problem: Problem) -> list[Plan]:
         speed = float(f"{abs(segment.drive_velocity_mps):.2g}")
         length_s[speed] = length_s.get(speed, 0.0) + (segment.last - segment.first) * BLOCK_S
     usual = max(length_s, key=lambda speed: length_s[speed])
-    cycle_m = _cycle_m(problem.rig, problem.scales)
+    # a cycle of tiny slips counts as one of a tenth of the static friction, so that the run is long enough to compare
+    falls_N = max(2.0 * (problem.rig.static_force_N - problem.rig.coulomb_force_N), 0.1 * problem.rig.static_force_N)
+    cycle_m = falls_N / problem.scales.stiffness_N_per_m
     result: list[Plan] = []
     slowest, fastest = min(length_s), max(length_s)
     seen_m = max(abs(segment.drive_velocity_mps) * (segment.last - segment.first) * BLOCK_S for segment in used)
@@ -135,28 +136,19 @@ def as_run(problem: Problem, plan: Plan, point: Point) -> Prepared:
     counts = [round(step.seconds / BLOCK_S) for step in plan.steps]
     edges = np.concatenate([[0], np.cumsum(counts)]).tolist()
     segments = tuple(
-        Segment(first, last, step.velocity_mps, step.frequency_Hz, step.amplitude_m)
-        for first, last, step in zip(edges[:-1], edges[1:], plan.steps, strict=True)
+        Segment(first, last, *step[1:]) for first, last, step in zip(edges[:-1], edges[1:], plan.steps, strict=True)
+    )
+    drive, frequency_Hz, amplitude_m = (
+        np.repeat(column, counts) for column in zip(*(step[1:] for step in plan.steps), strict=True)
     )
     commands = template.commands._replace(
-        drive=np.repeat([step.velocity_mps for step in plan.steps], counts),
-        frequency_Hz=np.repeat([step.frequency_Hz for step in plan.steps], counts),
-        amplitude_m=np.repeat([step.amplitude_m for step in plan.steps], counts),
-        segments=segments,
+        drive=drive, frequency_Hz=frequency_Hz, amplitude_m=amplitude_m, segments=segments
     )
     start = template.start._replace(position_m=template.start.position_m + plan.shift_m)
     run = template._replace(file=plan.what, holdout=False, commands=commands, start=start, entries=(), clipped={})
     signals = problem.signals(run, point)
     commands = commands._replace(segments=tuple(settled(signals, segment, problem.scales) for segment in segments))
     return run._replace(signals=signals, commands=commands, entries=entries_of(signals, commands, problem.scales))
-
-
-def _cycle_m(rig: RigTable, scales: Scales) -> float:
-    """Drive travel of one stick-slip cycle: the force falls by twice the difference of static and sliding friction.
-
-    It is at least the travel for a tenth of the static friction, so that a run with tiny cycles is long enough to compare.
-    """
-    return max(2.0 * (rig.static_force_N - rig.coulomb_force_N), 0.1 * rig.static_force_N) / scales.stiffness_N_per_m
 
 
 def _travel_m(scales: Scales, cycle_m: float) -> float:

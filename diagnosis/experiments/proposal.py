@@ -5,7 +5,7 @@ either explanation can imitate by changing uncertain numbers of rig, sensors and
 """
 
 import math
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,12 +13,12 @@ import numpy.typing as npt
 from bridge.arrays import Floats
 from bridge.units import signal_name
 from diagnosis.experiments.candidate_runs import Plan, as_run, plans
-from diagnosis.experiments.checks_by_hand import advice
 from diagnosis.features.feature import Feature
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.retuning import ROUGHNESS
-from diagnosis.gap.floor import Floor, compress, floor_of, replicates, slope_of_compress
+from diagnosis.gap.measure import Floor, compress, floor_of, replicates, slope_of_compress
 from diagnosis.gap.problem import Point, Problem
+from diagnosis.hypotheses.catalogue import CATALOGUE, FRAME, SPEEDS, SWEEP, TAP, TRACK, WEIGHT
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.result import Experiment
 from plant.effects.library import EFFECTS
@@ -41,6 +41,10 @@ _CERTAIN = 0.05
 _STEP, _STEP_OF_EFFECT = 0.5, 0.15
 # Difference, in floors, of a feature that only one explanation shows, such as a slip. Larger: slips at the edge decide.
 _MISSING = 4.0
+UNCOUPLE = "Uncouple the drive from the mass and vibrate: any vibration left in the force signal is not force."
+SINE = "Halve the piezo's voltage, then tighten its mount: harmonics of a drive too hard or loose fall faster than the vibration."
+_FORCES = "Move the axis to and fro at 0.2, 1 and 5 times the present speeds, from other positions, with rests of 1, 10 and 60 s."
+_BY_PLACE: Final = {"sensor": WEIGHT, "drive": TAP, "structure": FRAME, "piezo": SWEEP, "friction": SPEEDS}
 
 
 class _Look(NamedTuple):
@@ -207,3 +211,21 @@ def _in_words(feature: Feature) -> str:
         "ripple": f"the ripple of the {signal}",
     }
     return words.get(name.split()[0], f"the level of the {signal}")
+
+
+def advice(effects: tuple[str, ...], drive: str) -> str:
+    """A physical check that separates these effects; with `drive` "force" other motions separate effects of friction."""
+    for a in effects:
+        for b in effects:
+            check = CATALOGUE[a].check_against.get(b) or CATALOGUE[b].check_against.get(a)
+            if check is not None and not (drive == "force" and check in {TRACK, SPEEDS}):
+                return check
+    # checks at a single part come before checks that need runs
+    for places in (("sensor",), ("piezo", "structure", "drive"), ("friction",)):
+        for name in effects:
+            place = EFFECTS[name].acts_on
+            if place in places:
+                if drive == "force" and place == "friction":
+                    return _FORCES
+                return CATALOGUE[name].check or _BY_PLACE[place]
+    return _FORCES if drive == "force" else SPEEDS

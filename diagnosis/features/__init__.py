@@ -6,7 +6,5 @@ slips                       the slips of a segment, with weights, and the instan
 feature                     definition of a feature
 spring_drive, force_drive   the features of a run with a spring drive, and with a force drive
 axis_motion                 the measured motion that a force-driven model is made to follow
-moving_mean                 a moving mean, compiled
-spring_law                  the force as a function of the spring's extension
 noise                       the noise of a run, taken from the run
 """

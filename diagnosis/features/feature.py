@@ -40,29 +40,26 @@ class Scales(NamedTuple):
 
 
 class Features:
-    """Collector of the features of one run, with labels on request."""
+    """Collector of the features of one run, each with its label."""
 
-    def __init__(self, labelled: bool = True) -> None:
-        self._labels: list[tuple[str, str, str, Band, int]] | None = [] if labelled else None
+    def __init__(self) -> None:
+        self._labels: list[tuple[str, str, str, Band, int]] = []
         self.values: list[float] = []
 
     @property
     def labels(self) -> list[Feature]:
-        """Label of every value, in order; none without labels."""
-        return [Feature(*label) for label in self._labels or ()]
+        """Label of every value, in order."""
+        return [Feature(*label) for label in self._labels]
 
     def add(self, name: str, signal: str, regime: str, band_Hz: Band, segment: int, value: float) -> None:
         """Append one number; NaN where this run has no such feature."""
-        if self._labels is not None:
-            self._labels.append((name, signal, regime, band_Hz, segment))
-        self.values.append(value)
+        self.add_all([(name, regime)], signal, band_Hz, segment, [value])
 
     def add_all(
         self, names: Sequence[tuple[str, str]], signal: str, band_Hz: Band, segment: int, values: Sequence[float]
     ) -> None:
         """Append several numbers of one signal and band; `names`: name and regime of each."""
-        if self._labels is not None:
-            self._labels += [(name, signal, regime, band_Hz, segment) for name, regime in names]
+        self._labels += [(name, signal, regime, band_Hz, segment) for name, regime in names]
         self.values += values
 
 

@@ -105,21 +105,15 @@ def _first(motion: SlideMotion, rig: RigTable) -> int:
     return max(int(np.argmax(travel_m > _forgetting_m(rig))), _EDGE)
 
 
+def _sums(values: Floats, bins: Indices, count: int) -> tuple[Floats, Indices]:
+    """Sum of `values` [blocks] in each bin, and number of blocks in it, [count] each."""
+    return np.bincount(bins, values, count).astype(np.float64), np.bincount(bins, minlength=count)
+
+
 def _means(values: Floats, bins: Indices, count: int) -> Floats:
     """Mean of `values` [blocks] in each bin, [count]; NaN where a bin holds too few blocks."""
-    held = np.bincount(bins, minlength=count)
-    sums = np.bincount(bins, values, count)
+    sums, held = _sums(values, bins, count)
     return np.where(held >= _FEWEST, sums / np.maximum(held, 1), np.nan)
-
-
-def _profile(values: Floats, bins: Indices, count: int) -> Floats:
-    """Mean of `values` [blocks] in each bin, [count], shrunk towards 0 in bins with fewer blocks than the median bin.
-
-    The mean at a position that the motion passes only once is mostly roughness.
-    """
-    held = np.bincount(bins, minlength=count)
-    sums = np.bincount(bins, values, count)
-    return sums / np.maximum(held, max(float(np.median(held)), 1.0))
 
 
 def _without_curve(
@@ -178,7 +172,9 @@ def _waves(features: Features, rest_N: Floats, motion: SlideMotion, sliding: npt
     ):
         bins = waves * _BINS_PER_WAVE
         at = np.minimum((over * bins).astype(np.int64), bins - 1)
-        profile = _profile(values[sliding], at[sliding], bins)
+        sums, held = _sums(values[sliding], at[sliding], bins)
+        # shrunk towards 0 in bins with fewer blocks than the median bin: a place that is passed only once shows roughness
+        profile = sums / np.maximum(held, max(float(np.median(held)), 1.0))
         weights = np.asarray(dct(profile))[1 : waves + 1] / bins
         for wave, value in enumerate(weights.tolist(), start=1):
             features.add(f"{name} {wave}", "drive_force_N", "steady", LOW, -1, value)

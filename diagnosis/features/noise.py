@@ -64,16 +64,14 @@ def noise_of(signals: Signals, commands: CommandedRun, scales: Scales) -> RunNoi
     quiet[:_WINDOW] = quiet[-_WINDOW:] = False  # at the ends the mean is one-sided, and a ramp would leave spikes
     still = quiet & (commands.frequency_Hz == 0.0)
     for name, values in signals.items():
+        rest = (values - uniform_filter1d(values, _WINDOW))[quiet]
         if name.endswith("shake_mps2"):
-            calm = values[still] if still.any() else np.zeros(1)
-            shake[name] = float(np.median(calm))
-            spread = values - uniform_filter1d(values, _WINDOW)
-            pieces[name] = spread[quiet]
+            shake[name] = float(np.median(values[still])) if still.any() else 0.0
+            pieces[name] = rest
         elif name.endswith("accel_mps2") and still.sum() >= _FEWEST_STILL:
             pieces[name] = values[still]
         else:
-            rest = values - uniform_filter1d(values, _WINDOW)
-            pieces[name] = rest[quiet] * (_WINDOW / (_WINDOW - 1.0)) ** 0.5
+            pieces[name] = rest * (_WINDOW / (_WINDOW - 1.0)) ** 0.5
     return RunNoise(pieces, shake, _SLOW_SHARE * scales.force_N)
 
 

@@ -106,14 +106,9 @@ def commands_of(run: MeasuredRun, rig: RigTable, reduced: dict[str, Floats]) -> 
             return CommandedRun(rate, frequency_Hz, amplitude_m, (), changing_s=blocks * BLOCK_S)
     change = (np.diff(drive) != 0.0) | (np.diff(frequency_Hz) != 0.0) | (np.diff(amplitude_m) != 0.0)
     edges = [0, *(np.flatnonzero(change) + 1).tolist(), blocks]
+    f_Hz, u0_m = frequency_Hz, amplitude_m
     segments = tuple(
-        Segment(
-            first + _SETTLING,
-            last,
-            float(drive[first]),
-            float(frequency_Hz[first]),
-            float(amplitude_m[first]),
-        )
+        Segment(first + _SETTLING, last, float(drive[first]), float(f_Hz[first]), float(u0_m[first]))
         for first, last in pairwise(edges)
         if (last - first) * BLOCK_S >= SHORTEST_S
     )

@@ -39,11 +39,6 @@ class SegmentSlips(NamedTuple):
     middles: Floats  # instants of mid-fall
     weights: Floats  # 0 to 1
 
-    @property
-    def some(self) -> bool:
-        """Whether the slips have enough weight to be compared."""
-        return float(self.weights.sum()) > 0.1
-
 
 def slip_pairs(slips: SegmentSlips) -> Floats:
     """Weight of each stick between two slips, [slips - 1]."""

@@ -6,36 +6,133 @@ measured and a predicted run pass through the same code; a feature that a run do
 """
 
 import math
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
+import numpy.typing as npt
 from scipy.fft import dct
+from scipy.ndimage import uniform_filter1d
 
 from bridge.arrays import Floats
 from diagnosis.features.feature import DRIVE_WAVES, HIGH, LOW, MIDDLE, RESOLVED_M, Features, Scales, Signals
 from diagnosis.features.grid import BLOCK_S
-from diagnosis.features.moving_mean import moving_mean
 from diagnosis.features.segments import CommandedRun, Segment
 from diagnosis.features.slips import NO_SLIPS, SHAPE_AT, SegmentSlips, find_slips, slip_pairs
-from diagnosis.features.spring_law import spring_bend, spring_law
 
-_LOW_AND_HIGH = np.array([0.05, 0.95])
+_ENTRY_MARGIN = 10  # blocks left out around the start of a segment: longer than the delays of a measuring chain
+# Widths of two moving means, in slip durations; the bend is fitted to the band between them. Shorter short mean: noise of the
+# displacement sensors, which grows with the square of frequency; longer: it smears the slip. Longer long mean: a sensor's bow
+# looks like a bend; shorter: the slip is removed. Counted on 60 rigs without a gap (docs/method/diagnosis.md).
+_SHORT, _LONG = 0.25, 8.0
+_LOW_AND_HIGH = 0.05, 0.95
 _LEVELS = 8  # number of bins over a segment without slips
 _BREAKAWAY_WAVES = 5  # half waves of the breakaway force over a segment; more follow shorter friction waves and noise
+_CYCLE_WAVES = {"breakaway": _BREAKAWAY_WAVES, "restick": 3}
+_LACKING = [math.nan] * _BREAKAWAY_WAVES
+_MOMENTS = {
+    regime: tuple((name, regime) for name in ("mean", *(f"wave {wave}" for wave in range(1, waves + 1)), "scatter"))
+    for regime, waves in _CYCLE_WAVES.items()
+}
+_RATES = tuple((f"rate {part}", "stick") for part in ("early", "middle", "late"))
+_LEVEL_NAMES = tuple(
+    (name, "steady")
+    for name in ("mean level", "deviation", "low level", "high level", *(f"level {bin_}" for bin_ in range(_LEVELS)))
+)
+_DRIVE_WAVES = tuple((f"wave {wave}", "steady") for wave in range(1, DRIVE_WAVES + 1))
 
 
-def spring_features(signals: Signals, commands: CommandedRun, scales: Scales, labelled: bool = True) -> Features:
+def spring_law(
+    force_N: Floats, extension_m: Floats, segments: Sequence[Segment], scale_N: float, stiffness_N_per_m: float
+) -> dict[str, float]:
+    """Part of the force [N] that follows the extension, its rate, its cube, time and direction; and the rest's mean square.
+
+    The parts are fitted one after the other: stiffness, rate, cube, time, direction (NaN in a run of one direction), rest.
+
+    Args:
+        force_N, extension_m: [blocks] each.
+        segments: segments of the run.
+        scale_N, stiffness_N_per_m: typical force and stiffness, which scale the columns.
+
+    """
+    even = _away_from_entries(segments, len(force_N), _ENTRY_MARGIN)
+    rate_mps = np.gradient(uniform_filter1d(extension_m, 5), BLOCK_S)[even]
+    force_N, extension_m = force_N[even], extension_m[even]
+    extension_m = extension_m - extension_m.mean() + force_N.mean() / stiffness_N_per_m
+    reaches = extension_m * (stiffness_N_per_m / scale_N)
+    both = force_N.min() < -0.3 * scale_N and force_N.max() > 0.3 * scale_N
+    columns = {
+        "stiffness": reaches,
+        "rate": rate_mps * 1e3,
+        "cube": reaches * reaches * reaches,  # `**` would take as long as the rest of this function
+        "time": np.linspace(-1.0, 1.0, len(even))[even],
+    }
+    if both:
+        columns["direction"] = np.sign(force_N)
+    law, rest = _sequential_fit(columns, force_N)
+    law.setdefault("direction", math.nan)
+    return law | {"rest": max(rest, 0.0) / len(force_N)}
+
+
+def spring_bend(force_N: Floats, extension_m: Floats, segments: Sequence[Segment], slip_s: float) -> float:
+    """The force [N] for each m/s2 of the extension's second derivative, in the band of the slips.
+
+    A force with a delay of T is F - T F' + T^2 F'' / 2. Behind n equal low-passes with the same total delay, the factor of T^2
+    F'' is (n + 1) / (2 n) instead of 1/2. A swinging frame bends the force without a delay. So the bend separates a delay, a
+    low-pass and a frame.
+    """
+    short, long = (max(round(slips * slip_s / BLOCK_S), 1) for slips in (_SHORT, _LONG))
+    level_m = uniform_filter1d(extension_m, short)
+    padded_m = np.pad(level_m, short, mode="edge")
+    earlier_m, later_m = padded_m[: -2 * short], padded_m[2 * short :]
+    columns = {
+        "stiffness": level_m,
+        "rate": (later_m - earlier_m) / (2 * short * BLOCK_S),
+        "bend": (later_m - 2.0 * level_m + earlier_m) / (short * BLOCK_S) ** 2,
+    }
+    even = _away_from_entries(segments, len(force_N), _ENTRY_MARGIN + 2 * short)
+    fast = {name: (values - uniform_filter1d(values, long))[even] for name, values in columns.items()}
+    level_N = uniform_filter1d(force_N, short)
+    law, _ = _sequential_fit(fast, (level_N - uniform_filter1d(level_N, long))[even])
+    return law["bend"]
+
+
+def _away_from_entries(segments: Sequence[Segment], blocks: int, about: int) -> npt.NDArray[np.bool_]:
+    """Marks [blocks] without `about` blocks around the start of each segment, where the model starts at the measured force."""
+    even = np.ones(blocks, np.bool_)
+    for segment in segments:
+        if segment.still or segment.slips > 0:
+            even[max(segment.first - about, 0) : segment.first + about] = False
+    return even
+
+
+def _sequential_fit(columns: Mapping[str, Floats], force_N: Floats) -> tuple[dict[str, float], float]:
+    """Coefficient of the force [blocks] on each column, orthogonal to the columns before it; and the rest's sum of squares.
+
+    A fit of all columns at once would transfer the noise of a column to the others.
+    """
+    centred = np.array([*columns.values(), force_N])
+    centred -= centred.mean(axis=1, keepdims=True)
+    products = centred @ centred.T
+    shares: dict[str, float] = {}
+    for i, name in enumerate(columns):
+        freed = products[i] / (products[i, i] + 1e-30)
+        shares[name] = float(freed[-1])
+        products -= np.outer(products[i], freed)
+    return shares, float(products[-1, -1])
+
+
+def spring_features(signals: Signals, commands: CommandedRun, scales: Scales) -> Features:
     """All features of a run with a spring drive; the list of features depends on commands and channels alone.
 
     Args:
         signals: [blocks] each, measured or predicted, from `without_vibration`.
         commands: commands of the run, with settled segments.
         scales: scales of the rig.
-        labelled: whether the labels are wanted; without them the call takes a tenth less time.
 
     """
-    features = Features(labelled)
+    features = Features()
     for number, segment in enumerate(commands.segments):
         inside = slice(segment.first, segment.last)
         cut = {
@@ -56,15 +153,6 @@ def spring_features(signals: Signals, commands: CommandedRun, scales: Scales, la
     if "drive_position_m" in signals:
         _drive(features, signals["drive_position_m"], commands)
     return features
-
-
-_CYCLE_WAVES = {"breakaway": _BREAKAWAY_WAVES, "restick": 3}
-_LACKING = [math.nan] * _BREAKAWAY_WAVES
-_MOMENTS = {
-    regime: tuple((name, regime) for name in ("mean", *(f"wave {wave}" for wave in range(1, waves + 1)), "scatter"))
-    for regime, waves in _CYCLE_WAVES.items()
-}
-_RATES = tuple((f"rate {part}", "stick") for part in ("early", "middle", "late"))
 
 
 def _cycles(
@@ -121,12 +209,6 @@ def _period(features: Features, number: int, slips: SegmentSlips, segment: Segme
     features.add("period", "drive_force_N", "stick", LOW, number, value)
 
 
-_LEVEL_NAMES = tuple(
-    (name, "steady")
-    for name in ("mean level", "deviation", "low level", "high level", *(f"level {bin_}" for bin_ in range(_LEVELS)))
-)
-
-
 def _level(features: Features, number: int, force_N: Floats, slips: SegmentSlips, segment: Segment) -> None:
     """Add levels of the force: over complete cycles with the weights of their slips; over the segment without slips.
 
@@ -144,32 +226,24 @@ def _level(features: Features, number: int, force_N: Floats, slips: SegmentSlips
         total = counts.sum()
         mean_N = (counted_N * counts).sum() / total
         about_N = counted_N - mean_N
-        levels = np.array([mean_N, ((about_N * about_N) * counts).sum() / total, *_quantiles(counted_N, counts)])
+        levels = np.array(
+            [
+                mean_N,
+                ((about_N * about_N) * counts).sum() / total,
+                *np.quantile(counted_N, _LOW_AND_HIGH, weights=counts, method="inverted_cdf"),
+            ]
+        )
         levels[1] **= 0.5
     bins = [math.nan] * _LEVELS
     middle = fast = math.nan
     if still:
         edges = np.linspace(0, len(force_N), _LEVELS + 1).astype(np.int64).tolist()
-        bins = [_mean(force_N[first:last]) for first, last in pairwise(edges)]
-        short = moving_mean(force_N, 5)
-        middle, fast = float(np.var(short - moving_mean(force_N, 100))), float(np.var(force_N - short))
+        bins = [float(force_N[first:last].mean()) for first, last in pairwise(edges)]
+        short = uniform_filter1d(force_N, 5)
+        middle, fast = float(np.var(short - uniform_filter1d(force_N, 100))), float(np.var(force_N - short))
     features.add_all(_LEVEL_NAMES, name, LOW, number, [*levels.tolist(), *bins])
     features.add("ripple", name, "steady", MIDDLE, number, middle)
     features.add("ripple", name, "steady", HIGH, number, fast)
-
-
-def _quantiles(values: Floats, weights: Floats) -> Floats:
-    """Same result as `numpy.quantile` at 5 and 95 % by the inverted distribution, in a fifth of its time."""
-    order = np.argsort(values)
-    share = weights[order].cumsum()
-    share /= share[-1]
-    quantiles = values[order[np.minimum(np.searchsorted(share, _LOW_AND_HIGH), len(values) - 1)]]
-    return np.full(2, np.nan) if np.isnan(values[order[-1]]) else quantiles  # NaN: the model diverges
-
-
-def _mean(values: Floats) -> float:
-    """Same result as `values.mean()`, which takes five times as long for some hundred values."""
-    return float(np.add.reduce(values)) / len(values)
 
 
 def _regime(at: float) -> str:
@@ -188,7 +262,7 @@ def _shapes(
     if not names:
         return
     shapes, powers = np.full((len(names), len(SHAPE_AT)), np.nan), np.full(len(names), np.nan)
-    if slips.some:
+    if float(slips.weights.sum()) > 0.1:
         signals = np.array([cut[name] for name in names])
         last = signals.shape[1] - 1
         inside = slips.weights > 0.0
@@ -198,7 +272,7 @@ def _shapes(
         before = np.minimum(at.astype(np.int64), last - 1)
         low = signals[:, before]
         shapes = weights @ (low + (at - before) * (signals[:, before + 1] - low))
-        fast = np.array([signal - moving_mean(signal, 5) for signal in signals])
+        fast = np.array([signal - uniform_filter1d(signal, 5) for signal in signals])
         rings = fast[:, np.minimum((middles + np.arange(int(3.0 * width))).astype(np.int64), last)]
         powers = np.einsum("nij,nij,i->n", rings, rings, weights) / rings.shape[2]
     for i, name in enumerate(names):
@@ -240,9 +314,6 @@ def _parity(features: Features, signals: Signals, commands: CommandedRun, scales
         features.add(f"spring {name}", "drive_force_N", "stick", MIDDLE if name == "rest" else LOW, -1, value)
 
 
-_DRIVE_WAVES = tuple((f"wave {wave}", "steady") for wave in range(1, DRIVE_WAVES + 1))
-
-
 def _drive(features: Features, position_m: Floats, commands: CommandedRun) -> None:
     """Add waves and power of the drive position's deviation from a line and a bow in each segment."""
     rest_m = np.zeros_like(position_m)
@@ -251,7 +322,7 @@ def _drive(features: Features, position_m: Floats, commands: CommandedRun) -> No
         rest_m[rows] = _without_line(position_m[rows], segment)
     waves = np.asarray(dct(rest_m))[1 : DRIVE_WAVES + 1] / len(rest_m)
     features.add_all(_DRIVE_WAVES, "drive_position_m", LOW, -1, waves.tolist())
-    fast = rest_m - moving_mean(rest_m, 100)
+    fast = rest_m - uniform_filter1d(rest_m, 100)
     features.add("rest", "drive_position_m", "steady", MIDDLE, -1, float(fast.var()) + RESOLVED_M**2)
 
 

@@ -10,7 +10,7 @@ NEVER_WITHOUT_GAP = 1.8
 # A fit beyond this limit leaves more than a right model would. Too small: right effects are called unexplained.
 # Too large: an effect outside the library passes for one inside. Counted: docs/method/diagnosis.md.
 MUCH = 1.6
-# Chi2 of a perfect model, per compared feature, from which noise is said to hide the slips; the floor is doubtful there.
+# Chi2 of a perfect model, per compared feature, from which noise counts as hiding the slips; the floor is doubtful there.
 # Too small: ordinary evidence is called hidden. Too large: scatter is searched for effects. Counted: docs/method/diagnosis.md.
 _HIDDEN_BY_NOISE = 0.4
 

@@ -46,7 +46,7 @@ def prior_of(hypothesis: Hypothesis, deviations: Floats) -> Floats:
 def step_within(normal: Floats, gradient: Floats, at: Floats, most: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
     """The Newton step from `at` [parameters], and which parameters it moves [parameters].
 
-    A nuisance that stands at its bound stays there if the step would take it beyond.
+    A nuisance at its bound stays there if the step would take it beyond.
 
     Args:
         normal: matrix of the normal equations [parameters, parameters].

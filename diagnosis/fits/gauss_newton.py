@@ -13,8 +13,7 @@ import numpy as np
 from bridge.arrays import Floats
 from diagnosis.fits.batch import At, Question, Work, together
 from diagnosis.fits.fit import Fit, prior_of, step_within
-from diagnosis.gap.floor import KNEE, Floor
-from diagnosis.gap.measure import differences, whitened
+from diagnosis.gap.measure import KNEE, Floor, differences, whitened
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.hypothesis import LEVELS, NOTHING, Hypothesis
 from diagnosis.hypotheses.nuisances import Nuisances
@@ -24,13 +23,14 @@ from diagnosis.model.rig import Effects
 # the narrow line of a wave's period. Too large: coarser coordinates get derivatives of mere grid noise.
 _NARROW = 0.1
 # Bounds of the rig's numbers, in tolerances: a deviation beyond is a gap, not a tolerance.
-# Too small: a right rig is held back. Too large: the rig takes what an effect causes. Counted: docs/method/diagnosis.md.
+# Too small: a right rig is held back. Too large: the rig absorbs an effect. Counted: docs/method/diagnosis.md.
 _MOST_TOLERANCES = 3.3
 # The same for lags and corners of the sensors, in their assumed spreads: wider, as no tolerance is stated for them.
 _MOST_OF_CHAIN = 5.0
 # Gain in chi2 below which a step counts as none. Too small: fits creep on. Too large: fits stop before they are done.
 _WORTH_A_STEP = 0.5
-# The same as a share of chi2, but for the baseline, which every fit is compared with: creeping on costs time and changes no name.
+# The same as a share of chi2, except for the baseline, with which every fit is compared: creeping on costs time and changes
+# no name.
 _WORTH_OF_CHI2 = 0.01
 # Shares of the Newton step that are tried, until one gains. Without the small share a curved valley stops the fit; each further
 # share costs a prediction where nothing gains. Counted: docs/method/diagnosis.md.
@@ -46,7 +46,7 @@ class FitStage(NamedTuple):
     steps: int  # at most
     renewals: int  # renewals of the nuisances' derivatives that may gain nothing before the fit ends
     knee: float  # of the compression, in noise floors
-    # whether to compute the derivatives where the fit ends; otherwise those of the last step stay
+    # whether to compute the derivatives where the fit ends; otherwise the derivatives of the last step stay
     columns: bool = True
     worth: float = _WORTH_OF_CHI2  # gain below which a step counts as none, as a share of chi2
 
@@ -193,19 +193,15 @@ class Fitter:
         return (yield from self.fitting(hypothesis, deviations, w, _NEAR))
 
     def trying(self, hypothesis: Hypothesis, deviations: Floats, w: Floats, baseline_chi2: float) -> Work[Fit]:
-        """As `refitting`, but stop after the first steps where chi2 is about that of the baseline, `baseline_chi2`."""
+        """As `refitting`, but stop after the first steps where chi2 is about the chi2 of the baseline, `baseline_chi2`."""
         fit = yield from self.fitting(hypothesis, deviations, w, _FAR)
         fit = yield from self._judging(fit)
         if _NO_LESS * baseline_chi2 < fit.chi2 < _ASTRAY * baseline_chi2:
             return fit
         return (yield from self.fitting(hypothesis, fit.deviations, fit.w, _NEAR))
 
-    def further(self, fit: Fit) -> Fit:
-        """Refit a fit again as long as chi2 falls."""
-        return together(self.predicted_many, [self.going_further(fit)])[0]
-
     def going_further(self, fit: Fit) -> Work[Fit]:
-        """As `further`, as a work that proceeds beside others; a finished fit is returned as it is."""
+        """Refit a fit again as long as chi2 falls; a finished fit is returned unchanged."""
         for _ in range(_MORE_REFITS):
             if fit.finished:
                 break

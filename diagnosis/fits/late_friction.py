@@ -9,12 +9,11 @@ import math
 
 import numpy as np
 
-from bridge.arrays import Floats
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.fits.refits import Start, refits
 from diagnosis.hypotheses.starts import Trial
-from diagnosis.processes import each
+from diagnosis.processes import spread
 
 EFFECT = "frictional-lag"
 _LATER = (1.0, 3.0, 10.0)  # times the longest lag that the library begins with: up to longer than a slip
@@ -28,7 +27,7 @@ def late_fits(fitter: Fitter, trials: list[Trial], jobs: int = 1) -> list[Fit]:
     fits = _refits(fitter, late_starts(fitter, trials, jobs), jobs)
     for fit in [fit for fit in fits if _is_late_in_time(fit)][:1]:  # from the numbers of all runs other teeth stand out
         fits += _refits(fitter, _teeth(fitter, fit, jobs), jobs)
-    return sorted(fits, key=_chi2)
+    return sorted(fits, key=lambda fit: fit.chi2)
 
 
 def late_starts(fitter: Fitter, trials: list[Trial], jobs: int = 1) -> list[Start]:
@@ -57,11 +56,7 @@ def late_starts(fitter: Fitter, trials: list[Trial], jobs: int = 1) -> list[Star
 
 def _refits(fitter: Fitter, starts: list[Start], jobs: int) -> list[Fit]:
     """Best first."""
-    return sorted(refits(fitter, starts, jobs), key=_chi2)
-
-
-def _chi2(fit: Fit) -> float:
-    return fit.chi2
+    return sorted(refits(fitter, starts, jobs), key=lambda fit: fit.chi2)
 
 
 def _is_late_in_time(fit: Fit) -> bool:
@@ -78,17 +73,10 @@ def _teeth(fitter: Fitter, fit: Fit, jobs: int) -> list[Start]:
     tried = [
         np.array([math.log(lag_s / axis.scale), *fit.w[1:]]) for lag_s in np.linspace(low_s, high_s, count).tolist()
     ]
-    chi2 = np.full(count + 2, math.inf)
-    for i, share in enumerate(each(jobs, _chi2s, fitter, [(fit, tried[i::jobs]) for i in range(jobs)])):
-        chi2[1 + i : 1 + count : jobs] = share
+    points = [(fit.deviations, fit.hypothesis.tables(w)) for w in tried]
+    residuals = [fitter.whitened(features)[0] for features in spread(jobs, Fitter.predicted_many, fitter, points)]
+    # of the differences alone: the priors hardly change along a dead time
+    chi2 = [math.inf, *(float(residual @ residual) for residual in residuals), math.inf]
     teeth = [i for i in range(count) if chi2[i + 1] <= min(chi2[i], chi2[i + 2])]
     best = sorted(teeth, key=lambda i: chi2[i + 1])[:_TEETH]
     return [(fit.hypothesis, fit.deviations, tried[i]) for i in best]
-
-
-def _chi2s(fitter: Fitter, share: tuple[Fit, list[Floats]]) -> list[float]:
-    """Of the differences alone: the priors hardly change along a dead time."""
-    fit, tried = share
-    predicted = fitter.predicted_many([(fit.deviations, fit.hypothesis.tables(w)) for w in tried])
-    residuals = [fitter.whitened(features)[0] for features in predicted]
-    return [float(residual @ residual) for residual in residuals]

@@ -6,7 +6,6 @@ runs give eight phases for each run, in any combination (docs/method/diagnosis.m
 """
 
 import math
-from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -16,8 +15,8 @@ from diagnosis.fits.gauss_newton import FAR_KNEE, Fitter
 from diagnosis.fits.refits import Start
 from diagnosis.hypotheses.starts import Trial, wave_trial
 from diagnosis.hypotheses.waves import Wave
-from diagnosis.model.per_run import PHASE, phase_of
-from diagnosis.processes import each
+from diagnosis.model.per_run import PHASE, of_run
+from diagnosis.processes import spread
 
 EFFECT, FORM = "normal-load-fluctuation", "sine"
 _PHASES_RAD = 2.0 * math.pi * np.arange(8) / 8.0  # that a run may begin in
@@ -42,14 +41,14 @@ def starts_by_run(fitter: Fitter, origin: Fit, trials: list[Trial], jobs: int = 
             frequency = coordinates["frequency_Hz"]
             slowest_Hz = frequency.low
             waves[frequency.scale] = Wave(1.0 / frequency.scale, 0.0, 0.0, spread=frequency.prior)
-    shares = each(jobs, _in_best_phases, fitter, [(origin, list(waves.values())[i::jobs]) for i in range(jobs)])
-    best = sorted(chain.from_iterable(shares), key=lambda tried: tried.chi2)[:_MOST]
+    in_phase = spread(jobs, _in_best_phases, (fitter, origin), list(waves.values()))
+    best = sorted(in_phase, key=lambda tried: tried.chi2)[:_MOST]
     wave_trials = [wave_trial(EFFECT, FORM, tried.wave, slowest_Hz) for tried in best]
     return [(trial.hypothesis, origin.deviations, trial.w) for trial in wave_trials]
 
 
-def _in_best_phases(fitter: Fitter, share: tuple[Fit, list[Wave]]) -> list[_TriedWave]:
-    origin, waves = share
+def _in_best_phases(shared: tuple[Fitter, Fit], waves: list[Wave]) -> list[_TriedWave]:
+    fitter, origin = shared
     files = [run.file for run in fitter.problem.runs]
     run_of = np.array([files.index(run) for *_, run in fitter.floor.cells])
     tried_waves: list[_TriedWave] = []
@@ -62,7 +61,7 @@ def _in_best_phases(fitter: Fitter, share: tuple[Fit, list[Wave]]) -> list[_Trie
         chi2 = by_run.min(axis=1).sum(axis=1)
         best = int(chi2.argmin())
         first_rad, *others_rad = _PHASES_RAD[by_run[best].argmin(axis=0)].tolist()
-        phases_of = {phase_of(file): phase_rad for file, phase_rad in zip(files[1:], others_rad, strict=True)}
+        phases_of = {of_run(PHASE, file): phase_rad for file, phase_rad in zip(files[1:], others_rad, strict=True)}
         in_phase = wave._replace(ratio=_RATIOS[best], phase_rad=first_rad, phases_of=phases_of)
         tried_waves.append(_TriedWave(float(chi2[best]), in_phase))
     return tried_waves

@@ -50,9 +50,9 @@ class Scattered(NamedTuple):
 
 
 class _Paths(NamedTuple):
-    """What random paths of one length do to the whitened differences."""
+    """The effect of random paths of one length on the whitened differences."""
 
-    table: dict[str, float]  # parameters of the effect but for its seed
+    table: dict[str, float]  # parameters of the effect except its seed
     mean: Floats  # [compared]
     covariance: Floats  # [compared, compared]
 

@@ -10,7 +10,7 @@ from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.fits.screening import Screened
 from diagnosis.hypotheses.hypothesis import Hypothesis
 from diagnosis.hypotheses.starts import Trial
-from diagnosis.processes import each
+from diagnosis.processes import spread
 
 # start of a refit: the hypothesis, its nuisances in tolerances [nuisances], its coordinates [coordinates]
 Start = tuple[Hypothesis, Floats, Floats]
@@ -21,7 +21,7 @@ T = TypeVar("T")
 
 
 def refits(fitter: Fitter, starts: Sequence[Start], jobs: int) -> list[Fit]:
-    """Refit from every start to the end, in `jobs` processes; the fits stand in the order of the starts."""
+    """Refit from every start to the end, in `jobs` processes; the fits have the order of the starts."""
     return each_beside(jobs, _refitting, fitter, starts)
 
 
@@ -30,13 +30,12 @@ def _refitting(fitter: Fitter, start: Start) -> Work[Fit]:
 
 
 def each_beside(jobs: int, work: Callable[[Fitter, T], Work[Fit]], fitter: Fitter, items: Sequence[T]) -> list[Fit]:
-    """Turn every item into a fit, many at once in each of `jobs` processes; the fits stand in the order of the items."""
-    shares = each(jobs, _share, fitter, [(work, items[i::jobs]) for i in range(jobs)])
-    return [shares[number % jobs][number // jobs] for number in range(len(items))]
+    """Turn every item into a fit, many at once in each of `jobs` processes; the fits have the order of the items."""
+    return spread(jobs, _fitted, (fitter, work), items)
 
 
-def _share(fitter: Fitter, share: tuple[Callable[[Fitter, T], Work[Fit]], Sequence[T]]) -> list[Fit]:
-    work, items = share
+def _fitted(shared: tuple[Fitter, Callable[[Fitter, T], Work[Fit]]], items: list[T]) -> list[Fit]:
+    fitter, work = shared
     return together(fitter.predicted_many, [work(fitter, item) for item in items])
 
 

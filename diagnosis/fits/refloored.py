@@ -12,7 +12,7 @@ from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.fits.refits import best_of_each, refits
 from diagnosis.fits.retuning import REPLICATES, Retuned, expected_chi2
-from diagnosis.gap.floor import floor_of, replicates
+from diagnosis.gap.measure import floor_of, replicates
 
 _FITS = 4  # of single effects, and of pairs, that are fitted again: the others were far behind
 

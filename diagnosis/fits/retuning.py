@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -15,13 +14,12 @@ from diagnosis.fits.batch import together
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.fits.screening import Directions
-from diagnosis.gap.floor import compress, floor_of, replicates
-from diagnosis.gap.measure import between, differences, gap
+from diagnosis.gap.measure import between, compress, differences, floor_of, gap, replicates
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.hypothesis import NOTHING
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.model.rig import Roughness
-from diagnosis.processes import each
+from diagnosis.processes import spread
 
 ROUGHNESS = Roughness(0.003, 1.5e-4, 0)  # before the breakaways of the evidence say more
 _MARGIN = 1.2  # on the roughness: too small a floor makes causes out of scatter
@@ -73,8 +71,8 @@ def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, f
     floor = floor_of(problem, point, replicates(problem, point, roughness, REPLICATES, 2, jobs), floor)
     # where slips come and go chi2 is jagged: from half the way 166 was found instead of 410
     starts = [fit.deviations, 0.5 * fit.deviations]
-    shares = each(jobs, _retuned, Fitter(problem, floor, nuisances), [starts[i::jobs] for i in range(jobs)])
-    fitter, fit = min(chain.from_iterable(shares), key=lambda pair: pair[1].chi2)
+    again = spread(jobs, _retuned, Fitter(problem, floor, nuisances), starts)
+    fitter, fit = min(again, key=lambda pair: pair[1].chi2)
     expected = expected_chi2(fitter, fit, roughness, jobs)
     left = differences(floor, problem, fitter.predicted(fit.deviations, {}))
     progress(f"refitted inside its tolerances, {gap(floor, left):.1f} noise floors are left", 0.25)

@@ -14,7 +14,7 @@ from diagnosis.fits.fit import Fit, step_within
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.hypotheses.hypothesis import Hypothesis
 from diagnosis.hypotheses.starts import Trial
-from diagnosis.processes import each
+from diagnosis.processes import spread
 
 # Bounds of a screened start: times the trial's own size, and tolerances of a nuisance. Too small: large effects look too small
 # to matter. Too large: starts lie where the derivatives no longer hold.
@@ -36,14 +36,14 @@ class Screened(NamedTuple):
 
 
 class Screening(NamedTuple):
-    """What the trials promise, the lowest estimated chi2 first."""
+    """The gains that the trials promise, the lowest estimated chi2 first."""
 
     singles: list[Screened]  # every trial that changes a prediction
     pairs: list[Screened]  # the best pair of trials of every two effects, the first few
 
 
 class Column(NamedTuple):
-    """What a trial changes."""
+    """The change by a trial."""
 
     trial: Trial
     change: Floats  # of the whitened differences [compared]
@@ -87,9 +87,8 @@ def screened(fitter: Fitter, base: Fit, trials: list[Trial], jobs: int = 1, pair
     """What the trials promise in addition to the effects of `base`, and pairs of them where `paired`; in `jobs` processes."""
     trials = [trial for trial in trials if not set(trial.hypothesis.effects) & set(base.hypothesis.effects)]
     directions = Directions(base, fitter.most)
-    shares = each(jobs, _columns, fitter, [(base, trials[i::jobs]) for i in range(jobs)])
     # in the order of the trials: otherwise `jobs` would decide which of two equal trials comes first
-    changes = (shares[number % jobs][number // jobs] for number in range(len(trials)))
+    changes = spread(jobs, _columns, (fitter, base), trials)
     columns = [Column(trial, change, directions.freed(change)) for trial, change in zip(trials, changes, strict=True)]
     columns = [column for column in columns if float(column.direction @ column.direction) >= _LEAST_POWER]
     if not columns:
@@ -110,8 +109,8 @@ def screened(fitter: Fitter, base: Fit, trials: list[Trial], jobs: int = 1, pair
     return Screening(sorted(singles, key=lambda single: single.chi2), pairs)
 
 
-def _columns(fitter: Fitter, work: tuple[Fit, list[Trial]]) -> list[Floats]:
-    base, trials = work
+def _columns(shared: tuple[Fitter, Fit], trials: list[Trial]) -> list[Floats]:
+    fitter, base = shared
     base_features = fitter.predicted(base.deviations, base.effects)
     slope = fitter.whitened(base_features)[1]
     moved = fitter.predicted_many(

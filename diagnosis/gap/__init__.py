@@ -2,7 +2,5 @@
 
 prepare   measured runs, reduced and cut into segments
 problem   measured features, and predicted features for any rig numbers, sensor chain and effects
-floor     the noise floor: the difference that remains with a perfect model
-measure   the gap in noise floors, by cell (signal x regime x band x run)
-excerpt   shortening of long records before simulation
+measure   the noise floor: the difference that remains with a perfect model; the gap in noise floors, by cell
 """

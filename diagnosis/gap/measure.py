@@ -16,12 +16,31 @@ logarithm beyond: a ripple of 500 floors in a very accurate drive position prove
 hide all other differences.
 """
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
+import numpy.typing as npt
 
 from bridge.arrays import Floats
-from diagnosis.gap.floor import KNEE, CellKey, Floor, cell_means, compress, logarithms, slope_of_compress
-from diagnosis.gap.problem import Problem
+from diagnosis.features.feature import DRIVE_WAVES, POWERS, Feature
+from diagnosis.gap.problem import Draw, Point, Problem
+from diagnosis.model.rig import Roughness
+from diagnosis.processes import spread
 
+# Difference, in noise floors, up to which it counts in full; beyond, it counts as its logarithm.
+# Too small: large differences, which identify the effect, count little. Too large: a signal that is far off hides all others.
+KNEE = 6.0
+_LEAST_POWER = 1e-30  # squared unit of the signal: keeps the logarithm of a power finite; far below any sensor's noise
+# Smallest scatter of "spring bend" [s2 x stiffness]: the bend of the force over the extension due to sensors.
+# Too small: rigs without a gap show a bend. Too large: a slow and a delayed force sensor are not separated.
+# Counted on 20 rigs without a gap (docs/method/diagnosis.md).
+_SENSORS_BEND_S2 = 1e-7
+_SHORT_WAVES = frozenset(f"wave {number}" for number in range(5, DRIVE_WAVES + 1))  # shorter than a sensor's bow
+# Share of the replicates in which a feature must be finite to be compared.
+# Too small: its scatter comes from few replicates. Too large: features of segments with few slips are lost.
+_FEWEST_FINITE = 0.75
+CellKey = tuple[str, str, tuple[float, float], str]
 DEFINITION = (
     "root mean square, over cells of signal x regime x band x run, of the differences between measured and predicted "
     "features (cycle means and trends, slip shapes, levels, vibration, parity relations), each in units of the scatter of "
@@ -37,6 +56,248 @@ _LACKING = 8.0
 # Too small: models that lose slips win. Too large: a fit that starts with late slips cannot recover.
 # Counted on one late slip (docs/method/diagnosis.md).
 _LACKING_SLIP = 5.0
+
+
+class Floor(NamedTuple):
+    """The noise floor of each feature.
+
+    The features belong to one `Problem`. Arrays are [features], in the unit of each feature, unless stated otherwise.
+    """
+
+    bias: Floats  # mean of the replicates less the noise-free prediction; 0 or more for powers
+    powers: npt.NDArray[np.bool_]  # features that are powers: noise adds to them, and they are compared as logarithms
+    scatter: Floats  # one noise floor; of the logarithm for powers
+    compared: npt.NDArray[np.bool_]
+    whitening: Floats  # [compared, compared]: makes differences of replicates independent
+    cells: tuple[CellKey, ...]  # [compared]: the cell of every compared feature
+    level: float  # root mean square of the replicates themselves over the cells, in noise floors
+
+    def expected(self, predicted: Floats) -> Floats:
+        """Expected features of a rough and noisy rig whose noise-free prediction is `predicted`; [features] each.
+
+        A power is returned as half its logarithm.
+        """
+        return logarithms(predicted + self.bias, self.powers)
+
+    def of_features(self, mask: npt.NDArray[np.bool_]) -> "Floor":
+        """The floor of the features marked in `mask` [features]: all features of one or several runs.
+
+        Runs are independent of each other, so the whitening may be cut at their borders.
+        """
+        rows = mask[self.compared]
+        return Floor(
+            bias=self.bias[mask],
+            powers=self.powers[mask],
+            scatter=self.scatter[mask],
+            compared=self.compared[mask],
+            whitening=self.whitening[rows][:, rows],
+            cells=tuple(cell for cell, marked in zip(self.cells, rows, strict=True) if marked),
+            level=self.level,
+        )
+
+
+def compress(z: Floats, knee: float = KNEE) -> Floats:
+    """Function T of the definition of the gap, of `z` in noise floors; fits begin with a larger knee."""
+    return knee * np.arcsinh(z / knee)
+
+
+def slope_of_compress(z: Floats, knee: float = KNEE) -> Floats:
+    """Derivative of `compress` at `z`, same shape."""
+    return 1.0 / np.sqrt(1.0 + (z / knee) ** 2)
+
+
+def replicates(
+    problem: Problem,
+    point: Point,
+    roughness: Roughness,
+    count: int,
+    seed: int,
+    jobs: int = 1,
+    perhaps: Sequence[Point] = (),
+) -> Floats:
+    """Predicted features of a model on random rough surfaces with random sensor noise, [count, features].
+
+    The result does not depend on the number of processes.
+
+    Args:
+        problem: the runs.
+        point: the model.
+        roughness: scatter of the friction, and the length around which the length of each replicate is drawn.
+        count: number of replicates.
+        seed: seed of the draws.
+        jobs: processes.
+        perhaps: points that may be requested next, simulated where a lane is free.
+
+    """
+    return np.array(spread(jobs, _drawn, (problem, point, roughness, seed, perhaps), range(count)))
+
+
+def _drawn(model: tuple[Problem, Point, Roughness, int, Sequence[Point]], numbers: list[int]) -> list[Floats]:
+    problem, point, roughness, seed, perhaps = model
+    draws: list[Draw] = []
+    for number in numbers:
+        random = np.random.default_rng([seed, number])
+        length_m = float(roughness.length_m * np.exp(random.uniform(-1.0, 1.0)))
+        surface = Roughness(roughness.ratio, length_m, int(random.integers(1_000_000)))
+        draws.append(Draw(random, surface))
+    return problem.predicted_many([point] * len(draws), draws, perhaps)
+
+
+def floor_of(problem: Problem, point: Point, drawn: Floats, before: Floor | None = None) -> Floor:
+    """The noise floor of the model at `point`, from its replicates `drawn` [count, features].
+
+    A feature that the floor `before` compared stays compared, with the scatter of `before`: a refit that loses the slips
+    cannot drop the features of the slips.
+    """
+    labels = problem.labels
+    powers = np.array([label.name in POWERS for _, label in labels])
+    plain = problem.predicted(point)
+    finite = np.isfinite(drawn)
+    compared = (finite.mean(axis=0) >= _FEWEST_FINITE) & np.isfinite(plain) & np.isfinite(problem.measured)
+    count = np.maximum(finite.sum(axis=0), 1)
+    mean = np.where(finite, drawn, 0.0).sum(axis=0) / count
+    bias = np.where(compared, mean - np.where(compared, plain, 0.0), 0.0)
+    # Noise can only increase a power, so a negative bias is chance. Added to the prediction of a weaker ring, it would give a
+    # negative power, whose logarithm is far off (docs/method/diagnosis.md).
+    bias[powers] = np.maximum(bias[powers], 0.0)
+    about = np.where(finite, logarithms(drawn, powers) - logarithms(mean, powers), 0.0)
+    # Under vibration a slip depends on the phase at which it begins. So the prediction scatters as much as the measured run,
+    # and the variance of their difference is twice the variance of the replicates.
+    about *= np.where(_slips_under_vibration(problem), 2.0**0.5, 1.0)
+    spread = np.sqrt((about * about).sum(axis=0) / np.maximum(count - 1, 1))
+    least = np.array([_least(label, problem) for _, label in labels])
+    scatter = np.hypot(spread, least)
+    lost = np.zeros_like(compared)
+    if before is not None:
+        lost = before.compared & ~compared
+        compared = compared | lost
+        bias, scatter = np.where(lost, before.bias, bias), np.where(lost, before.scatter, scatter)
+    z = compress(about[:, compared] / scatter[compared])
+    cells = tuple(
+        (label.signal, label.regime, label.band_Hz, file)
+        for (file, label), use in zip(labels, compared, strict=True)
+        if use
+    )
+    # The replicates show only the drawn part of the scatter; the whitening needs the least scatter as well.
+    further = np.where(lost, 1.0, least / scatter)[compared] ** 2
+    # A new run differs from the mean of `count` replicates by a little more than the replicates do.
+    correction = (len(drawn) + 1.0) / (len(drawn) - 1.0)
+    squares = np.where(lost[compared], 1.0, z * z)
+    # without a cell the model shows none of the measured features; the caller reports it
+    level = np.sqrt(correction * np.mean([cell_means(row, cells).mean() for row in squares])) if cells else np.nan
+    segments = [(file, label.segment) for (file, label), use in zip(labels, compared, strict=True) if use]
+    return Floor(bias, powers, scatter, compared, _whitening(z, further, segments), cells, float(level))
+
+
+def logarithms(values: Floats, powers: npt.NDArray[np.bool_]) -> Floats:
+    """Features [..., features] with each power as half its logarithm; other features unchanged.
+
+    A difference of two powers is then the relative difference of two amplitudes.
+    """
+    return np.where(powers, 0.5 * np.log(np.maximum(values, _LEAST_POWER)), values)
+
+
+def _slips_under_vibration(problem: Problem) -> npt.NDArray[np.bool_]:
+    segments = {run.file: run.commands.segments for run in problem.runs}
+    return np.array(
+        [
+            label.segment >= 0 and label.regime != "steady" and segments[file][label.segment].frequency_Hz > 0.0
+            for file, label in problem.labels
+        ]
+    )
+
+
+def cell_means(squares: Floats, cells: tuple[CellKey, ...]) -> Floats:
+    """Mean of `squares` [compared] over the features of each cell, [cells], in the order in which the cells first appear."""
+    number = {key: i for i, key in enumerate(dict.fromkeys(cells))}
+    index = np.array([number[key] for key in cells], np.int64)
+    return np.bincount(index, squares, len(number)) / np.bincount(index, minlength=len(number))
+
+
+def _whitening(z: Floats, further: Floats, segments: list[tuple[str, int]]) -> Floats:
+    """Inverse root of the covariance of the replicates `z` [count, compared], segment by segment.
+
+    Each segment runs on another piece of the track. With so few replicates, a correlation of two segments is chance, and a
+    shrinkage strong enough to remove it would also remove the common effect of a slip on all features of its segment.
+    """
+    result = np.zeros((len(segments), len(segments)))
+    for segment in dict.fromkeys(segments):
+        mask = np.array([label == segment for label in segments])
+        result[np.outer(mask, mask)] = _inverse_root(z[:, mask], further[mask]).ravel()
+    return result
+
+
+def _inverse_root(z: Floats, further: Floats) -> Floats:
+    """Inverse root of the covariance of the replicates `z` [count, features], shrunk towards independence.
+
+    The intensity of the shrinkage follows Ledoit and Wolf (2004). `further` [features] is added to the variances.
+    """
+    count, features = z.shape
+    sample = z.T @ z / count
+    off = sample - np.diag(np.diag(sample))
+    square = z * z
+    noise = float((square.T @ square).sum() / count - (sample**2).sum()) - float(
+        ((square**2).sum(axis=0) / count - np.diag(sample) ** 2).sum()
+    )
+    shrink = float(np.clip(noise / count / max(float((off**2).sum()), 1e-12), 0.05, 1.0))
+    covariance = (1.0 - shrink) * off
+    covariance[np.diag_indices(features)] = np.maximum(np.diag(sample) + further, 0.3)
+    values, vectors = np.linalg.eigh(covariance)
+    return (vectors / np.sqrt(np.maximum(values, 0.05))) @ vectors.T
+
+
+def _least(label: Feature, problem: Problem) -> float:
+    """Smallest scatter of a feature, in the unit of the feature: resolution of the grid and accuracy of ordinary sensors.
+
+    A smaller value makes false gaps from ordinary sensors; a larger value hides small effects in that feature. A number
+    without a comment was set so that synthetic evidence without a gap differs by one to two noise floors (rms over eight
+    evidences of the protocol "ladder").
+    """
+    force_N, slip_s, _, stiffness, _ = problem.scales
+    if problem.rig.drive == "force":
+        return _least_of_axis(label, force_N, problem.force_peak_N)
+    drop_m = 0.3 * force_N / stiffness  # length of a slip when friction falls by a sixth
+    if label.name == "rest":
+        return 1.5  # noise of a displacement sensor between 5 and 24 Hz cannot be estimated from the run
+    if label.name in {"scatter", "ripple"}:
+        return 0.6  # small powers: hum, slow noise and the roughness of a track are as large
+    if label.name in {"ring", "spring rest"}:
+        return 0.25
+    if label.name == "spring cube":
+        return 8e-3 * force_N  # over a short stretch the bow of a displacement sensor looks like a stiffening spring
+    if label.name == "spring bend":
+        return _SENSORS_BEND_S2 * stiffness
+    if label.name.startswith("spring"):
+        return 2e-3 * force_N  # a bow of 0.2 % in a displacement sensor changes the slope along the track
+    if label.name.startswith("vibration"):
+        return 0.006 if label.signal == "base_accel_mps2" else 0.04
+    if label.name == "period":
+        return 0.003
+    if label.name.startswith("rate"):
+        return 0.003 * force_N
+    if label.signal == "drive_force_N":
+        return 3e-4 * force_N
+    if label.signal.endswith("accel_mps2"):
+        if label.name in {"shape -0.5", "shape 0.5"}:  # the acceleration jumps where a slip begins and where it ends
+            return 0.1 * drop_m * (np.pi / slip_s) ** 2
+        return 4e-3 * drop_m * (np.pi / slip_s) ** 2
+    if (
+        label.signal == "drive_position_m"
+    ):  # a sensor's bow appears in the long waves; over a short way its error is small
+        return (4e-4 if label.name in _SHORT_WAVES else 2e-3) * drop_m
+    return 1e-3 * drop_m
+
+
+def _least_of_axis(label: Feature, force_N: float, peak_N: float) -> float:
+    if label.name == "ripple":
+        return 0.2
+    if label.signal != "drive_force_N":
+        return 0.002
+    if label.regime == "breakaway" and label.name in {"mean", "over rest"}:
+        return 0.02 * force_N  # the load on the contact before the run is not known
+    if " over " in label.name:
+        return 2e-4 * force_N  # waves over time and position: the error of a force channel changes slowly
+    return 5e-4 * peak_N  # linearity of a good force channel
 
 
 def chi2_of(left: Floats) -> float:

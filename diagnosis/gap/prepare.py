@@ -43,10 +43,9 @@ def prepare(evidence: Evidence) -> list[Prepared]:
     Raises Fault BAD_EVIDENCE when a force-driven axis moves for less than 0.5 s.
     """
     prepared: list[Prepared] = []
-    before_s = 0.0
     for run in evidence.runs:
+        before_s = prepared[-1].before_s + len(prepared[-1].commands.drive) * BLOCK_S if prepared else 0.0
         prepared.append(_prepare(evidence.rig, run, before_s))
-        before_s += len(prepared[-1].commands.drive) * BLOCK_S
     return prepared
 
 
@@ -80,20 +79,17 @@ def _prepare(rig: RigTable, run: MeasuredRun, before_s: float) -> Prepared:
 
 
 def _start(rig: RigTable, signals: Signals, commands: CommandedRun) -> Start:
-    first = slice(0, 10)
+    force_N, slide_m, drive_m = (
+        float(signals[name][:10].mean()) if name in signals else None
+        for name in ("drive_force_N", "mass_position_m", "drive_position_m")
+    )
     if rig.drive == "force":
         assert commands.motion is not None, "a force drive has a motion"  # noqa: S101
         at_m, velocity_mps = (float(values[0]) for values in commands.motion[:2])
         # friction at the start: sliding friction, or the force that the contact holds at rest
         sliding = abs(velocity_mps) > rig.stribeck_velocity_mps
-        force_N = float(signals["drive_force_N"][first].mean())
-        return Start(np.sign(velocity_mps) * rig.coulomb_force_N if sliding else force_N, at_m, velocity_mps)
-    force_N = float(signals["drive_force_N"][first].mean()) if "drive_force_N" in signals else 0.7 * rig.coulomb_force_N
-    if "mass_position_m" in signals:
-        at_m = float(signals["mass_position_m"][first].mean())
-    elif "drive_position_m" in signals:
-        at_m = float(signals["drive_position_m"][first].mean()) - force_N / scales_of(rig).stiffness_N_per_m
-    else:
-        at_m = 0.0
-    drive_m = float(signals["drive_position_m"][first].mean()) if "drive_position_m" in signals else None
-    return Start(force_N, at_m, drive_m=drive_m)
+        return Start(np.sign(velocity_mps) * rig.coulomb_force_N if sliding else force_N or 0.0, at_m, velocity_mps)
+    force_N = 0.7 * rig.coulomb_force_N if force_N is None else force_N
+    if slide_m is None:
+        slide_m = 0.0 if drive_m is None else drive_m - force_N / scales_of(rig).stiffness_N_per_m
+    return Start(force_N, slide_m, drive_m=drive_m)

@@ -21,8 +21,7 @@ from diagnosis.model.per_run import in_run, of_run
 from diagnosis.model.predict import predict_many
 from diagnosis.model.rig import AGE_BEFORE_S, AGE_SPREAD, Effects, Roughness, Start, StartState, rig_config
 from diagnosis.model.segment_starts import misread
-from diagnosis.model.sensor_chain import SENSOR_EFFECTS, SensorChain, sensed, true_force_N
-from diagnosis.model.true_force import relative, true_commands
+from diagnosis.model.sensor_chain import SENSOR_EFFECTS, SensorChain, relative, sensed, true_commands, true_force_N
 from plant.config import RigConfig
 from plant.effects.library import EFFECTS
 from plant.four_rigs_step import LANES, NARROW
@@ -83,7 +82,7 @@ class Problem:
         self.force_peak_N = max(float(np.abs(run.signals.get("drive_force_N", np.zeros(1))).max()) for run in runs)
         self._simulated: dict[object, Signals | None] = {}
         self._averaged = {run.file: averaged(run.commands.frequency_Hz) for run in runs}
-        measured = [self._features(run, run.signals, labelled=True) for run in runs]
+        measured = [self._features(run, run.signals) for run in runs]
         self.measured = np.concatenate([np.array(features.values) for features in measured])
         self.labels = [
             (run.file, label) for run, features in zip(runs, measured, strict=True) for label in features.labels
@@ -177,9 +176,7 @@ class Problem:
         result = {name: result[name] for name in run.signals}
         for name, values in noise.items():
             result[name] = result[name] - values if name == "drive_force_N" else result[name] + values
-        for name, (low, high) in run.clipped.items():
-            result[name] = np.clip(result[name], low, high)
-        return result
+        return _clipped(run, result)
 
     def _raw(
         self,
@@ -242,20 +239,17 @@ class Problem:
         by_number = dict(zip(configs, predicted, strict=True))
         return [by_number.get(number) for number in range(len(requests))]
 
-    def _features(self, run: Prepared, signals: Signals, labelled: bool = False) -> Features:
+    def _features(self, run: Prepared, signals: Signals) -> Features:
         if self.rig.drive == "force":
             return axis_features(signals, run.commands, self.rig)
-        return spring_features(
-            without_vibration(signals, self._averaged[run.file]), run.commands, self.scales, labelled
-        )
-
-
-def _true_N(reading_N: float, effects: Effects, t_s: float) -> float:
-    return float(true_force_N(np.array(reading_N), effects, np.array(t_s)))
+        return spring_features(without_vibration(signals, self._averaged[run.file]), run.commands, self.scales)
 
 
 def _request(run: Prepared, point: Point, draw: Draw | None) -> _Request:
-    start = run.start._replace(force_N=_true_N(run.start.force_N, point.effects, 0.0))
+    def true_N(reading_N: float, t_s: float) -> float:
+        return float(true_force_N(np.array(reading_N), point.effects, np.array(t_s)))
+
+    start = run.start._replace(force_N=true_N(run.start.force_N, 0.0))
     age_s = point.effects.get(AGEING, {}).get(of_run(AGE_BEFORE, run.file))
     if age_s is not None:
         start = start._replace(age_s=float(age_s))
@@ -263,7 +257,7 @@ def _request(run: Prepared, point: Point, draw: Draw | None) -> _Request:
         start = start._replace(age_s=AGE_BEFORE_S * math.exp(AGE_SPREAD * float(draw.random.normal())))
     entries = tuple(
         entry._replace(
-            force_N=_true_N(entry.force_N, point.effects, entry.block * BLOCK_S),
+            force_N=true_N(entry.force_N, entry.block * BLOCK_S),
             age_s=entry.age_s + start.age_s if entry.from_before and entry.age_s is not None else entry.age_s,
         )
         for entry in run.entries
@@ -276,7 +270,11 @@ def _request(run: Prepared, point: Point, draw: Draw | None) -> _Request:
 
 
 def _rig_effects(run: Prepared, effects: Effects, draw: Draw | None) -> Effects:
-    """The effects on the rig, with their numbers in this run."""
+    """The effects on the rig, with their numbers in this run, and with a path for each random effect.
+
+    The path follows from the effect's seed; with seed 0, from the draw. Without seed and draw the effect is left out, as its
+    mean is 0. An effect over time has another path in every run, an effect over position the same path in all runs.
+    """
     seed = draw.roughness.seed if draw else None
     in_this_run = {name: in_run(table, run.file, run.holdout, seed) for name, table in effects.items()}
     moving = {name: table for name, table in in_this_run.items() if table is not None and name not in SENSOR_EFFECTS}
@@ -284,7 +282,13 @@ def _rig_effects(run: Prepared, effects: Effects, draw: Draw | None) -> Effects:
         moving = {name: table for name, table in moving.items() if name not in PIEZO_EFFECTS}
     if "before_s" in moving.get("friction-drift", {}):
         moving["friction-drift"] = moving["friction-drift"] | {"before_s": run.before_s}
-    return _with_paths(moving, run, draw)
+    result: Effects = {}
+    for name, table in moving.items():
+        if table["form"] != "random":
+            result[name] = table
+        elif path := float(table["seed"]) or (1.0 + draw.roughness.seed if draw else 0.0):
+            result[name] = table | {"seed": path + (run.before_s if "frequency_Hz" in table else 0.0)}
+    return result
 
 
 def _sensor_signals(run: Prepared, request: _Request, raw: Signals) -> Signals:
@@ -297,9 +301,11 @@ def _sensor_signals(run: Prepared, request: _Request, raw: Signals) -> Signals:
     if request.draw is not None:
         for name, values in result.items():
             result[name] = values + run.noise.drawn(name, len(values), request.draw.random)
-    for name, (low, high) in run.clipped.items():
-        result[name] = np.clip(result[name], low, high)
-    return result
+    return _clipped(run, result)
+
+
+def _clipped(run: Prepared, signals: Signals) -> Signals:
+    return signals | {name: np.clip(signals[name], *limits) for name, limits in run.clipped.items()}
 
 
 def _key(run: Prepared, request: _Request, inputs: object) -> object:
@@ -318,18 +324,3 @@ def _key(run: Prepared, request: _Request, inputs: object) -> object:
 
 def _hashable(tables: Mapping[str, Mapping[str, float | str]]) -> object:
     return tuple((name, tuple(sorted(table.items(), key=str))) for name, table in sorted(tables.items()))
-
-
-def _with_paths(effects: Effects, run: Prepared, draw: Draw | None) -> Effects:
-    """The effects with a path for each random effect.
-
-    The path follows from the effect's seed; with seed 0, from the draw. Without seed and draw the effect is left out, as its
-    mean is 0. An effect over time has another path in every run, an effect over position the same path in all runs.
-    """
-    result: Effects = {}
-    for name, table in effects.items():
-        if table["form"] != "random":
-            result[name] = table
-        elif seed := float(table["seed"]) or (1.0 + draw.roughness.seed if draw else 0.0):
-            result[name] = table | {"seed": seed + (run.before_s if "frequency_Hz" in table else 0.0)}
-    return result

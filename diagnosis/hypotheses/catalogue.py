@@ -4,30 +4,22 @@ The physics is in `plant.effects`. A form that is missing here is not tried: it 
 follow; `diagnosis.fits.random_friction` searches for it.
 """
 
-from typing import Final
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple
 
-from diagnosis.hypotheses.catalogue_row import (
-    BREAKAWAY,
-    DRIVE,
-    FRAME,
-    OF_EXCITER,
-    OF_EXTENSION,
-    OF_RATE,
-    OVER_SPEED,
-    REPEAT,
-    REVERSE,
-    SHAKER,
-    SPEEDS,
-    TAP,
-    TRACK,
-    WEIGHT,
-    ZERO,
-    EffectRow,
-    Tried,
-)
-from diagnosis.hypotheses.scales import Scale, Sizes
+import numpy as np
+
+from diagnosis.evidence.manifest import RigTable
+from diagnosis.gap.prepare import Prepared
+from diagnosis.gap.problem import Problem
+from diagnosis.hypotheses.hypothesis import LEVELS, Scale, Sizes, sizes
 from diagnosis.hypotheses.starts import (
+    Starts,
+    Trial,
+    TrialRequest,
     aged_before,
+    at_scale,
     at_times_its_scale,
     at_times_the_vibration,
     at_values,
@@ -39,11 +31,66 @@ from diagnosis.hypotheses.starts import (
     waves_of_track,
     where_the_base_rings,
 )
+from plant.effects.library import EFFECTS
+
+
+@dataclass(frozen=True)
+class Tried:
+    """How a form is tried. Parameters without a scale keep their default."""
+
+    # scales of the free parameters on a rig of these sizes; none where the starts define the coordinates
+    scale: Callable[[Sizes], dict[str, Scale]] = lambda _: {}
+    starts: Starts = at_scale
+
+
+Over = tuple[str, str]  # a residual and its variable: names of `pictures.choice`
+
+
+class EffectRow(NamedTuple):
+    """An effect in the diagnosis."""
+
+    words: str  # meaning on a machine, in plain words
+    shown_by: tuple[Over, ...]  # residuals that show the effect, the best first; the next if channels are missing
+    forms: dict[str, Tried]
+    check: str = ""  # check by hand; empty: the check for the part on which it acts
+    check_against: dict[
+        str, str
+    ] = {}  # check by hand that separates it from another effect; stated in one of the two rows
+    # whether the first two of `shown_by` are drawn, as its forms show over different variables
+    shown_twice: bool = False
+
+
+BREAKAWAY: Final = "breakaway"
+OVER_SPEED: Final = (("friction", "velocity_mps"),)
+OF_RATE: Final = (("spring", "extension_rate_mps"), ("curvature", "acceleration_mps2"))
+OF_EXTENSION: Final = (("spring", "extension_m"), ("curvature", "acceleration_mps2"))
+OF_EXCITER: Final = (("exciter", "frequency_Hz"),)
+
+WEIGHT: Final = "Hang a known weight on the force sensor, and read it empty: its gain and its zero are then known."
+ZERO: Final = "Unload the force sensor and read it for ten minutes: a zero that wanders is seen at once."
+TAP: Final = (
+    "Hold the mass still and tap the drive with a small hammer: a late or smoothed force reading shows against the "
+    "accelerometer, damping and compliance of the drive as ringing."
+)
+FRAME: Final = (
+    "Put an accelerometer on the mount of the drive, then on the base, and tap: a part that swings is seen directly."
+)
+SHAKER: Final = "Put both accelerometers on one calibrated shaker, or turn them over: gravity makes 2 g of difference."
+SWEEP: Final = (
+    "Sweep the piezo from 0.5 to 5 kHz at rest and look at the base accelerometer: it shows the delivered motion."
+)
+DRIVE: Final = (
+    "Measure the drive position with a second sensor, unloaded: an uneven drive is uneven without the mass, too."
+)
+TRACK: Final = (
+    "Drag along the same track twice, the second time at another speed: an effect of the place returns there."
+)
+SPEEDS: Final = "Drag at 0.2, 1 and 5 times the present speed, and hold the drive for 1, 10 and 60 s in between."
+REVERSE: Final = "Drag to and fro over the same track."
+REPEAT: Final = "Repeat one run unchanged after a pause of ten minutes: a drift does not repeat."
+
 
 _RESTED = {"rested_s": Scale(0.3, True, 1.5)}
-_WAVE = {"ratio": Scale(0.02, True, 1.5), "phase_rad": Scale(1.0, False, 3.0)}
-_ALONG_WAY = _WAVE | {"wavelength_m": Scale(1.0, True, 0.2)}
-_OVER_TIME = _WAVE | {"frequency_Hz": Scale(1.0, True, 0.2)}
 _MODE = {"resonance_Hz": Scale(1.0, True, 0.7), "damping_ratio": Scale(0.05, True, 0.7)}
 _DAMPING_RATIO = {"damping_ratio": Scale(0.05, True, 0.7)}
 
@@ -55,11 +102,6 @@ def _level(_: Sizes) -> dict[str, Scale]:
 
 def _gain(_: Sizes) -> dict[str, Scale]:
     return {"ratio": Scale(0.05, False)}
-
-
-def _by_waves(_: Sizes) -> dict[str, Scale]:
-    """No scales, as the starts from waves define their coordinates."""
-    return {}
 
 
 CATALOGUE: Final[dict[str, EffectRow]] = {
@@ -108,9 +150,9 @@ CATALOGUE: Final[dict[str, EffectRow]] = {
         words="friction changes along the way, and is the same again at the same place",
         shown_by=(("friction", "position_m"), (BREAKAWAY, "position_m"), (BREAKAWAY, "time_s")),
         forms={
-            "wave": Tried(lambda _: _ALONG_WAY, waves_of_track),
-            "two-waves": Tried(_by_waves, two_waves_of_track),
-            "bumps": Tried(_by_waves, bumps_of_track),
+            "wave": Tried(starts=waves_of_track),
+            "two-waves": Tried(starts=two_waves_of_track),
+            "bumps": Tried(starts=bumps_of_track),
         },
         check=TRACK,
         check_against={"normal-load-fluctuation": TRACK, "drive-speed-ripple": DRIVE, "friction-drift": REPEAT},
@@ -124,7 +166,7 @@ CATALOGUE: Final[dict[str, EffectRow]] = {
     "normal-load-fluctuation": EffectRow(
         words="the force that presses the surfaces together goes up and down",
         shown_by=(("friction", "time_s"), (BREAKAWAY, "time_s")),
-        forms={"sine": Tried(lambda _: _OVER_TIME, waves_of_time)},
+        forms={"sine": Tried(starts=waves_of_time)},
         check=TRACK,
         check_against={"drive-speed-ripple": DRIVE},
     ),
@@ -190,9 +232,9 @@ CATALOGUE: Final[dict[str, EffectRow]] = {
         words="the drive runs unevenly, for example once a turn of its screw",
         shown_by=(("drive", "drive_position_m"), (BREAKAWAY, "time_s")),
         forms={
-            "screw": Tried(lambda _: _ALONG_WAY, waves_of_screw),
-            "time": Tried(lambda _: _OVER_TIME, waves_of_motor),
-            "load": Tried(lambda _: _ALONG_WAY, waves_of_screw),
+            "screw": Tried(starts=waves_of_screw),
+            "time": Tried(starts=waves_of_motor),
+            "load": Tried(starts=waves_of_screw),
         },
         check=DRIVE,
     ),
@@ -314,3 +356,31 @@ CATALOGUE: Final[dict[str, EffectRow]] = {
         check=SHAKER,
     ),
 }
+
+
+def trials(problem: Problem) -> list[Trial]:
+    """Every form of every effect that this rig can have and these runs could show."""
+    rig, runs = problem.rig, problem.runs
+    frequencies = np.concatenate([run.commands.frequency_Hz for run in runs])
+    highest_Hz = float(frequencies.max())
+    of_rig = sizes(rig, runs, highest_Hz)
+    result: list[Trial] = []
+    for name, effect in EFFECTS.items():
+        if not _shows(name, rig, highest_Hz):
+            continue
+        for form in effect.forms:
+            tried = CATALOGUE[name].forms.get(form)
+            if tried is not None:
+                result += tried.starts(TrialRequest(name, form, tried.scale(of_rig), problem, highest_Hz))
+    return result
+
+
+def cannot_show(rig: RigTable, runs: Sequence[Prepared], assumed: Sequence[str]) -> tuple[str, ...]:
+    """Effects that this kind of drive cannot have, that need a missing vibration, or that change an assumed rig number."""
+    highest_Hz = max(float(run.commands.frequency_Hz.max()) for run in runs)
+    return tuple(name for name in EFFECTS if not _shows(name, rig, highest_Hz) or LEVELS.get(name) in assumed)
+
+
+def _shows(name: str, rig: RigTable, highest_Hz: float) -> bool:
+    effect = EFFECTS[name]
+    return rig.drive in effect.drives and (effect.acts_on != "piezo" or highest_Hz > 0.0)

@@ -52,11 +52,13 @@ class Nuisances:
         """Relative growth of a number of the rig table per tolerance, at a deviation."""
         return self._tolerance[name] * self._described[name] / self.value(name, deviation)
 
+    def _values(self, deviations: Floats) -> dict[str, float]:
+        return {name: self.value(name, float(deviations[i])) for i, name in enumerate(self.rig_names)}
+
     def parameters(self, deviations: Floats) -> tuple[RigNumber, ...]:
         """The rig's numbers in the model at these deviations, including the shape of its Stribeck curve."""
         count = len(self.rig_names)
-        values = {name: self.value(name, float(deviations[i])) for i, name in enumerate(self.rig_names)}
-        values = self._described | values
+        values = self._described | self._values(deviations)
         values["static_force_N"] = max(values["static_force_N"], values["coulomb_force_N"])
         numbers = [
             RigNumber(name, self._described[name], values[name], self._tolerance[name]) for name in self.rig_names
@@ -66,7 +68,7 @@ class Nuisances:
     def point(self, deviations: Floats, effects: Effects) -> Point:
         """The model at these deviations, with these effects."""
         count = len(self.rig_names)
-        values = {name: self.value(name, float(deviations[i])) for i, name in enumerate(self.rig_names)}
+        values = self._values(deviations)
         values["stribeck_tail"] = _TAIL * float(deviations[count])
         chain: dict[str, float] = {}
         for (name, (mean, spread)), deviation in zip(_CHAIN.items(), deviations[count + 1 :].tolist(), strict=True):

@@ -12,21 +12,20 @@ import numpy as np
 
 from bridge.arrays import Floats
 from diagnosis.gap.problem import AGE_BEFORE, Problem
-from diagnosis.hypotheses.axis_waves import axis_waves
-from diagnosis.hypotheses.hypothesis import Coordinate, Hypothesis
-from diagnosis.hypotheses.ringing import ringing_Hz
-from diagnosis.hypotheses.scales import Scale, longest_run_s
+from diagnosis.hypotheses.hypothesis import Coordinate, Hypothesis, Scale, longest_run_s
 from diagnosis.hypotheses.waves import (
     Wave,
+    WaveSeries,
+    axis_waves,
     drive_series,
-    drive_waves,
     friction_series,
-    friction_waves,
-    friction_waves_beside,
-    two_friction_waves,
+    ringing_Hz,
+    strongest_waves,
+    two_waves,
     waves_apart,
-)
-from diagnosis.model.per_run import OTHER_PHASE, PHASE, of_run
+    waves_beside,
+)  # fmt: skip
+from diagnosis.model.per_run import OTHER_PHASE, PHASE, name_and_run, of_run
 from diagnosis.model.rig import AGE_BEFORE_S, AGE_SPREAD
 from plant.effects.library import EFFECTS
 
@@ -48,6 +47,10 @@ class Trial(NamedTuple):
     w: Floats
 
 
+# parameter, scale, whether it is logarithmic, prior, start of its coordinate
+Axis = tuple[str, float, bool, float, float]
+
+
 class TrialRequest(NamedTuple):
     """A form of an effect to try on an evidence."""
 
@@ -57,9 +60,14 @@ class TrialRequest(NamedTuple):
     problem: Problem
     highest_Hz: float  # highest frequency of the vibration
 
-    def trial(self, start: dict[str, float], further: Iterable[Coordinate] = ()) -> Trial:
+    def trial(self, start: dict[str, float], further: Iterable[Axis] = ()) -> Trial:
         """A trial from these values, or from the scales where a value is missing; `further` coordinates come last."""
-        return _trial(self.name, self.form, self.scale, start, list(further))
+        # a coordinate of either sign starts at half a unit; a positive coordinate at its scale
+        axes = [
+            (name, start.get(name, unit.scale), unit.logarithmic, unit.prior, 0.0 if unit.logarithmic else 0.5)
+            for name, unit in self.scale.items()
+        ]
+        return _trial(self.name, self.form, [*axes, *further])
 
 
 Starts = Callable[[TrialRequest], list[Trial]]
@@ -88,7 +96,7 @@ def at_times_the_vibration(parameter: str, *times: float) -> Starts:
 def aged_before(asked: TrialRequest) -> list[Trial]:
     """A single start; the age of the contact at the beginning of each run is a free parameter."""
     of_runs = [
-        Coordinate(asked.name, of_run(AGE_BEFORE, run.file), AGE_BEFORE_S, True, AGE_SPREAD, *_AGE_LIMITS_S)
+        (of_run(AGE_BEFORE, run.file), AGE_BEFORE_S, True, AGE_SPREAD, 0.0)
         for run in asked.problem.runs
         if any(entry.from_before for entry in run.entries)
     ]
@@ -107,56 +115,58 @@ def where_the_base_rings(asked: TrialRequest) -> list[Trial]:
 
 def waves_of_track(asked: TrialRequest) -> list[Trial]:
     """Waves of the friction along the track."""
-    runs, scales = asked.problem.runs, asked.problem.scales
     if asked.problem.rig.drive == "force":
-        return _waves(asked, axis_waves(runs, "position", _AXIS_WAVES))
-    waves = friction_waves(runs, scales, "position", _WAVES)
-    return _waves(asked, waves + friction_waves(runs, scales, "position", _STEEP_WAVES, harmonics=2))
+        return _waves(asked, axis_waves(asked.problem.runs, "position", _AXIS_WAVES))
+    series = _friction(asked, "position")
+    return _waves(asked, strongest_waves(series, _WAVES) + strongest_waves(series, _STEEP_WAVES, 2))
 
 
 def waves_of_time(asked: TrialRequest) -> list[Trial]:
     """Waves of the friction over time, with one phase for all runs or a phase for each run."""
-    runs, scales = asked.problem.runs, asked.problem.scales
     if asked.problem.rig.drive == "force":
-        return _waves(asked, axis_waves(runs, "time", _AXIS_WAVES))
-    waves = friction_waves(runs, scales, "time", _WAVES)
-    return _waves(asked, waves + waves_apart(friction_series(runs, scales, "time"), runs, _WAVES))
+        return _waves(asked, axis_waves(asked.problem.runs, "time", _AXIS_WAVES))
+    series = _friction(asked, "time")
+    return _waves(asked, strongest_waves(series, _WAVES) + waves_apart(series, asked.problem.runs, _WAVES))
 
 
 def waves_of_screw(asked: TrialRequest) -> list[Trial]:
     """Waves of the drive's velocity along its way; without a drive position, of the friction along the track."""
-    runs, scales = asked.problem.runs, asked.problem.scales
-    waves = drive_waves(runs, "position", _WAVES) or friction_waves(runs, scales, "position", _WAVES)
-    return _waves(asked, waves)
+    return _waves(asked, _drive_waves(asked, "position"))
 
 
 def waves_of_motor(asked: TrialRequest) -> list[Trial]:
     """Waves of the drive's velocity over time; without a drive position, of the friction."""
-    runs, scales = asked.problem.runs, asked.problem.scales
-    waves = drive_waves(runs, "time", _WAVES) or friction_waves(runs, scales, "time", _WAVES)
-    series = drive_series(runs, "time") or friction_series(runs, scales, "time")
-    return _waves(asked, waves + waves_apart(series, runs, _WAVES))
+    runs = asked.problem.runs
+    series = drive_series(runs, "time") or _friction(asked, "time")
+    return _waves(asked, _drive_waves(asked, "time") + waves_apart(series, runs, _WAVES))
 
 
 def two_waves_of_track(asked: TrialRequest) -> list[Trial]:
     """Pairs of waves of the friction along the track."""
-    runs = asked.problem.runs
     if asked.problem.rig.drive == "force":
-        pairs = list(combinations(axis_waves(runs, "position", _AXIS_WAVES), 2))
+        pairs = list(combinations(axis_waves(asked.problem.runs, "position", _AXIS_WAVES), 2))
     else:
-        pairs = two_friction_waves(runs, asked.problem.scales, _WAVES)
+        pairs = two_waves(_friction(asked, "position"), _WAVES)
     return [_two_waves_trial(asked.name, *pair) for pair in pairs]
 
 
 def bumps_of_track(asked: TrialRequest) -> list[Trial]:
     """Bumps and dips where the friction along the track has its longest waves."""
-    runs, scales = asked.problem.runs, asked.problem.scales
     if asked.problem.rig.drive == "force":
-        waves = axis_waves(runs, "position", _AXIS_WAVES)
+        waves = axis_waves(asked.problem.runs, "position", _AXIS_WAVES)
     else:
-        longest = friction_waves(runs, scales, "position", _STEEP_WAVES, harmonics=2)[-_LOBES_OF_BUMPS:]
-        waves = friction_waves_beside(runs, scales, longest, _BESIDE)
+        series = _friction(asked, "position")
+        waves = waves_beside(series, strongest_waves(series, _STEEP_WAVES, 2)[-_LOBES_OF_BUMPS:], _BESIDE)
     return [_bumps_trial(asked.name, wave, sign) for wave in waves for sign in (1.0, -1.0)]
+
+
+def _friction(asked: TrialRequest, over: str) -> list[WaveSeries]:
+    return friction_series(asked.problem.runs, asked.problem.scales, over)
+
+
+def _drive_waves(asked: TrialRequest, over: str) -> list[Wave]:
+    of_drive = strongest_waves(drive_series(asked.problem.runs, over), _WAVES, 2)
+    return of_drive or strongest_waves(_friction(asked, over), _WAVES)
 
 
 def _waves(asked: TrialRequest, waves: list[Wave]) -> list[Trial]:
@@ -164,72 +174,57 @@ def _waves(asked: TrialRequest, waves: list[Wave]) -> list[Trial]:
     return [wave_trial(asked.name, asked.form, wave, slowest_Hz) for wave in waves]
 
 
-def _trial(name: str, form: str, scale: dict[str, Scale], start: dict[str, float], of_runs: list[Coordinate]) -> Trial:
-    axes: list[Coordinate] = []
-    for row in EFFECTS[name].forms[form].parameters:
-        if row.name in scale:
-            unit = scale[row.name]
-            size = start.get(row.name, unit.scale)
-            axes.append(Coordinate(name, row.name, size, unit.logarithmic, unit.prior, row.low, row.high))
-    axes += of_runs
-    # a coordinate of either sign starts at half a unit; a positive coordinate at its scale
-    w = np.array([0.0 if axis.logarithmic else 0.5 for axis in axes])
-    return Trial(Hypothesis({name: form}, tuple(axes)), w)
-
-
 def wave_trial(name: str, form: str, wave: Wave, slowest_Hz: float) -> Trial:
     """A form with a single wave that starts at `wave`; a wave over time must not be slower than `slowest_Hz`."""
-    axes: list[Coordinate] = []
-    for row in EFFECTS[name].forms[form].parameters:
-        if row.name == PHASE:
-            axes += [Coordinate(name, phase, 1.0, False, 3.0, -20.0, 20.0) for phase in (PHASE, *wave.phases_of)]
-        elif row.name == "ratio":
-            axes.append(Coordinate(name, row.name, max(wave.ratio, 1e-4), True, 1.5, row.low, row.high))
-        elif row.name in {"second_sin", "second_cos"}:
-            axes.append(Coordinate(name, row.name, 0.4, False, 1.0, row.low, row.high))
-        elif row.name == "frequency_Hz":
-            # with a free phase in every run, a slower wave could imitate any trend, such as a tilted track
-            axes.append(
-                Coordinate(name, row.name, 1.0 / wave.period, True, wave.spread, max(row.low, slowest_Hz), row.high)
-            )
-        else:
-            axes.append(Coordinate(name, row.name, wave.period, True, wave.spread, row.low, row.high))
-    start = {PHASE: wave.phase_rad, "second_sin": wave.second_sin, "second_cos": wave.second_cos} | dict(wave.phases_of)
-    w = np.array([start.get(axis.name, 0.0) / axis.scale for axis in axes])
-    return Trial(Hypothesis({name: form}, tuple(axes)), w)
+    over_time = any(row.name == "frequency_Hz" for row in EFFECTS[name].forms[form].parameters)
+    period = ("frequency_Hz", 1.0 / wave.period) if over_time else ("wavelength_m", wave.period)
+    axes = [
+        ("ratio", max(wave.ratio, 1e-4), True, 1.5, 0.0),
+        (*period, True, wave.spread, 0.0),
+        *_phases({PHASE: wave.phase_rad} | dict(wave.phases_of)),
+        ("second_sin", 0.4, False, 1.0, wave.second_sin / 0.4),
+        ("second_cos", 0.4, False, 1.0, wave.second_cos / 0.4),
+    ]
+    return _trial(name, form, axes, slowest_Hz)
 
 
 def _two_waves_trial(name: str, first: Wave, second: Wave) -> Trial:
-    rows = {row.name: row for row in EFFECTS[name].forms["two-waves"].parameters}
-
-    def positive(parameter: str, size: float, prior: float) -> Coordinate:
-        return Coordinate(name, parameter, size, True, prior, rows[parameter].low, rows[parameter].high)
-
     ratio = max(first.ratio, 1e-4)
-    axes = (
-        positive("ratio", ratio, 1.5),
-        positive("wavelength_m", first.period, first.spread),
-        Coordinate(name, PHASE, 1.0, False, 3.0, -20.0, 20.0),
-        positive("other_share", max(second.ratio / ratio, 0.05), 1.0),
-        positive("other_wavelength_m", second.period, second.spread),
-        Coordinate(name, OTHER_PHASE, 1.0, False, 3.0, -20.0, 20.0),
-    )
-    return Trial(
-        Hypothesis({name: "two-waves"}, axes), np.array([0.0, 0.0, first.phase_rad, 0.0, 0.0, second.phase_rad])
-    )
+    axes = [
+        ("ratio", ratio, True, 1.5, 0.0),
+        ("wavelength_m", first.period, True, first.spread, 0.0),
+        *_phases({PHASE: first.phase_rad}),
+        ("other_share", max(second.ratio / ratio, 0.05), True, 1.0, 0.0),
+        ("other_wavelength_m", second.period, True, second.spread, 0.0),
+        *_phases({OTHER_PHASE: second.phase_rad}),
+    ]
+    return _trial(name, "two-waves", axes)
 
 
 def _bumps_trial(name: str, wave: Wave, sign: float) -> Trial:
     """Bumps where a wave is high (`sign` 1), or dips where it is low (`sign` -1)."""
-    rows = {row.name: row for row in EFFECTS[name].forms["bumps"].parameters}
+    axes = [
+        ("ratio", 2.0 * max(wave.ratio, 1e-4), False, 3.0, sign),
+        ("wavelength_m", wave.period, True, wave.spread, 0.0),
+        *_phases({PHASE: wave.phase_rad - sign * 0.5 * math.pi}),
+        ("width", 0.12, True, 0.5, 0.0),
+    ]
+    return _trial(name, "bumps", axes)
 
-    def axis(parameter: str, size: float, logarithmic: bool, prior: float) -> Coordinate:
-        return Coordinate(name, parameter, size, logarithmic, prior, rows[parameter].low, rows[parameter].high)
 
-    axes = (
-        axis("ratio", 2.0 * max(wave.ratio, 1e-4), False, 3.0),
-        axis("wavelength_m", wave.period, True, wave.spread),
-        Coordinate(name, PHASE, 1.0, False, 3.0, -20.0, 20.0),
-        axis("width", 0.12, True, 0.5),
+def _phases(starts: dict[str, float]) -> list[Axis]:
+    return [(phase, 1.0, False, 3.0, start) for phase, start in starts.items()]
+
+
+def _trial(name: str, form: str, axes: list[Axis], slowest_Hz: float = 0.0) -> Trial:
+    bounds = {row.name: (row.low, row.high) for row in EFFECTS[name].forms[form].parameters} | {
+        AGE_BEFORE: _AGE_LIMITS_S
+    }
+    if "frequency_Hz" in bounds:
+        # with a free phase in every run, a slower wave could imitate any trend, such as a tilted track
+        bounds["frequency_Hz"] = max(bounds["frequency_Hz"][0], slowest_Hz), bounds["frequency_Hz"][1]
+    coordinates = tuple(
+        Coordinate(name, parameter, size, logarithmic, prior, *bounds[name_and_run(parameter)[0]])
+        for parameter, size, logarithmic, prior, _ in axes
     )
-    return Trial(Hypothesis({name: "bumps"}, axes), np.array([sign, 0.0, wave.phase_rad - sign * 0.5 * math.pi, 0.0]))
+    return Trial(Hypothesis({name: form}, coordinates), np.array([start for *_, start in axes]))

@@ -1,4 +1,4 @@
-"""Candidate waves: the periods that the scatter of the breakaways, the level of sliding and the drive position show.
+"""Candidate waves, from breakaways, the level of sliding and the drive position; frequencies at which a structure rings.
 
 They are only starting points of a refit, never a verdict.
 """
@@ -9,12 +9,15 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
+from scipy.signal import find_peaks, welch
 
 from bridge.arrays import Floats
 from diagnosis.features.feature import Scales
+from diagnosis.features.force_drive import friction_share
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.gap.prepare import Prepared
-from diagnosis.model.per_run import phase_of
+from diagnosis.model.per_run import PHASE, of_run
 from diagnosis.slips import turning_points
 
 _GRID = 1500  # number of periods that are tried for a wave
@@ -22,6 +25,13 @@ _LOBES = 2  # peaks that are tried in each range: separate pieces of track leave
 _LOBE = 10  # least distance of two peaks, in grid points
 _TWO_WAVES = 3  # pairs of waves that are tried
 _STEEPEST = 0.8  # largest second harmonic, relative to the first
+_EVERY = 8  # blocks for each sample of a force-driven axis
+_MOST_TURNS = 200  # most turns of a wave within the longest run
+_STEPS_PER_TURN = 3  # tried periods for each turn: a line is one turn wide
+_WINDOW = 512  # blocks of a window: a resolution of 2 Hz
+# range of a ringing base: slips are slower, the 1 ms grid resolves no faster ringing
+_LOWEST_HZ, _HIGHEST_HZ = 20.0, 450.0
+_PROMINENCE = 2.0  # smallest prominence of a peak in the logarithm of power; combs of regular slips stay below
 
 
 class Wave(NamedTuple):
@@ -48,14 +58,8 @@ class WaveSeries(NamedTuple):
     of_slips: bool = False  # whether there is one value for each breakaway; False: values of continuous motion
 
 
-def friction_waves(runs: list[Prepared], scales: Scales, over: str, most: int, harmonics: int = 1) -> list[Wave]:
-    """The strongest waves of the friction over `position` [m] or `time` [s], two in each of `most` ranges of periods."""
-    return _strongest(friction_series(runs, scales, over), most, harmonics)
-
-
-def friction_waves_beside(runs: list[Prepared], scales: Scales, waves: list[Wave], at: tuple[float, ...]) -> list[Wave]:
-    """Waves along the track with harmonic and best phase; their periods are `at` spreads away from the periods of `waves`."""
-    series = friction_series(runs, scales, "position")
+def waves_beside(series: list[WaveSeries], waves: list[Wave], at: tuple[float, ...]) -> list[Wave]:
+    """Waves with harmonic and best phase; their periods are `at` spreads away from the periods of `waves`."""
     result: list[Wave] = []
     for wave in waves:
         periods = wave.period * (1.0 + wave.spread * np.array(at))
@@ -65,10 +69,9 @@ def friction_waves_beside(runs: list[Prepared], scales: Scales, waves: list[Wave
     return result
 
 
-def two_friction_waves(runs: list[Prepared], scales: Scales, most: int) -> list[tuple[Wave, Wave]]:
-    """Pairs of the strongest waves of the friction along the track, those that explain most together first."""
-    series = friction_series(runs, scales, "position")
-    together = [_fitted_pair(series, *two) for two in combinations(_strongest(series, most), 2)]
+def two_waves(series: list[WaveSeries], most: int) -> list[tuple[Wave, Wave]]:
+    """Pairs of the strongest waves, those that explain most together first."""
+    together = [_fitted_pair(series, *two) for two in combinations(strongest_waves(series, most), 2)]
     together.sort(key=lambda pair: -pair[0])
     return [two for _, two in together[:_TWO_WAVES]]
 
@@ -124,11 +127,6 @@ def friction_series(runs: list[Prepared], scales: Scales, over: str) -> list[Wav
     return series
 
 
-def drive_waves(runs: list[Prepared], over: str, most: int) -> list[Wave]:
-    """The strongest waves of the drive's relative velocity over its `position` [m] or `time` [s]."""
-    return _strongest(drive_series(runs, over), most, 2)
-
-
 def drive_series(runs: list[Prepared], over: str) -> list[WaveSeries]:
     """The drive's velocity relative to its mean, over its `position` [m] or `time` [s]; a series for each segment."""
     series: list[WaveSeries] = []
@@ -158,18 +156,19 @@ def waves_apart(series: list[WaveSeries], runs: list[Prepared], most: int) -> li
     if sum(bool(parts) for parts in by_run.values()) < 2:
         return []
     waves: list[Wave] = []
-    for wave in _strongest(series, most, apart=True):
+    for wave in strongest_waves(series, most, apart=True):
         first, *later = (
             wave_of(wave.period, fitted(parts, np.array([wave.period]))[1][0]) if parts else wave
             for parts in by_run.values()
         )
         ratio = float(np.sqrt(np.mean([in_run.ratio**2 for in_run in (first, *later)])))
-        phases_of = {phase_of(run.file): in_run.phase_rad for run, in_run in zip(runs[1:], later, strict=True)}
+        phases_of = {of_run(PHASE, run.file): in_run.phase_rad for run, in_run in zip(runs[1:], later, strict=True)}
         waves.append(wave._replace(ratio=ratio, phase_rad=first.phase_rad, phases_of=phases_of))
     return waves
 
 
-def _strongest(series: list[WaveSeries], most: int, harmonics: int = 1, apart: bool = False) -> list[Wave]:
+def strongest_waves(series: list[WaveSeries], most: int, harmonics: int = 1, apart: bool = False) -> list[Wave]:
+    """The strongest waves, two in each of `most` ranges of periods; with `apart`, each run may have another phase."""
     if not series:
         return []
     span = max(float(np.ptp(part.at)) for part in series)
@@ -222,3 +221,40 @@ def wave_of(period: float, shares: Floats) -> Wave:
         second = np.clip((turned.real, turned.imag), -_STEEPEST, _STEEPEST).tolist()
         wave = wave._replace(second_sin=second[0], second_cos=second[1])
     return wave
+
+
+def axis_waves(runs: list[Prepared], over: str, most: int) -> list[Wave]:
+    """The strongest waves of the friction over `position` [m] or `time` [s], strongest first."""
+    series: list[WaveSeries] = []
+    for run in runs:
+        motion = run.commands.motion
+        if motion is None:
+            continue
+        share, valid = friction_share(run.signals["drive_force_N"], motion)
+        time_s = np.arange(len(share)) * BLOCK_S
+        at = motion.position_m if over == "position" else time_s
+        series.append(WaveSeries(at[valid][::_EVERY], uniform_filter1d(share, _EVERY)[valid][::_EVERY]))
+    span = max((float(np.ptp(part.at)) for part in series), default=0.0)
+    if span <= 0.0:
+        return []
+    periods = span * _STEPS_PER_TURN / np.arange(1, _MOST_TURNS * _STEPS_PER_TURN)
+    power, shares = fitted(series, periods)
+    near = 2 * _STEPS_PER_TURN
+    peaks = [i for i in range(len(power)) if power[i] == power[max(0, i - near) : i + near + 1].max()]
+    best = [wave_of(float(periods[i]), shares[i]) for i in sorted(peaks, key=lambda i: -power[i])[:most]]
+    return [wave._replace(spread=min(0.5 * wave.period / span, 0.2)) for wave in best]
+
+
+def ringing_Hz(runs: list[Prepared], signal: str, most: int) -> list[float]:
+    """Frequencies of the most prominent peaks, `most` at most; empty without the signal."""
+    power: Floats = np.zeros(_WINDOW // 2 + 1)
+    frequency_Hz = np.fft.rfftfreq(_WINDOW, BLOCK_S)
+    for run in runs:
+        for segment in run.commands.segments:
+            values = run.signals.get(signal, np.zeros(0))[segment.first : segment.last]
+            if segment.frequency_Hz == 0.0 and len(values) >= _WINDOW:
+                power += len(values) * welch(values, 1.0 / BLOCK_S, nperseg=_WINDOW)[1]
+    inside = (frequency_Hz > _LOWEST_HZ) & (frequency_Hz < _HIGHEST_HZ)
+    peaks, properties = find_peaks(np.log(np.maximum(power[inside], 1e-300)), prominence=_PROMINENCE)
+    order = np.argsort(-properties["prominences"])[:most]
+    return [float(value) for value in frequency_Hz[inside][peaks[order]]]

@@ -26,7 +26,6 @@ class LatentSignal(NamedTuple):
     differs: float  # about the mean of the rows
     left: float  # of scatter and noise
     noise: float
-    lengths_m: dict[str, float]  # of the processes along the track
     revisited: bool  # whether place and time are two things here
     judged_on_held_out: bool
     rows: int
@@ -63,7 +62,6 @@ def signal_of(rows: ExcessRows) -> LatentSignal:
         differs=differs,
         left=max(differs * float(np.sqrt(min(max(1.0 - explained, 0.0), 1.0))), min(rows.noise_N, differs)),
         noise=min(rows.noise_N, differs),
-        lengths_m={name: float(np.exp(value)) for name, value in best.lengths.items() if name != "wander"},
         revisited=best.model.revisited,
         judged_on_held_out=judged_on_held_out,
         rows=len(rows.excess_N),

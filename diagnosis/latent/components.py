@@ -92,10 +92,9 @@ def model_of(rows: ExcessRows) -> ComponentModel:
         components.append(Component(RUN, _fixed(unit(np.equal.outer(rows.run, rows.run).astype(float)))))
     if rows.load_N is not None and float(rows.load_N.std()) > _LOAD_VARIES * abs(float(rows.load_N.mean())):
         components.append(Component(LOAD, _fixed(line(rows.load_N))))
-    if rows.pull_N is not None and float(rows.pull_N.std()) > 0.0:
-        components.append(Component(MASS, _fixed(line(rows.pull_N))))
-    if rows.rate_N_per_s is not None and float(rows.rate_N_per_s.std()) > 0.0:
-        components.append(Component(CLOCKS, _fixed(line(rows.rate_N_per_s))))
+    for what, values in ((MASS, rows.pull_N), (CLOCKS, rows.rate_N_per_s)):
+        if values is not None and float(values.std()) > 0.0:
+            components.append(Component(what, _fixed(line(values))))
     components.append(Component(SCATTER, _fixed(unit(np.eye(len(rows.excess_N))))))
     return ComponentModel(tuple(components), tuple(lengths), revisited)
 

@@ -34,11 +34,22 @@ def covariances(model: ComponentModel, lengths: dict[str, float]) -> list[Floats
     return [component.covariance(lengths) for component in model.components]
 
 
-def restricted(kernels: list[Floats], variances: Floats, y: Floats) -> tuple[float, Floats]:
-    """The restricted log likelihood of `y` [rows], and its derivatives by the logarithms of the variances."""
+def factored(kernels: list[Floats], variances: Floats) -> tuple[Floats, bool]:
+    """Cholesky factor of the covariance of the rows, for `cho_solve`."""
     whole = np.tensordot(variances, np.array(kernels), axes=1)
     whole[np.diag_indices_from(whole)] += 1e-9 * max(float(variances.sum()), 1e-12)
-    factor = cho_factor(whole, lower=True, check_finite=False)
+    return cho_factor(whole, lower=True, check_finite=False)
+
+
+def solved(kernels: list[Floats], variances: Floats, y: Floats) -> tuple[tuple[Floats, bool], Floats]:
+    """The factor, and the inverse of the covariance on `y` and on ones, [rows, 2]."""
+    factor = factored(kernels, variances)
+    return factor, cho_solve(factor, np.stack([y, np.ones(len(y))], axis=1), check_finite=False)
+
+
+def restricted(kernels: list[Floats], variances: Floats, y: Floats) -> tuple[float, Floats]:
+    """The restricted log likelihood of `y` [rows], and its derivatives by the logarithms of the variances."""
+    factor = factored(kernels, variances)
     inverse = cho_solve(factor, np.eye(len(y)), check_finite=False)
     ones = inverse.sum(axis=0)
     total = float(ones.sum())
@@ -107,10 +118,7 @@ def fitted(
 
 def restricted_value(kernels: list[Floats], variances: Floats, y: Floats) -> float:
     """The restricted log likelihood alone."""
-    whole = np.tensordot(variances, np.array(kernels), axes=1)
-    whole[np.diag_indices_from(whole)] += 1e-9 * max(float(variances.sum()), 1e-12)
-    factor = cho_factor(whole, lower=True, check_finite=False)
-    both = cho_solve(factor, np.stack([y, np.ones(len(y))], axis=1), check_finite=False)
+    factor, both = solved(kernels, variances, y)
     total = float(both[:, 1].sum())
     square = float(y @ both[:, 0]) - float(both[:, 0].sum()) ** 2 / total
     return -float(np.log(np.diag(factor[0])).sum()) - 0.5 * math.log(total) - 0.5 * square

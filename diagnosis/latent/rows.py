@@ -17,7 +17,7 @@ class ExcessRows(NamedTuple):
     """Excess levels of one signal. Arrays are [rows], in time order within a run."""
 
     signal: str  # BREAKAWAY or SLIDING
-    excess_N: Floats  # of the friction, positive against the motion, over what the rig table describes
+    excess_N: Floats  # of the friction, positive against the motion, over the described friction
     sign: Floats  # of the motion, 1 or -1
     place_m: Floats
     t_s: Floats  # since the first run began
@@ -27,7 +27,7 @@ class ExcessRows(NamedTuple):
     load_N: Floats | None  # normal load
     pull_N: Floats | None  # inertia, positive along the motion; of an axis
     rate_N_per_s: Floats | None  # of the force, positive along the motion; of an axis
-    noise_N: float  # standard deviation of what the sensors add to a row
+    noise_N: float  # standard deviation that the sensors add to a row
 
     def some(self, mask: npt.NDArray[Any]) -> "ExcessRows":
         """The rows `mask`: indices or marks."""

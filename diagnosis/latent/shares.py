@@ -13,7 +13,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from bridge.arrays import Indices
 from diagnosis.latent.components import NOISE, SCATTER
-from diagnosis.latent.reml import Fitted, covariances, fitted, restricted_value
+from diagnosis.latent.reml import Fitted, covariances, factored, fitted, restricted_value, solved
 from diagnosis.latent.rows import ExcessRows, Floats
 
 _PROPOSED, _DRAWS = 120, 80  # variances and lengths proposed for the interval, and courses drawn
@@ -74,10 +74,7 @@ def _split(kernels: list[Floats], variances: Floats, y: Floats, held: Indices) -
 
 def _weights(kernels: list[Floats], variances: Floats, y: Floats) -> Floats:
     """The inverse of the covariance on what the mean leaves of `y`."""
-    whole = np.tensordot(variances, np.array(kernels), axes=1)
-    whole[np.diag_indices_from(whole)] += 1e-9 * max(float(variances.sum()), 1e-12)
-    factor = cho_factor(whole, lower=True, check_finite=False)
-    both = cho_solve(factor, np.stack([y, np.ones(len(y))], axis=1), check_finite=False)
+    _, both = solved(kernels, variances, y)
     return both[:, 0] - both[:, 1] * float(both[:, 0].sum()) / float(both[:, 1].sum())
 
 
@@ -85,29 +82,23 @@ def _numbers(
     fitted_model: Fitted, y: Floats, fit: Indices, random: np.random.Generator
 ) -> list[tuple[Floats, list[Floats]]]:
     """Draws of the variances, and the covariances at the drawn lengths."""
-    names = list(fitted_model.lengths)
     bounds = {length.name: length for length in fitted_model.model.lengths}
-    kernels = [kernel[fit[:, None], fit] for kernel in covariances(fitted_model.model, fitted_model.lengths)]
+    every = covariances(fitted_model.model, fitted_model.lengths)
+    kernels = [kernel[fit[:, None], fit] for kernel in every]
     root = np.linalg.cholesky(_spread(kernels, fitted_model.variances))
     count = len(fitted_model.variances)
-    fixed = [None if component.lengths else kernel for component, kernel in zip(
-        fitted_model.model.components, covariances(fitted_model.model, fitted_model.lengths), strict=True)]  # fmt: skip
     drawn: list[tuple[Floats, list[Floats]]] = []
     chances: list[float] = []
     for _ in range(_PROPOSED):
         normal = random.standard_normal(count)
         variances = fitted_model.variances * np.exp(root @ normal)
         lengths = {
-            name: float(
-                np.clip(
-                    fitted_model.lengths[name] + 0.4 * random.standard_normal(), bounds[name].low, bounds[name].high
-                )
-            )
-            for name in names
+            name: min(max(at + 0.4 * random.standard_normal(), bounds[name].low), bounds[name].high)
+            for name, at in fitted_model.lengths.items()
         }
         all_rows = [
-            component.covariance(lengths) if known is None else known
-            for component, known in zip(fitted_model.model.components, fixed, strict=True)
+            component.covariance(lengths) if component.lengths else known
+            for component, known in zip(fitted_model.model.components, every, strict=True)
         ]
         value = restricted_value([kernel[fit[:, None], fit] for kernel in all_rows], variances, y[fit])
         # flat in the standard deviations, against the density that the draw came from
@@ -120,9 +111,7 @@ def _numbers(
 
 def _spread(kernels: list[Floats], variances: Floats) -> Floats:
     """Covariance of the logarithms of the variances, from the expected information, no wider than `_WIDEST`."""
-    whole = np.tensordot(variances, np.array(kernels), axes=1)
-    whole[np.diag_indices_from(whole)] += 1e-9 * max(float(variances.sum()), 1e-12)
-    inverse = cho_solve(cho_factor(whole, lower=True), np.eye(len(whole)))
+    inverse = cho_solve(factored(kernels, variances), np.eye(len(kernels[0])), check_finite=False)
     moved = [size * (inverse @ kernel) for size, kernel in zip(variances, kernels, strict=True)]
     information = 0.5 * np.array([[float(np.vdot(a.T, b)) for b in moved] for a in moved])
     return np.linalg.inv(information + np.eye(len(variances)) / _WIDEST**2)

@@ -76,7 +76,7 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
         clocks = [] if any(_numbers_rows(table, name) for name in left) else left
         clues = (
             ([name for name in table.columns if name not in numeric], _has_dates, "holds times"),
-            (left, _rises_in_time, "rises in even steps of a unit of time"),
+            (left, _rises_in_time, "rises evenly and has a unit of time"),
             (clocks, _rises, "rises in even steps"),
         )
         for names, shows_time, why in clues:

@@ -8,12 +8,10 @@ import numpy as np
 
 from bridge.arrays import Floats
 from bridge.results import in_json
-from diagnosis.look.breakaway import breakaway_of
+from diagnosis.look.laid_over import breakaway_of, with_slip_times
 from diagnosis.look.numbers import Number, jackknifed, mean_of
-from diagnosis.look.record import OneWayPart, parts_of
 from diagnosis.look.slip_shape import Shape, falls_of, shape_of
-from diagnosis.look.slip_times import with_slip_times
-from diagnosis.look.slips import RecordSlips, find_slips
+from diagnosis.look.slips import OneWayPart, RecordSlips, find_slips, parts_of
 from diagnosis.look.speeds import AtSpeed, over_dwell, over_speed
 from diagnosis.look.sticks import Cycle, cycles_of
 
@@ -88,10 +86,8 @@ def look(
     slips_of_parts = [slips for slips in (find_slips(part) for part in parts) if slips is not None]
     cycles = [cycle for slips in slips_of_parts for cycle in cycles_of(slips, known.speed_mps)]
     weights = [len(slips.tops) for slips in slips_of_parts]
-    straight = (
-        float(np.average([slips.straight for slips in slips_of_parts], weights=weights)) if slips_of_parts else 0.0
-    )
-    sticks = bool(slips_of_parts) and straight >= 0.5
+    straight = [slips.straight for slips in slips_of_parts]
+    sticks = bool(slips_of_parts) and float(np.average(straight, weights=weights)) >= 0.5
     seconds = sum(float(part.t_s[-1] - part.t_s[0]) for part in parts)
     step_s = float(np.median([part.step_s for part in parts]))
     numbers: dict[str, Number] = {}
@@ -132,13 +128,10 @@ def look(
 
 def _of_coefficient(numbers: dict[str, Number]) -> dict[str, Number]:
     """Numbers of a friction coefficient: dimensionless, and without the numbers of the drive's spring."""
-    left = {
-        name: number
+    return {
+        _MU.get(name, name): number._replace(unit=re.sub(r"^N\b", "1", number.unit))
         for name, number in numbers.items()
         if name not in ("series_N_per_m", "stiffness_N_per_m", "mass_kg")
-    }
-    return {
-        _MU.get(name, name): number._replace(unit=re.sub(r"^N\b", "1", number.unit)) for name, number in left.items()
     }
 
 

@@ -1,17 +1,27 @@
-"""Slips of a part of a record. The time scale comes from the part: falls of 10 ms and of 10 s are found alike.
+"""A record as even parts of one direction, and the slips of a part.
+
+The time scale comes from the part: falls of 10 ms and of 10 s are found alike.
 
 A fall after a straight climb is a slip; a swing without a straight climb is not a slip. A slip may take longer than the stick
 before it.
 """
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import uniform_filter1d
 
 from bridge.arrays import Floats, Indices
-from diagnosis.look.record import OneWayPart, smoothed
+from bridge.log.watches.arrays import noise_of
 from diagnosis.slips import NOISE_SPANS, turning_points
 
+_GAP_STEPS = 10.0  # usual steps; a longer gap cuts the record, as it may hide slips
+FEWEST = 16  # fewest samples of a part
+_UNEVEN = 0.01  # share of a step; with a larger deviation from an even clock the record is interpolated
+_BOTH_WAYS = 0.3  # share of its largest size that the force reaches with either sign on a rig that moves both ways
+_TURN = 0.1  # share of that size: a force that changes sign by less has not turned
 # Smallest fall as a share of the range between the 1st and the 99th percentile. Smaller: ripple counts; larger: small slips of a
 # record with large ones are lost.
 _SHARE = 0.04
@@ -27,6 +37,73 @@ _AS_QUICK = 3.0  # ratio of fall to climb duration above which the shape of the 
 _FEWEST_OF_FALL = 8  # fewest samples of a fall whose shape is judged
 _POINTS = 41  # points at which the falls are averaged
 _LEAST_STRAIGHT = 0.5  # smallest share of straight climbs in stick-slip; below it the force swings
+
+
+class OneWayPart(NamedTuple):
+    """An even stretch in which the drive goes one way. Arrays are [samples]; the force is positive along the motion."""
+
+    t_s: Floats
+    force_N: Floats
+    position_m: Floats | None  # position of the drive, rising along the motion
+    sign: float  # sign of the measured force
+    noise_N: float  # standard deviation of the force from sample to sample
+
+    @property
+    def step_s(self) -> float:
+        """Seconds between samples."""
+        return float(self.t_s[-1] - self.t_s[0]) / (len(self.t_s) - 1)
+
+
+def parts_of(t_s: Floats, force_N: Floats, position_m: Floats | None = None) -> list[OneWayPart]:
+    """The even parts of a record, [samples] each, without samples that hold no number or go back in time."""
+    columns = [t_s, force_N] if position_m is None else [t_s, force_N, position_m]
+    columns = [column[np.isfinite(columns).all(axis=0)] for column in columns]
+    latest_s = np.maximum.accumulate(np.concatenate([[-np.inf], columns[0]]))
+    t_s, force_N, *positions = (column[columns[0] > latest_s[:-1]] for column in columns)
+    position_m = positions[0] if positions else None
+    if len(t_s) < FEWEST:
+        return []
+    step_s = float(np.median(np.diff(t_s)))
+    gaps = np.flatnonzero(np.diff(t_s) > _GAP_STEPS * step_s) + 1
+    edges = np.unique(np.concatenate([[0], gaps, [len(t_s)]]))
+    edges = np.unique(np.concatenate([edges, _turns(force_N)]))
+    parts: list[OneWayPart] = []
+    for first, last in pairwise(edges.tolist()):
+        if last - first < FEWEST:
+            continue
+        inside = slice(first, last)
+        sign = -1.0 if float(np.median(force_N[inside])) < 0.0 else 1.0
+        position = None if position_m is None else position_m[inside]
+        if position is not None and position[-1] < position[0]:
+            position = -position
+        parts.append(_even(t_s[inside], sign * force_N[inside], position, sign))
+    return parts
+
+
+def _turns(force_N: Floats) -> npt.NDArray[np.int64]:
+    """Indices where the direction turns; empty for a rig that moves one way."""
+    size = float(np.quantile(np.abs(force_N), 0.99))
+    if min(np.quantile(force_N, 0.95), -np.quantile(force_N, 0.05)) < _BOTH_WAYS * size:
+        return np.zeros(0, np.int64)
+    side = np.where(force_N > _TURN * size, 1, np.where(force_N < -_TURN * size, -1, 0))
+    known = np.flatnonzero(side)
+    turned = np.flatnonzero(np.diff(side[known])) + 1
+    return known[turned]
+
+
+def _even(t_s: Floats, force_N: Floats, position_m: Floats | None, sign: float) -> OneWayPart:
+    step_s = float(t_s[-1] - t_s[0]) / (len(t_s) - 1)
+    even_s = t_s[0] + step_s * np.arange(len(t_s))
+    if np.abs(t_s - even_s).max() > _UNEVEN * step_s:
+        force_N = np.interp(even_s, t_s, force_N)
+        position_m = None if position_m is None else np.interp(even_s, t_s, position_m)
+    return OneWayPart(even_s, force_N, position_m, sign, float(noise_of(force_N)))
+
+
+def smoothed(values: Floats, width: int) -> Floats:
+    """Moving mean over `width` samples, [samples]; an even width is made odd."""
+    width = width | 1
+    return values if width <= 1 else np.asarray(uniform_filter1d(values, width, mode="mirror"), np.float64)
 
 
 class RecordSlips(NamedTuple):

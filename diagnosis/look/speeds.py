@@ -1,4 +1,4 @@
-"""Friction over the speed of the drive, and over the dwell before a slip."""
+"""Friction over the speed of the drive and over the dwell before a slip; whether breakaway or speed drifts over the record."""
 
 from typing import NamedTuple
 
@@ -6,8 +6,9 @@ import numpy as np
 
 from bridge.arrays import Floats
 from bridge.log.watches.arrays import noise_of
+from bridge.units import prefixed
 from diagnosis.look.numbers import Number, mean_of, slope_of
-from diagnosis.look.record import OneWayPart, smoothed
+from diagnosis.look.slips import OneWayPart, smoothed
 from diagnosis.look.sticks import Cycle
 
 VARIES = 1.3  # ratio of largest to smallest speed above which friction is reported over speed
@@ -20,6 +21,9 @@ _MOST_INFLATED = 10.0  # Marquardt's bound: largest inflation of the slope's var
 _ENOUGH = 0.1  # a rate that varies less than this share of the dwell's variation makes at most a tenth of the slope
 _DWELLS = 1.25  # ratio of largest to smallest dwell (of nine in ten slips) above which breakaway is reported over dwell
 _ASIDE = 0.05  # share of the dwells at each end that this ratio leaves out; at least one slip
+_FEWEST_FOR_DRIFT = 8  # fewest slips: fewer show a drift by chance
+_SURE_DRIFT = 2.5  # smallest drift that is reported, in half intervals of 90 %
+_OF_SWING = 0.1  # smallest drift, as a share of the fall in a slip: less changes no number beyond its reading accuracy
 
 
 class AtSpeed(NamedTuple):
@@ -123,3 +127,43 @@ def _dwells(cycles: list[Cycle]) -> Floats | None:
     dwells = np.sort(rows[:, 0])
     aside = max(round(_ASIDE * len(dwells)), 1)  # one slip alone shows no dependence
     return None if dwells[-1 - aside] < _DWELLS * dwells[aside] else rows
+
+
+def unsteady(cycles: list[Cycle], unit: str) -> list[str]:
+    """A message on a breakaway that drifts, and a message on sticks of several speeds where only one speed is known.
+
+    Args:
+        cycles: every slip of the record.
+        unit: unit of the force; "1" for a coefficient.
+
+    """
+    tops = [cycle for cycle in cycles if np.isfinite(cycle.restick_force_N)]
+    sticks = [cycle for cycle in cycles if np.isfinite(cycle.slope_N_per_s)]
+    drifts = _drift(tops, "" if unit == "1" else unit) if len(tops) >= _FEWEST_FOR_DRIFT else []
+    return drifts + (_speeds(sticks) if len(sticks) >= _FEWEST_FOR_DRIFT else [])
+
+
+def _drift(tops: list[Cycle], unit: str) -> list[str]:
+    t_s = np.array([cycle.breakaway_t_s for cycle in tops])
+    rate = slope_of(t_s, np.array([cycle.breakaway_force_N for cycle in tops]), f"{unit}/s")
+    drift = rate.value * float(np.ptp(t_s)) if rate is not None else 0.0
+    swing = float(np.median([cycle.breakaway_force_N - cycle.restick_force_N for cycle in tops]))
+    if rate is None or abs(rate.value) < _SURE_DRIFT * (rate.high - rate.value) or abs(drift) < _OF_SWING * swing:
+        return []
+    factor, shown = prefixed(abs(drift), unit) if unit else (1.0, "")
+    verb, size = "rises" if drift > 0.0 else "falls", f"{abs(drift) * factor:.3g} {shown}".rstrip()
+    return [
+        f"no steady level: the breakaway {verb} by {size} over the record (running in, heat, zero of the sensor), and the "
+        "numbers are means over it; look at a part of the record"
+    ]
+
+
+def _speeds(sticks: list[Cycle]) -> list[str]:
+    speeds = [cycle.speed_mps for cycle in sticks if np.isfinite(cycle.speed_mps)]
+    low, high = np.quantile([cycle.slope_N_per_s for cycle in sticks], [0.1, 0.9])
+    if (speeds and max(speeds) > VARIES * min(speeds)) or not 0.0 < VARIES * low < high:
+        return []
+    return [
+        f"no single speed: sticks climb by {low:.3g} to {high:.3g} a second, so stiffness and mass hold for none of them; give "
+        "the drive's position, or look at a part with one speed"
+    ]

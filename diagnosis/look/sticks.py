@@ -6,8 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bridge.arrays import Floats
-from diagnosis.look.record import OneWayPart, parts_of, smoothed
-from diagnosis.look.slips import RecordSlips, find_slips
+from diagnosis.look.slips import OneWayPart, RecordSlips, find_slips, parts_of, smoothed
 
 # Begin and end of the part of a stick in which its slope is measured: a re-stick rings, and before a breakaway the slide creeps.
 _FROM, _TO = 0.25, 0.9
@@ -19,7 +18,7 @@ _DEGREE = 4  # degree of the polynomial through a stick: a contact that gives wa
 # where its contact gives way.
 _LEAST_OF_DRIVE = 0.5
 _ENOUGH = 1 << 20  # samples that are searched: a hundred slips of a slow rig at 10 kHz
-_HALVES = 4  # least width of the smoothing [samples] for which half of the samples locates a peak and half measures it
+_HALVES = 4  # from this width of the smoothing [samples] on, half of the samples locates a peak and half measures it
 
 
 class Cycle(NamedTuple):
@@ -118,18 +117,16 @@ def _stick(
     else:
         speed = _slope(t_s, part.position_m[first:last])
     known = {"slope_N_per_s": slope, "speed_mps": speed}
-    if not speed > 0.0 or (part.position_m is not None and _halted(part.position_m, began, top, first, last)):
+    if not speed > 0.0:
         return known
+    if part.position_m is not None:
+        in_part_m, in_stick_m = (part.position_m[b] - part.position_m[a] for a, b in ((first, last - 1), (began, top)))
+        if in_part_m < _EVEN * (_TO - _FROM) * in_stick_m:  # the drive has halted
+            return known
     # the smoothing locates a breakaway to its width: nearer to it the slip may have begun
     stuck = slice(0, max(min(last, top - width) - first, 0))
     drive, contact = _compliances(speed * (t_s - t_s[0])[stuck], force_N[stuck], breakaway_N)
     return known | {"stiffness_N_per_m": slope / speed, "drive_m_per_N": drive, "contact_m_per_N": contact}
-
-
-def _halted(position_m: Floats, began: int, top: int, first: int, last: int) -> bool:
-    """Whether the drive moves much less in the measured part of a stick than an even drive would."""
-    in_part_m, in_stick_m = position_m[last - 1] - position_m[first], position_m[top] - position_m[began]
-    return bool(in_part_m < _EVEN * (_TO - _FROM) * in_stick_m)
 
 
 def _loading(part: OneWayPart, began: int, top: int, width: int) -> float:

@@ -5,8 +5,7 @@ import math
 from bridge.units import counted, fixed_digits, prefixed
 from diagnosis.look.look import LookResult
 from diagnosis.look.numbers import Number
-from diagnosis.look.speeds import confounded
-from diagnosis.look.steady import unsteady
+from diagnosis.look.speeds import confounded, unsteady
 
 # in the order of the output
 TITLES = {
@@ -53,11 +52,10 @@ def _digits(value: float, width: float) -> int:
 def headline(seen: LookResult) -> str:
     """The result in one line."""
     if not seen.cycles:
-        if seen.known.coefficient:
-            level = f"the friction coefficient is {seen.mean_force_N:.4g} on average, with {seen.noise_N:.2g} of noise"
-            return f"no slip in {seen.seconds:.3g} s: {level}"
-        quantity, unit = ("torque" if seen.known.torsion else "force"), seen.known.force_unit
-        level = f"the {quantity} is {seen.mean_force_N:.4g} {unit} on average, with {seen.noise_N:.2g} {unit} of noise"
+        known = seen.known
+        quantity = "friction coefficient" if known.coefficient else "torque" if known.torsion else "force"
+        unit = "" if known.coefficient else f" {known.force_unit}"
+        level = f"the {quantity} is {seen.mean_force_N:.4g}{unit} on average, with {seen.noise_N:.2g}{unit} of noise"
         return f"no slip in {seen.seconds:.3g} s: {level}"
     if not seen.sticks:
         swings = f"{counted(len(seen.cycles), 'swing')} in {seen.seconds:.3g} s"

@@ -40,11 +40,6 @@ PHASE = "phase_rad"
 OTHER_PHASE = "other_phase_rad"  # phase of a second wave
 
 
-def phase_of(file: str) -> str:
-    """The name of the phase in the run `file`, for every run but the first."""
-    return of_run(PHASE, file)
-
-
 def is_phase(name: str) -> bool:
     """Whether a parameter is a phase, for all runs or for a single run."""
     return name in {PHASE, OTHER_PHASE} or is_of_run(name, PHASE)
@@ -69,7 +64,7 @@ def in_run(table: Table, file: str, held_out: bool, seed: int | None) -> dict[st
     if not has_own_phases(table):
         return plain
     if not held_out:
-        return plain | {PHASE: table.get(phase_of(file), plain[PHASE])}
+        return plain | {PHASE: table.get(of_run(PHASE, file), plain[PHASE])}
     if seed is None:
         return None
     return plain | {PHASE: float(np.random.default_rng([seed, crc32(file.encode())]).uniform(-math.pi, math.pi))}

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from bridge.arrays import Floats
+from bridge.arrays import Floats, Records
 from bridge.kernel import kernel
 from bridge.layouts import PlantMemory, PlantParams
 from bridge.wire.channels import CHANNELS
@@ -64,7 +64,7 @@ def predict_many(
 ) -> list[dict[str, Floats] | None]:
     """Result of `predict` for each of many rigs in the same run; the entries of all rigs are at the same blocks.
 
-    With `wanted`, the first `wanted` rigs are predicted, and further rigs only in empty lanes; the rest is None.
+    With `wanted`, the first `wanted` rigs are predicted, and further rigs only in empty lanes, with None for the others.
     """
     rigs = [built(config, force_driven, commands, start) for config, start in zip(configs, starts, strict=True)]
     if force_driven:
@@ -121,47 +121,9 @@ def _side_by_side(rigs: Sequence[Rig], commands: CommandedRun, entries: Sequence
 
 
 @kernel
-def _predict(
-    params: npt.NDArray[Any],
-    state: npt.NDArray[Any],
-    drive: Floats,
-    frequency_Hz: Floats,
-    amplitude_m: Floats,
-    steps: npt.NDArray[np.int64],
-    analogue: Floats,
-    truth: Floats,
-    out: Floats,
-) -> None:
-    p: PlantParams = params[0]
-    channels, truths = analogue.shape[0], truth.shape[0]
-    for block in range(drive.shape[0]):
-        samples = steps[block]
-        p.samples_per_block = samples
-        p.steps_per_sample = 1
-        p.dt_s = BLOCK_S / samples
-        # contiguous, as in all other calls: other arrays would make Numba compile the kernel again
-        block_analogue = analogue.ravel()[: channels * samples].reshape((channels, samples))
-        block_truth = truth.ravel()[: truths * samples].reshape((truths, samples))
-        advance_disturbed(
-            params, state, drive[block], frequency_Hz[block], amplitude_m[block], block_analogue, block_truth
-        )
-        for row in range(channels):
-            total = 0.0
-            for i in range(samples):
-                total += block_analogue[row, i]
-            out[row, block] = total / samples
-        for row in range(1, 3):
-            total = 0.0
-            for i in range(samples):
-                about = block_analogue[row, i] - out[row, block]
-                total += about * about
-            out[4 + row, block] = math.sqrt(total / samples)
-
-
-@kernel
 def _follow(
-    params: npt.NDArray[Any],
-    state: npt.NDArray[Any],
+    params: Records,
+    state: Records,
     force_N: Floats,
     frequency_Hz: Floats,
     amplitude_m: Floats,
@@ -173,10 +135,10 @@ def _follow(
     stiffness: float,
     damping: float,
 ) -> None:
-    """Kernel `_predict` along a measured motion; the force in `out` is the force that keeps the model on this motion."""
+    """Predict along a measured motion; the force in `out` is the force that keeps the model on this motion."""
+    p: PlantParams = params[0]
     s: PlantMemory = state[0]
-    column = np.empty((out.shape[0], 1))
-    force = np.empty(1)
+    channels, truths = analogue.shape[0], truth.shape[0]
     ahead_before_m = position_m[0] - s.x
     rate_mps = 0.0
     share = 1.0 - math.exp(-BLOCK_S / _RATE_FILTER_S)
@@ -184,8 +146,23 @@ def _follow(
         ahead_m = position_m[block] - s.x
         rate_mps += share * ((ahead_m - ahead_before_m) / BLOCK_S - rate_mps)
         ahead_before_m = ahead_m
-        force[0] = force_N[block] + stiffness * ahead_m + damping * rate_mps
-        _predict(params, state, force, frequency_Hz[block : block + 1], amplitude_m[block : block + 1],
-                 steps[block : block + 1], analogue, truth, column)  # fmt: skip
-        for row in range(out.shape[0]):
-            out[row, block] = column[row, 0]
+        force = force_N[block] + stiffness * ahead_m + damping * rate_mps
+        samples = steps[block]
+        p.samples_per_block = samples
+        p.steps_per_sample = 1
+        p.dt_s = BLOCK_S / samples
+        # contiguous, as in all other calls: other arrays would make Numba compile the kernel again
+        block_analogue = analogue.ravel()[: channels * samples].reshape((channels, samples))
+        block_truth = truth.ravel()[: truths * samples].reshape((truths, samples))
+        advance_disturbed(params, state, force, frequency_Hz[block], amplitude_m[block], block_analogue, block_truth)
+        for row in range(channels):
+            total = 0.0
+            for i in range(samples):
+                total += block_analogue[row, i]
+            out[row, block] = total / samples
+        for row in range(1, 3):
+            total = 0.0
+            for i in range(samples):
+                about = block_analogue[row, i] - out[row, block]
+                total += about * about
+            out[4 + row, block] = math.sqrt(total / samples)

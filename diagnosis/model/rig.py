@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.evidence.manifest import RigTable
+from bridge.arrays import Records
+from diagnosis.evidence.manifest import RigTable, rig_file_tables
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.features.segments import CommandedRun
 from plant.config import RigConfig
@@ -32,9 +33,8 @@ class Start(NamedTuple):
     position_m: float
     velocity_mps: float = 0.0
     age_s: float = AGE_BEFORE_S  # age of the contact
-    drive_m: float | None = (
-        None  # position by the drive's sensor, whose zero differs from the zero of the slide's sensor
-    )
+    # position by the drive's sensor, whose zero differs from the zero of the slide's sensor
+    drive_m: float | None = None
 
 
 class StartState(NamedTuple):
@@ -49,8 +49,8 @@ class StartState(NamedTuple):
 class Rig(NamedTuple):
     """Records for the plant's kernel."""
 
-    params: npt.NDArray[Any]  # [1]
-    state: npt.NDArray[Any]  # [1], at the start of the run
+    params: Records  # [1]
+    state: Records  # [1], at the start of the run
     steps: npt.NDArray[np.int64]  # steps in each block, [blocks]
 
 
@@ -67,27 +67,12 @@ def rig_config(rig: RigTable, values: dict[str, float], effects: Effects, roughn
 
     Raises pydantic.ValidationError when the plant cannot simulate such a rig.
     """
-    value = {name: known for name, known in rig.values().items() if known is not None} | values
-    contact: dict[str, Any] = {
-        "stiffness_N_per_m": value["contact_stiffness_N_per_m"],
-        "damping_Ns_per_m": value["contact_damping_Ns_per_m"],
-        "viscous_damping_Ns_per_m": value["viscous_damping_Ns_per_m"],
-        "coulomb_force_N": value["coulomb_force_N"],
-        "static_force_N": max(value["static_force_N"], value["coulomb_force_N"]),
-        "stribeck_velocity_mps": value["stribeck_velocity_mps"],
-        "stribeck_tail": value.get("stribeck_tail", 0.0),
-    }
+    table: dict[str, Any] = {**rig_file_tables(rig.values() | values), "effects": effects}
     if roughness is not None:
-        contact |= {
+        table["contact"] |= {
             "roughness_ratio": roughness.ratio,
             "roughness_length_m": roughness.length_m,
             "roughness_seed": roughness.seed,
-        }
-    table: dict[str, Any] = {"contact": contact, "slide": {"mass_kg": value["mass_kg"]}, "effects": effects}
-    if rig.drive == "spring":
-        table["drive"] = {
-            "stiffness_N_per_m": value["drive_stiffness_N_per_m"],
-            "damping_Ns_per_m": value["drive_damping_Ns_per_m"],
         }
     # the exciter of the model follows its command at once and without limit; any deviation from this is a gap
     table["piezo"] = {"amplitude_max_m": 1.0, "amplitude_slew_m_per_s": 0.0}
@@ -103,20 +88,7 @@ def built(config: RigConfig, force_driven: bool, commands: CommandedRun, start: 
     p.frequency_min_Hz, p.frequency_max_Hz = 1.0, 1e9
     p.force_driven = force_driven
     p.disturbed = p.disturbed or force_driven
-    _set_start(p, state[0], start, force_driven)
-    contact_rad_per_s = math.sqrt(p.k_t / p.m)
-    coarsest_s = min(_LED_STEP_S if force_driven else _COARSEST_STEP_S, _CONTACT_STEP / contact_rad_per_s)
-    if p.base_m_per_N > 0.0:  # the contact spring between slide and base is stable up to twice this step
-        base_kg = 1.0 / (p.base_m_per_N * (2.0 * math.pi * p.base_Hz) ** 2)
-        coarsest_s = min(coarsest_s, math.sqrt(base_kg / p.k_t))
-    steps = np.maximum(
-        math.ceil(BLOCK_S / coarsest_s - 1e-9),
-        np.ceil(_STEPS_PER_PERIOD * commands.frequency_Hz * BLOCK_S - 1e-9),
-    ).astype(np.int64)
-    return Rig(params, state, steps)
-
-
-def _set_start(p: Any, s: Any, start: Start, force_driven: bool) -> None:
+    s: Any = state[0]
     held_N = float(np.clip(start.force_N, -p.F_s, p.F_s))
     s.x, s.v = start.position_m, start.velocity_mps
     s.z = held_N / p.k_t
@@ -130,3 +102,13 @@ def _set_start(p: Any, s: Any, start: Start, force_driven: bool) -> None:
         s.even_m = s.s_d
         if start.drive_m is not None and p.ripple_wavelength_m > 0.0:
             p.ripple_phase_rad += 2.0 * math.pi * (even_m(p, start.drive_m) - s.s_d) / p.ripple_wavelength_m
+    contact_rad_per_s = math.sqrt(p.k_t / p.m)
+    coarsest_s = min(_LED_STEP_S if force_driven else _COARSEST_STEP_S, _CONTACT_STEP / contact_rad_per_s)
+    if p.base_m_per_N > 0.0:  # the contact spring between slide and base is stable up to twice this step
+        base_kg = 1.0 / (p.base_m_per_N * (2.0 * math.pi * p.base_Hz) ** 2)
+        coarsest_s = min(coarsest_s, math.sqrt(base_kg / p.k_t))
+    steps = np.maximum(
+        math.ceil(BLOCK_S / coarsest_s - 1e-9),
+        np.ceil(_STEPS_PER_PERIOD * commands.frequency_Hz * BLOCK_S - 1e-9),
+    ).astype(np.int64)
+    return Rig(params, state, steps)

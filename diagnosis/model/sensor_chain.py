@@ -8,16 +8,20 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
 
 from bridge.arrays import Floats
 from diagnosis.features.grid import BLOCK_S
+from diagnosis.features.segments import CommandedRun
 from diagnosis.model.rig import Effects
 from plant.effects.library import EFFECTS
 from plant.effects.sensors import LAG_ORDERS
 
 Signals = dict[str, Floats]
 SENSOR_EFFECTS = tuple(name for name, effect in EFFECTS.items() if effect.acts_on == "sensor")
+# Standard deviation of the smoothing of the rate that inverts a low-pass. Too small: noise; too large: smeared reversals.
+_DERIVATIVE_S = 2e-3
 
 
 class SensorChain(NamedTuple):
@@ -132,3 +136,33 @@ def low_pass(values: Floats, lag_s: float) -> Floats:
     # the filter starts at rest on the first value
     result, _ = lfilter([now, now], [1.0, -keep], values, zi=np.array([values[0] * (1.0 - now)]))
     return np.asarray(result)
+
+
+def relative(chain: SensorChain) -> SensorChain:
+    """The chain with all delays relative to the position sensor: along a measured motion only their difference shows."""
+    return chain._replace(force_delay_s=chain.force_delay_s - chain.position_delay_s, position_delay_s=0.0)
+
+
+def true_commands(commands: CommandedRun, effects: Effects, chain: SensorChain) -> CommandedRun:
+    """The commands of a force-driven run with the true force [N] and the true motion: the inverse of `sensed`.
+
+    `chain` is from `relative`.
+    """
+    motion = commands.motion
+    assert motion is not None, "a force drive has a motion"  # noqa: S101
+    motion = motion._replace(position_m=motion.position_m / chain.position_scale)
+    return commands._replace(drive=_true_force(commands.drive, effects, chain), motion=motion)
+
+
+def _true_force(force_N: Floats, effects: Effects, chain: SensorChain) -> Floats:
+    force_N = true_force_N(force_N, effects, (np.arange(len(force_N)) + 0.5) * BLOCK_S)
+    delay_s = chain.force_delay_s
+    if "force-sensor-delay" in effects:
+        delay_s += float(effects["force-sensor-delay"]["delay_s"])
+    force_N = delayed(force_N, -delay_s)
+    if "force-sensor-lag" in effects:
+        table = effects["force-sensor-lag"]
+        for _ in range(1 if table["form"] == "first-order" else 2):
+            rate = gaussian_filter1d(force_N, _DERIVATIVE_S / BLOCK_S, order=1) / BLOCK_S
+            force_N = force_N + float(table["lag_s"]) * rate
+    return force_N

@@ -9,13 +9,15 @@ from bridge.units import counted
 from diagnosis.features.feature import Scales, Signals
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.features.segments import Segment
-from diagnosis.features.slips import SegmentSlips
+from diagnosis.features.slips import SegmentSlips, find_slips
 from diagnosis.gap.prepare import Prepared
-from diagnosis.pictures.breakaways import slips_of
+from diagnosis.gap.problem import Problem
 from diagnosis.result import Curve, Picture
 
 Style = Literal["measured", "nominal", "retuned", "effect"]
 _POINTS = 700  # points of a curve
+_MOST_RUNS = 5  # most runs with a picture of a cycle
+_SLIP_DIFFERS = 0.03  # smallest relative difference of two mean slips for which a close-up is drawn
 _AXES = {"drive_force_N": "drive force [N]", "mass_accel_mps2": "acceleration of the mass [m/s²]"}
 
 
@@ -32,34 +34,56 @@ class ShownSegment(NamedTuple):
 
     run: Prepared
     segment: Segment
-    versions: tuple[Version, ...]  # measured signals first
+    versions: tuple[Version, ...]  # measured signals, the rig as described, the baseline, the named effects if any
     difference: float
 
 
-def most_telling(run: Prepared, versions: tuple[Version, ...], scales: Scales) -> ShownSegment:
-    """The segment of a run in which measurement and baseline (without a baseline, the last version) differ most."""
-    baseline = next((version for version in versions if version.style == "retuned"), versions[-1])
-    best = ShownSegment(run, run.commands.segments[0], versions, -1.0)
+def cycle_pictures(problem: Problem, models: list[dict[str, Version]]) -> list[Picture]:
+    """The most telling segment of each run, and slips in close-up; `models` have a version for every run by its file."""
+    shown = [
+        _most_telling(
+            run, (Version("measured", "measured", run.signals), *(model[run.file] for model in models)), problem.scales
+        )
+        for run in problem.runs
+        if run.commands.segments
+    ]
+    shown = sorted(shown, key=lambda segment: -segment.difference)[:_MOST_RUNS]
+    shown.sort(key=lambda segment: segment.run.file)
+    drawn = [_force_picture(segment, problem.scales) for segment in shown]
+    for name in ("drive_force_N", "mass_accel_mps2") if problem.rig.drive == "spring" else ():
+        with_it = [segment for segment in shown if {"drive_force_N", name} <= segment.run.signals.keys()]
+        slips = [slip for segment in with_it if (slip := _slip_picture(segment, name, problem.scales)) is not None]
+        best = max(slips, key=_slip_difference, default=None)
+        if best is not None and _slip_difference(best) > _SLIP_DIFFERS:
+            drawn.append(best)
+    return drawn
+
+
+def slips_of(signals: Signals, segment: Segment, scales: Scales) -> SegmentSlips:
+    """The slips of a segment that the drive force shows, in blocks of the run."""
+    first = segment.first
+    slips = find_slips({"drive_force_N": segment.sign * signals["drive_force_N"][first : segment.last]}, scales)
+    return SegmentSlips(slips.tops + first, slips.bottoms + first, slips.middles + first, slips.weights)
+
+
+def _most_telling(run: Prepared, versions: tuple[Version, ...], scales: Scales) -> ShownSegment:
+    """The segment of a run in which measurement and baseline differ most."""
+    measured, baseline = versions[0].signals, versions[2].signals
+    shown: list[ShownSegment] = []
     for segment in run.commands.segments:
-        difference = _difference(versions[0].signals, baseline.signals, segment, scales)
+        if "drive_force_N" in measured:
+            summaries = (_summary(signals, segment, scales) for signals in (measured, baseline))
+            difference = float(np.abs(np.subtract(*summaries)).max())
+            regular = len(slips_of(measured, segment, scales).tops) != 1
+        else:
+            spreads = (
+                signals["mass_accel_mps2"][segment.first : segment.last].std() for signals in (measured, baseline)
+            )
+            difference, regular = float(abs(np.subtract(*spreads))), True
         # where small details decide whether or when the slide slips, a difference means little
-        if segment.at_the_edge or not _is_regular(versions[0].signals, segment, scales):
-            difference *= 0.3
-        if difference > best.difference:
-            best = ShownSegment(run, segment, versions, difference)
-    return best
-
-
-def _is_regular(signals: Signals, segment: Segment, scales: Scales) -> bool:
-    """Whether the segment has no slip, or two or more."""
-    return "drive_force_N" not in signals or len(slips_of(signals, segment, scales).tops) != 1
-
-
-def _difference(measured: Signals, predicted: Signals, segment: Segment, scales: Scales) -> float:
-    if "drive_force_N" not in measured:
-        cut = slice(segment.first, segment.last)
-        return float(abs(measured["mass_accel_mps2"][cut].std() - predicted["mass_accel_mps2"][cut].std()))
-    return float(np.abs(_summary(measured, segment, scales) - _summary(predicted, segment, scales)).max())
+        less = 0.3 if segment.at_the_edge or not regular else 1.0
+        shown.append(ShownSegment(run, segment, versions, less * difference))
+    return max(shown, key=lambda segment: segment.difference)
 
 
 def _summary(signals: Signals, segment: Segment, scales: Scales) -> Floats:
@@ -75,7 +99,7 @@ def _summary(signals: Signals, segment: Segment, scales: Scales) -> Floats:
     return np.array([top_N, bottom_N, level_N, period * scales.force_N]) / scales.force_N
 
 
-def force_picture(shown: ShownSegment, scales: Scales) -> Picture:
+def _force_picture(shown: ShownSegment, scales: Scales) -> Picture:
     """The mean cycle, from slip to slip, if every version has two slips; else the signal over time."""
     name = "drive_force_N" if "drive_force_N" in shown.run.signals else "mass_accel_mps2"
     # with a force drive the force is not a saw tooth, and its phase follows the measured motion
@@ -87,19 +111,11 @@ def force_picture(shown: ShownSegment, scales: Scales) -> Picture:
             cycles = f"mean of {counts[0] - 1} cycles" if counts[0] > 2 else "one cycle"
             title = f"{_place(shown)}: {cycles} from slip to slip"
             return Picture("cycle", title, "time after the middle of the slip [ms]", _AXES[name], tuple(curves))
-        if max(counts) == min(counts) == 1 or (shown.segment.first and min(counts)):
-            # the phase of stick-slip is random, so the first slips are aligned
-            zeros = [float(slip.middles[0]) for slip in slips]
-            title = f"{_place(shown)}: first slips aligned"
-            curves = [
-                _over_time(version, name, shown, zero) for version, zero in zip(shown.versions, zeros, strict=True)
-            ]
-            return Picture("cycle", title, "time after the middle of the first slip [ms]", _AXES[name], tuple(curves))
-    curves = [_over_time(version, name, shown, None) for version in shown.versions]
+    curves = [_over_time(version, name, shown) for version in shown.versions]
     return Picture("cycle", f"{_place(shown)}: over time", "time in the run [s]", _AXES[name], tuple(curves))
 
 
-def slip_picture(shown: ShownSegment, name: str, scales: Scales) -> Picture | None:
+def _slip_picture(shown: ShownSegment, name: str, scales: Scales) -> Picture | None:
     """The mean slip in close-up; None where a version does not slip."""
     curves: list[Curve] = []
     reach = np.arange(-1.5, 2.5, 0.02, dtype=np.float64) * scales.slip_s / BLOCK_S
@@ -118,13 +134,9 @@ def slip_picture(shown: ShownSegment, name: str, scales: Scales) -> Picture | No
     return Picture("cycle", title, "time after the middle of the slip [ms]", _AXES[name], tuple(curves))
 
 
-def slip_difference(shown: ShownSegment, name: str, scales: Scales) -> float:
-    """Difference of measurement and baseline in the mean slip, relative to the slip; 0 if one of them does not slip."""
-    picture = slip_picture(shown, name, scales)
-    if picture is None:
-        return 0.0
-    measured = picture.curves[0].y
-    baseline = next((curve for curve in picture.curves if curve.style == "retuned"), picture.curves[-1]).y
+def _slip_difference(picture: Picture) -> float:
+    """Difference of measurement and baseline in the mean slip, relative to the slip."""
+    measured, baseline = picture.curves[0].y, picture.curves[2].y
     return float((measured - baseline).std() / (measured.std() + 1e-12))
 
 
@@ -141,16 +153,15 @@ def _whole_cycle(version: Version, slips: SegmentSlips) -> Curve:
     return Curve(version.label, share * float(periods.mean()) * BLOCK_S * 1e3, np.mean(cycles, axis=0), version.style)
 
 
-def _over_time(version: Version, name: str, shown: ShownSegment, zero: float | None) -> Curve:
-    """All of a segment over the time in the run [s]; with `zero`, over the time since this block [ms]."""
+def _over_time(version: Version, name: str, shown: ShownSegment) -> Curve:
+    """All of a segment over the time in the run [s]."""
     segment = shown.segment
     values = version.signals[name][segment.first : segment.last]
     block = max(len(values) // _POINTS, 1)
     kept = len(values) // block * block
     mean = values[:kept].reshape(-1, block).mean(axis=1)
     at = segment.first + (np.arange(len(mean), dtype=np.float64) + 0.5) * block
-    x = at * BLOCK_S if zero is None else (at - zero) * BLOCK_S * 1e3
-    return Curve(version.label, x, mean, version.style)
+    return Curve(version.label, at * BLOCK_S, mean, version.style)
 
 
 def _place(shown: ShownSegment) -> str:

@@ -2,7 +2,7 @@
 
 relation            one relation: what it leaves, its columns, and where it holds
 spring, spring_effects, motion, drive, exciter, base    the five relations and their columns
-shapes              what a channel looks like behind a play, a mode, or as a free function of a variable
+shapes              a channel behind a play, a mode, or as a free function of a variable
 products            inner products by run and band of frequency; noise by REML
 search              evidence of single causes, pairs and triples
 outside             patterns and bursts that no column explains

@@ -18,14 +18,17 @@ from diagnosis.relations.products import (
     Products,
     band_edges_Hz,
     band_of_rows,
+    model_columns,
     noise_of,
     products_of,
+    spreads_of,
+    square_left,
     turned_back,
     turned_piece,
 )
 from diagnosis.relations.relation import Floats, Missing, Relation, thinned
 from diagnosis.relations.search import NOTHING, Found, Ranking, chosen_of, ranked, reduced, without_each
-from diagnosis.relations.shares import Shares, model_columns, shares_of, sizes_of
+from diagnosis.relations.shares import Shares, shares_of, sizes_of
 from diagnosis.relations.spring import spring_relation
 
 _FREE = 30.0  # spread of a pattern's coefficients, in rms of what is left: as good as free
@@ -98,7 +101,9 @@ def answered_of(relation: Relation, fitted: list[int]) -> Answered:
     bare = products.values[fitted].sum(axis=(0, 1))
     width = bare.shape[0] - 1
     described = _rms(bare, np.zeros(width), rows)
-    free = noise_of(products, fitted, np.arange(width), _spreads(products, described))
+    spreads = spreads_of(products.terms)
+    as_free = _FREE * max(described, relation.resolution)
+    free = noise_of(products, fitted, np.arange(width), np.where(np.isfinite(spreads), spreads, as_free))
     chosen, noise = NOTHING, noise_of(products, fitted, *model_columns(products, ()))
     ranking, lost = Ranking((), ()), ()
     if relation.effects:
@@ -138,18 +143,8 @@ def answered_of(relation: Relation, fitted: list[int]) -> Answered:
     )
 
 
-def _spreads(products: Products, described: float) -> Floats:
-    """Spread of every column, [columns]; patterns are as good as free."""
-    free = _FREE * max(described, products.relation.resolution)
-    spreads = [
-        np.full(term.values[0].shape[1], term.spread if math.isfinite(term.spread) else free) for term in products.terms
-    ]
-    return np.concatenate([*spreads, np.zeros(0)])
-
-
 def _rms(bare: Floats, size: Floats, rows: float) -> float:
-    with_left = np.append(-size, 1.0)
-    return math.sqrt(max(float(with_left @ bare @ with_left), 0.0) / rows)
+    return math.sqrt(max(square_left(bare, size), 0.0) / rows)
 
 
 def _agreement(products: Products, runs: list[int], noise: BandNoise, chosen: Found, number: int) -> float:

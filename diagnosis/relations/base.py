@@ -6,7 +6,7 @@ from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.feature import scales_of
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.gap.prepare import Prepared
-from diagnosis.relations.relation import Missing, Relation, kept_blocks, lacking, pieces_of, term
+from diagnosis.relations.relation import Missing, Relation, pieces_without_vibration, term
 from diagnosis.relations.shapes import bend, free, mode, rate, slip_phase
 
 NEEDED = ("base_accel_mps2", "drive_force_N", "mass_accel_mps2")
@@ -21,11 +21,9 @@ def base_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
     """The relation in m/s2, away from vibration; `Missing` where a run lacks a channel or always vibrates."""
     if rig.drive == "force":
         return Missing("base", 'drive = "force": nothing slips')
-    if why := lacking(NEEDED, runs):
-        return Missing("base", why)
-    pieces = tuple(pieces_of(kept_blocks(run) & (run.commands.frequency_Hz == 0.0)) for run in runs)
-    if not any(pieces_of for pieces_of, run in zip(pieces, runs, strict=True) if not run.holdout):
-        return Missing("base", "no stretch without vibration is long enough")
+    pieces = pieces_without_vibration("base", NEEDED, runs)
+    if isinstance(pieces, Missing):
+        return pieces
     accel = [run.signals["mass_accel_mps2"] for run in runs]
     friction = [run.signals["drive_force_N"] - rig.mass_kg * run.signals["mass_accel_mps2"] for run in runs]
     since = [slip_phase(rate(run.signals["drive_force_N"]), scales_of(rig).slip_s) for run in runs]

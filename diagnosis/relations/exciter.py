@@ -28,11 +28,11 @@ def exciter_relation(runs: list[Prepared]) -> Relation | Missing:
     for run in runs:
         if "base_shake_mps2" not in run.signals and (run.commands.frequency_Hz > 0.0).any():
             return Missing("exciter", f"{run.file} has no base_accel_mps2 that is fast enough")
-    pieces = tuple(_pieces(run) for run in runs)
+    pieces = tuple(pieces_of_vibration(run) for run in runs)
     if not any(pieces_of for pieces_of, run in zip(pieces, runs, strict=True) if not run.holdout):
         return Missing("exciter", "no vibration is held long enough")
-    frequency = [_rows(run.commands.frequency_Hz) for run in runs]
-    left = tuple(_left(run) for run in runs)
+    frequency = [row_means(run.commands.frequency_Hz) for run in runs]
+    left = tuple(delivered_log(run) for run in runs)
     most_Hz = max(float(f.max()) for f in frequency)
 
     ones = [np.ones_like(f) for f in frequency]
@@ -47,7 +47,7 @@ def exciter_relation(runs: list[Prepared]) -> Relation | Missing:
         for share in (0.15, 0.7):
             shape = [_resonance(f / frequency_Hz, share) / share for f in frequency]
             effects.append(term("piezo-resonance", f"{frequency_Hz:.4g} Hz, {share:g}", shape, 0.5, 1, "share"))
-    forces = [_rows(run.signals["drive_force_N"]) for run in runs if "drive_force_N" in run.signals]
+    forces = [row_means(run.signals["drive_force_N"]) for run in runs if "drive_force_N" in run.signals]
     patterns: list[Term] = []
     if len(forces) == len(runs):
         most_N = max(float(np.abs(f).max()) for f in forces)
@@ -91,33 +91,34 @@ def exciter_relation(runs: list[Prepared]) -> Relation | Missing:
     )  # fmt: skip
 
 
-def _rows(values: Floats) -> Floats:
+def row_means(values: Floats) -> Floats:
     """Means over the blocks of each row, [rows]."""
     count = len(values) // _ROW_BLOCKS
     return values[: count * _ROW_BLOCKS].reshape(count, _ROW_BLOCKS).mean(axis=1)
 
 
-def _left(run: Prepared) -> Floats:
+def delivered_log(run: Prepared) -> Floats:
+    """Logarithm of the delivered over the commanded vibration, [rows]; 0 without a vibration."""
     if "base_shake_mps2" not in run.signals:
         return np.zeros(len(run.commands.drive) // _ROW_BLOCKS)
     still_mps2 = run.noise.shake_mps2.get("base_shake_mps2", 0.0)
     frequency_Hz = run.commands.frequency_Hz
     seen = 1.0 / (1.0 + _ROLLED_OFF * (frequency_Hz / 1e4) ** 2)
-    commanded = _rows(0.5 * ((2.0 * np.pi * frequency_Hz) ** 2 * run.commands.amplitude_m) ** 2 * seen)
+    commanded = row_means(0.5 * ((2.0 * np.pi * frequency_Hz) ** 2 * run.commands.amplitude_m) ** 2 * seen)
     whole = without_vibration(run.signals, averaged(frequency_Hz))  # a block of 4.5 periods has a mean of its own
-    delivered = _rows(whole["base_shake_mps2"] ** 2) - still_mps2**2
+    delivered = row_means(whole["base_shake_mps2"] ** 2) - still_mps2**2
     on = (commanded > 0.0) & (delivered > 0.0)
     result = np.zeros(len(commanded))
     result[on] = 0.5 * np.log(delivered[on] / commanded[on])
     return result
 
 
-def _pieces(run: Prepared) -> tuple[Piece, ...]:
+def pieces_of_vibration(run: Prepared) -> tuple[Piece, ...]:
     """Rows of one commanded vibration each, away from its changes."""
     kept = kept_blocks(run) & (run.commands.frequency_Hz > 0.0)
     count = len(kept) // _ROW_BLOCKS
     whole: Bools = np.asarray(kept[: count * _ROW_BLOCKS].reshape(count, _ROW_BLOCKS).min(axis=1))
-    key = _rows(run.commands.frequency_Hz) + 1e9 * _rows(run.commands.amplitude_m)
+    key = row_means(run.commands.frequency_Hz) + 1e9 * row_means(run.commands.amplitude_m)
     stretches: list[Piece] = []
     first = 0
     for row in range(1, count + 1):
@@ -133,7 +134,7 @@ def _driven_s(run: Prepared) -> Floats:
     commands = run.commands
     most_m = max(float(commands.amplitude_m.max()), 1e-12)
     power = (commands.amplitude_m / most_m) ** 2 * commands.frequency_Hz / 3000.0
-    return _rows(np.cumsum(power) * BLOCK_S)
+    return row_means(np.cumsum(power) * BLOCK_S)
 
 
 def _first_order(r: Floats) -> Floats:

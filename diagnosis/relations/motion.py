@@ -8,7 +8,7 @@ from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.feature import scales_of
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.gap.prepare import Prepared
-from diagnosis.relations.relation import Missing, Relation, kept_blocks, lacking, pieces_of, term
+from diagnosis.relations.relation import Missing, Relation, pieces_without_vibration, term
 from diagnosis.relations.shapes import bend, calmed, free, near_slips, rate, slip_phase
 
 NEEDED = ("mass_accel_mps2", "mass_position_m")
@@ -24,11 +24,9 @@ _LOWEST_RAD_PER_S = 2.0 * math.pi * 0.35  # accelerometers begin at 0 to 0.5 Hz
 
 def motion_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
     """The relation in m/s2, away from vibration; `Missing` where a run lacks a channel or always vibrates."""
-    if why := lacking(NEEDED, runs):
-        return Missing("motion", why)
-    pieces = tuple(pieces_of(kept_blocks(run) & (run.commands.frequency_Hz == 0.0)) for run in runs)
-    if not any(pieces_of for pieces_of, run in zip(pieces, runs, strict=True) if not run.holdout):
-        return Missing("motion", "no stretch without vibration is long enough")
+    pieces = pieces_without_vibration("motion", NEEDED, runs)
+    if isinstance(pieces, Missing):
+        return pieces
     accel = [run.signals["mass_accel_mps2"] for run in runs]
     position = [run.signals["mass_position_m"] for run in runs]
     left = tuple(a - bend(x) for a, x in zip(accel, position, strict=True))

@@ -10,12 +10,13 @@ from diagnosis.relations.products import (
     Products,
     band_edges_Hz,
     band_of_rows,
+    model_columns,
     turned_back,
     turned_piece,
     weighted,
 )
 from diagnosis.relations.relation import Floats, Term
-from diagnosis.relations.search import Found, nuisance_columns, nuisance_spreads
+from diagnosis.relations.search import Found
 
 _WINDOW_S = 0.1  # of a local variance
 _SPREADS = np.geomspace(1e-3, 1e2, 26)  # of a free function, relative to the noise of a row
@@ -34,29 +35,12 @@ def patterns_of(products: Products, runs: list[int], noise: BandNoise, chosen: F
     whole = weighted(products, runs, noise)
     plain = products.values[runs].sum(axis=(0, 1))
     rows = float(products.lengths[runs].sum())
-    places = {id(term): place for term, place in zip(products.terms, products.places, strict=True)}
-    model = np.concatenate([nuisance_columns(products), *(_columns(places[id(term)]) for term in chosen.terms)]).astype(
-        int
+    model, spreads = model_columns(products, chosen.terms)
+    patterns = (
+        _pattern(whole, plain, rows, model, spreads, term, products.columns((term,)))
+        for term in products.relation.patterns
     )
-    spreads = np.concatenate(
-        [
-            nuisance_spreads(products),
-            *(np.full(len(size), term.spread) for term, size in zip(chosen.terms, chosen.sizes, strict=True)),
-        ]
-    )
-    return tuple(
-        sorted(
-            (
-                _pattern(whole, plain, rows, model, spreads, term, _columns(places[id(term)]))
-                for term in products.relation.patterns
-            ),
-            key=lambda pattern: -pattern.evidence,
-        )
-    )
-
-
-def _columns(place: slice) -> np.ndarray:
-    return np.arange(place.start, place.stop)
+    return tuple(sorted(patterns, key=lambda pattern: -pattern.evidence))
 
 
 def _pattern(

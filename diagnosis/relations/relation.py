@@ -101,6 +101,18 @@ def pieces_of(kept: Bools, shortest: int = _SHORTEST) -> tuple[Piece, ...]:
     )
 
 
+def pieces_without_vibration(
+    name: str, needed: Sequence[str], runs: Sequence[Prepared]
+) -> tuple[tuple[Piece, ...], ...] | Missing:
+    """The pieces of each run away from vibration; `Missing` where a run lacks a channel or the fitted runs have no piece."""
+    if why := lacking(needed, runs):
+        return Missing(name, why)
+    pieces = tuple(pieces_of(kept_blocks(run) & (run.commands.frequency_Hz == 0.0)) for run in runs)
+    if not any(run_pieces for run_pieces, run in zip(pieces, runs, strict=True) if not run.holdout):
+        return Missing(name, "no stretch without vibration is long enough")
+    return pieces
+
+
 def thinned(relation: Relation) -> Relation:
     """The relation on means over as many rows as its highest frequency allows: all columns are averaged alike."""
     count = int(0.5 / (_SPARE * relation.highest_Hz * relation.row_s))

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.relations.products import BandNoise, Products, weighted
+from diagnosis.relations.products import BandNoise, Products, model_columns, places_of, spreads_of, weighted
 from diagnosis.relations.relation import Floats, Term
 
 _TRIED_TOGETHER = 40  # terms of which all pairs are tried
@@ -46,13 +46,9 @@ NOTHING = Found((), 0.0, (), ())
 def reduced(products: Products, runs: list[int], noise: BandNoise, terms: tuple[Term, ...]) -> Reduced:
     """The products over `runs` of `terms`, freed of the nuisances of the relation."""
     whole = weighted(products, runs, noise)
-    places = {id(term): place for term, place in zip(products.terms, products.places, strict=True)}
-    columns = np.concatenate(
-        [np.arange(places[id(term)].start, places[id(term)].stop) for term in terms] + [np.zeros(0, int)]
-    )
-    spreads = np.concatenate([np.full(term.values[0].shape[1], term.spread) for term in terms] + [np.ones(0)])
-    nuisance = nuisance_columns(products)
-    prior = np.diag(1.0 / nuisance_spreads(products) ** 2)
+    columns, spreads = products.columns(terms), spreads_of(terms)
+    nuisance, nuisance_spreads = model_columns(products, ())
+    prior = np.diag(1.0 / nuisance_spreads**2)
     left = np.append(columns, whole.shape[0] - 1)
     across = whole[nuisance[:, None], left]
     free = whole[left[:, None], left]
@@ -66,24 +62,7 @@ def reduced(products: Products, runs: list[int], noise: BandNoise, terms: tuple[
     inner, towards = np.zeros((count + 1, count + 1)), np.zeros(count + 1)
     inner[:count, :count] = free[:count, :count] * np.outer(spreads, spreads)
     towards[:count] = free[:count, -1] * spreads
-    shifted: list[slice] = []
-    for term in terms:
-        first = shifted[-1].stop if shifted else 0
-        shifted.append(slice(first, first + term.values[0].shape[1]))
-    return Reduced(terms, tuple(shifted), inner, towards, np.append(spreads, 1.0))
-
-
-def nuisance_columns(products: Products) -> np.ndarray:
-    """Indices of the columns of the nuisances."""
-    count = len(products.relation.nuisances)
-    return np.arange(products.places[count - 1].stop if count else 0)
-
-
-def nuisance_spreads(products: Products) -> Floats:
-    """Standard deviation of each of their coefficients before the data."""
-    return np.concatenate(
-        [np.full(term.values[0].shape[1], term.spread) for term in products.relation.nuisances] + [np.ones(0)]
-    )
+    return Reduced(terms, places_of(terms), inner, towards, np.append(spreads, 1.0))
 
 
 def evidences(data: Reduced, sets: list[tuple[int, ...]]) -> Floats:

@@ -1,6 +1,5 @@
 """Shares of what a relation shows on the held-out runs, from fits to the others, with intervals and what chance would show."""
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +9,8 @@ from diagnosis.relations.products import (
     Products,
     band_edges_Hz,
     band_of_rows,
+    model_columns,
+    square_left,
     turned_back,
     turned_piece,
     weighted,
@@ -35,9 +36,6 @@ class RelationShare(NamedTuple):
 class Shares(NamedTuple):
     """Shares of the mean square that the rig without effects, refitted on the other runs, leaves on the held-out runs."""
 
-    described: float  # rms as described, in the relation's unit
-    refitted: float  # rms of the rig without effects, refitted on the other runs
-    left: float  # rms with the named causes
     causes: tuple[RelationShare, ...]
     noise: float  # share
     unexplained: float  # share
@@ -55,9 +53,8 @@ def shares_of(
     steps = [_model(products, fitted, noise, chosen.terms[:count]) for count in range(len(chosen.terms) + 1)]
     width = blocks.shape[1]
     total = blocks.sum(axis=0)
-    rows = float(products.lengths[held_out].sum())
     least = noise.square(products, held_out)
-    squares = [_square(total, _padded(step.size, width)) for step in steps]
+    squares = [square_left(total, _padded(step.size, width)) for step in steps]
     random = np.random.default_rng(1)
     drawn = random.multinomial(len(blocks), np.full(len(blocks), 1.0 / len(blocks)), _DRAWS)
     resampled = np.tensordot(drawn, blocks, axes=1)
@@ -82,12 +79,9 @@ def shares_of(
             )
         )
     rest = np.maximum(ways[-1] - least, 0.0) / ways[0]
-    described = _square(total, np.zeros(width - 1))
     low, high = np.quantile(rest, _LEVELS)
-    return Shares(
-        math.sqrt(described / rows), math.sqrt(squares[0] / rows), math.sqrt(squares[-1] / rows), tuple(causes),
-        min(least / squares[0], 1.0), max(squares[-1] - least, 0.0) / squares[0], (float(low), float(high)),
-    )  # fmt: skip
+    unexplained = max(squares[-1] - least, 0.0) / squares[0]
+    return Shares(tuple(causes), min(least / squares[0], 1.0), unexplained, (float(low), float(high)))
 
 
 class _Model(NamedTuple):
@@ -103,15 +97,6 @@ class _Model(NamedTuple):
         block = covariance[-effects:, -effects:]
         moved = random.standard_normal((count, effects)) @ np.linalg.cholesky(block).T
         return self.size + moved @ np.linalg.solve(block, covariance[-effects:])
-
-
-def model_columns(products: Products, terms: tuple[Term, ...]) -> tuple[np.ndarray, Floats]:
-    """Indices and spreads of the columns of the nuisances and of `terms`."""
-    places = {id(term): place for term, place in zip(products.terms, products.places, strict=True)}
-    all_terms = (*products.relation.nuisances, *terms)
-    columns = [np.arange(places[id(term)].start, places[id(term)].stop) for term in all_terms]
-    spreads = [np.full(len(column), term.spread) for term, column in zip(all_terms, columns, strict=True)]
-    return np.concatenate([*columns, np.zeros(0, int)]).astype(int), np.concatenate([*spreads, np.zeros(0)])
 
 
 def _model(products: Products, runs: list[int], noise: BandNoise, terms: tuple[Term, ...]) -> _Model:
@@ -164,16 +149,9 @@ def _padded(size: Floats, width: int) -> Floats:
     return np.concatenate([size, np.zeros(width - 1 - len(size))])
 
 
-def _square(inner: Floats, size: Floats) -> float:
-    """Sum of squares of what the sizes leave."""
-    with_left = np.append(-size, 1.0)
-    return float(with_left @ inner @ with_left)
-
-
 def _null(products: Products, held_out: list[int], noise: BandNoise, model: _Model, term: Term) -> float:
     """Share that noise alone gives a cause in 9 of 10 draws; never below 0."""
-    columns, _ = model_columns(products, (term,))
-    columns_of_term = columns[len(columns) - term.values[0].shape[1] :]
+    columns_of_term = products.columns((term,))
     inner = products.values[held_out].sum(axis=0)[:, columns_of_term][:, :, columns_of_term]
     root = model.chance[len(model.size) - len(columns_of_term) :]
     random = np.random.default_rng(2)

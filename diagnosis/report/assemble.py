@@ -1,4 +1,4 @@
-"""From fits and a verdict to a diagnosis: candidates, cells of the gap, the gap on held-out runs, the next experiment."""
+"""From fits and a verdict to a diagnosis; and a diagnosis from relations and latent friction alone, where no fit ends in time."""
 
 import math
 import time
@@ -10,34 +10,70 @@ import numpy as np
 from bridge.arrays import Floats
 from bridge.log.finding import Finding
 from diagnosis.evidence.folder import Evidence
-from diagnosis.experiments.checks_by_hand import SINE, UNCOUPLE
-from diagnosis.experiments.proposal import next_experiment
+from diagnosis.evidence.foreign_vibration import PICK_UP
+from diagnosis.experiments.proposal import SINE, UNCOUPLE, next_experiment
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.features.segments import SHORTEST_S
 from diagnosis.fits.fit import Fit
-from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.fits.random_friction import is_random
-from diagnosis.gap.floor import Floor
-from diagnosis.gap.measure import DEFINITION, cell_names, cell_squares, differences
+from diagnosis.gap.measure import DEFINITION, Floor, cell_names, cell_squares, differences
 from diagnosis.gap.prepare import Prepared
 from diagnosis.gap.problem import OutOfTimeError, Problem
 from diagnosis.hypotheses.hypothesis import Coordinate
 from diagnosis.hypotheses.starts import Trial
 from diagnosis.model.per_run import is_phase
 from diagnosis.pictures.choice import pictures
-from diagnosis.report.without_fits import LONGER
 from diagnosis.result import PARAMETERS, Candidate, Cell, Diagnosis, Estimate, Experiment, Gap, Shrinkage
 from diagnosis.verdict.blend import flexible_differences
 from diagnosis.verdict.confirmation import Confirmation
-from diagnosis.verdict.held_out import GapLeft, HeldOut
+from diagnosis.verdict.held_out import HeldOut
 from diagnosis.verdict.judge import Verdict, refittable
 from diagnosis.verdict.lookalikes import imitators
 from diagnosis.verdict.selection import Contest
+from plant.effects.library import EFFECTS
 
+HOLD = Experiment(
+    f"Hold each speed and each vibration for {SHORTEST_S:g} s or more in some runs.",
+    "No simulated fit compares a command that changes all the time.",
+    None,
+)
+LONGER = Experiment("Diagnose the same runs with a longer --budget.", "No effect was fitted in this time.", None)
 R = TypeVar("R")
+_NO_SUCH_VIBRATION = Experiment(UNCOUPLE, "No effect of the library makes such a vibration of the force signal.", None)
+_NO_SINE = Experiment(SINE, "Every effect of the library shakes the base with a sine.", None)
 # Largest share of a run with changing speed or vibration without a finding. Smaller: ordinary ramps of drive and piezo cause the
 # finding. Larger: most of a run may be left out of the comparison without a finding.
 _MUCH_CHANGING = 0.2
+
+
+def comparable(runs: list[Prepared]) -> bool:
+    """Whether any fitted run has a segment that simulated fits can compare."""
+    return any(run.commands.segments for run in runs if not run.holdout)
+
+
+def unfitted() -> Verdict:
+    """The verdict before any result: all explanations have the same probability."""
+    names = ("unexplained", *EFFECTS, "none")
+    return Verdict("unexplained", None, dict.fromkeys(names, 1.0 / len(names)), None, (), 1.0)
+
+
+def without_fits(verdict: Verdict, runs: list[Prepared], following: Experiment, began: float) -> Diagnosis:
+    """The diagnosis of a verdict without any fit, still without relations, shares and sentences."""
+    return Diagnosis(
+        verdict=verdict.kind,
+        effects=verdict.names,
+        summary=(),
+        candidates=tuple(Candidate(name, math.nan) for name in dict.fromkeys((*verdict.names, "unexplained", "none"))),
+        not_distinguishable=(),
+        where=(),
+        gap=Gap(DEFINITION, tuple(run.file for run in runs if run.holdout)),
+        next_experiment=following,
+        rig=(),
+        findings=(),
+        pictures=(),
+        compared_features=0,
+        elapsed_s=round(time.monotonic() - began, 2),
+    )
 
 
 def assembled(
@@ -63,7 +99,12 @@ def assembled(
     fitter, baseline = contest.rig.fitter, contest.rig.fit
     verdict, best, _, held_out = outcome
     nuisances = fitter.nuisances
-    cells = _in_time(lambda: _cells_left(fitter, baseline), [])
+    cells = _in_time(
+        lambda: _cells(
+            fitter.floor, differences(fitter.floor, fitter.problem, fitter.predicted(baseline.deviations, {}))
+        ),
+        [],
+    )
     judged = Gap(DEFINITION)
     if held_out is not None:
         gap = held_out
@@ -74,12 +115,12 @@ def assembled(
     cells += _vibrating(evidence)
     total = sum(cell.share for cell in cells)
     where = sorted((cell._replace(share=cell.share / total) for cell in cells), key=lambda cell: -cell.share)
-    by_effect = {fit.hypothesis.effects[0]: fit for fit in reversed(contest.singles)}
+    singles = {fit.hypothesis.effects[0]: fit for fit in reversed(contest.singles)}
+    by_effect = dict(singles)
     if verdict.named is not None:
         by_effect |= dict.fromkeys(verdict.named.hypothesis.effects, verdict.named)
     elif verdict.ranked and is_random(verdict.ranked[0].fit.hypothesis):
         by_effect[verdict.ranked[0].fit.hypothesis.effects[0]] = verdict.ranked[0].fit
-    singles = {fit.hypothesis.effects[0]: fit for fit in reversed(contest.singles)}
     alone = {name: round(fit.chi2, 2) for name, fit in ({"none": baseline} | singles).items()}
     candidates = tuple(
         _candidate(name, probability, by_effect.get(name))._replace(chi2=alone.get(name))
@@ -91,12 +132,8 @@ def assembled(
     alike = _in_time(lambda: imitators(fitter, followed, verdict.scale), ()) if refittable(verdict) else ()
     leaders = [fit for fit in (verdict.named or baseline, verdict.runner_up) if fit is not None]
     if verdict.outside:
-        if any(run.pick_up for run in evidence.runs):
-            following = Experiment(
-                UNCOUPLE, "No effect of the library makes such a vibration of the force signal.", None
-            )
-        else:
-            following = Experiment(SINE, "Every effect of the library shakes the base with a sine.", None)
+        picked_up = any(vibration.kind == PICK_UP for run in evidence.runs for vibration in run.foreign)
+        following = _NO_SUCH_VIBRATION if picked_up else _NO_SINE
     else:
         following = _in_time(lambda: next_experiment(fitter.problem, nuisances, leaders), LONGER)
     shown = Problem(evidence.rig, runs)
@@ -141,12 +178,12 @@ def _judged(contest: Contest, outcome: Confirmation, held_out: HeldOut, tried: l
     fitter, baseline = contest.rig.fitter, contest.rig.fit
     closed = held_out.closed_by(best)
     compared = [
-        _shrinkage(" and ".join(fit.hypothesis.effects), held_out.closed_by(fit))
+        Shrinkage(" and ".join(fit.hypothesis.effects), *held_out.closed_by(fit))
         for fit in compared_fits(verdict, gone)
     ]
-    compared.append(_shrinkage(PARAMETERS, held_out.closed_by(baseline)))
+    compared.append(Shrinkage(PARAMETERS, *held_out.closed_by(baseline)))
     blend = flexible_differences(fitter, baseline, tried, held_out, jobs)
-    compared.append(_shrinkage("flexible residual", held_out.closed_by_differences(blend)))
+    compared.append(Shrinkage("flexible residual", *held_out.closed_by_differences(blend)))
     named = verdict.named is not None
     return Gap(
         definition=DEFINITION,
@@ -170,15 +207,6 @@ def _changing(runs: list[Prepared]) -> Iterator[Finding]:
             yield Finding("changing", f"{run.file}: commands", f"{text}; hold each command longer")
 
 
-def _shrinkage(who: str, closed: GapLeft) -> Shrinkage:
-    return Shrinkage(who, closed.gap, closed.shrinkage, closed.interval_90)
-
-
-def _cells_left(fitter: Fitter, fit: Fit) -> list[Cell]:
-    left = differences(fitter.floor, fitter.problem, fitter.predicted(fit.deviations, fit.effects))
-    return _cells(fitter.floor, left)
-
-
 def _cells(floor: Floor, z: Floats) -> list[Cell]:
     """Cells with their squared differences above the floor; if no cell is above the floor, with their squared differences."""
     squares = cell_squares(floor, z)
@@ -193,15 +221,10 @@ def _cells(floor: Floor, z: Floats) -> list[Cell]:
 
 def _vibrating(evidence: Evidence) -> list[Cell]:
     """Cells for vibrations that no model makes; their unit is the reported limit, as the floor is the unit of other cells."""
-    vibrations = [
-        (signal, run.file, vibration)
-        for run in evidence.runs
-        for signal, vibration in (("drive_force_N", run.pick_up), ("base_accel_mps2", run.distortion))
-    ]
     return [
-        Cell(signal, "steady", vibration.band_Hz, file, vibration.limits**2 - 1.0)
-        for signal, file, vibration in vibrations
-        if vibration
+        Cell(vibration.column, "steady", vibration.band_Hz, run.file, vibration.limits**2 - 1.0)
+        for run in evidence.runs
+        for vibration in run.foreign
     ]
 
 

@@ -9,7 +9,7 @@ from bridge import units
 from bridge.files import write_whole
 from bridge.pages import filled_page
 from bridge.provenance import provenance
-from diagnosis.report import relation_words, words
+from diagnosis.report import words
 from diagnosis.report.page_plots import draw
 from diagnosis.result import Cell, Diagnosis, Gap, RigNumber
 
@@ -83,7 +83,7 @@ def report_page(diagnosis: Diagnosis, evidence_name: str, footer: str = "") -> s
         estimate=words.estimate_in_words,
         meanings=words.EFFECT_WORDS,
         gap_bars=gap_bars(diagnosis.gap, bool(diagnosis.effects)),
-        floor_at=_floor_at(diagnosis.gap),
+        floor_at=_width(diagnosis.gap.floor / _widest(diagnosis.gap)),
         runs=runs,
         rows=rows,
         left_out=left_out,
@@ -97,9 +97,9 @@ def report_page(diagnosis: Diagnosis, evidence_name: str, footer: str = "") -> s
         who=words.who_in_words,
         closed=words.closed_in_words,
         closed_between=words.closed_between,
-        sizes=relation_words.sizes_in_words,
-        remainder=relation_words.remainder_in_words,
-        relation_number=relation_words.number_in_words,
+        sizes=words.sizes_in_words,
+        remainder=words.remainder_in_words,
+        relation_number=words.number_in_words,
         between=units.interval,
     )
 
@@ -110,19 +110,12 @@ def gap_bars(gap: Gap, named: bool) -> list[GapBar]:
     if named:
         bars.append(("with the best explanation", gap.with_effect, "effect"))
     widest = _widest(gap)
-    return [
-        GapBar(label, value, 100.0 * max(value, 0.0) / widest if math.isfinite(value) else 0.0, style)
-        for label, value, style in bars
-    ]
+    return [GapBar(label, value, _width(value / widest), style) for label, value, style in bars]
 
 
 def _width(share: float) -> float:
     """Width of the bar of a share in percent; 0 for NaN."""
     return min(max(100.0 * share, 0.0), 100.0) if math.isfinite(share) else 0.0
-
-
-def _floor_at(gap: Gap) -> float | None:
-    return 100.0 * gap.floor / _widest(gap) if math.isfinite(gap.floor) else None
 
 
 def _widest(gap: Gap) -> float:
@@ -139,7 +132,8 @@ def where_map(cells: tuple[Cell, ...]) -> tuple[list[str], list[MapRow], float]:
         shares[cell.file] = shares.get(cell.file, 0.0) + cell.share
     rows: list[MapRow] = []
     left_out = 0.0
-    for key in sorted(table, key=lambda key: (key[0], _place(key[1]), key[2])):
+    order = {regime: number for number, regime in enumerate(_REGIMES)}
+    for key in sorted(table, key=lambda key: (key[0], order.get(key[1], len(order)), key[1], key[2])):
         shares = table[key]
         if not max(shares.values()) >= _SMALL:  # written so that NaN is left out too
             left_out += sum(share for share in shares.values() if math.isfinite(share))
@@ -153,11 +147,6 @@ def where_map(cells: tuple[Cell, ...]) -> tuple[list[str], list[MapRow], float]:
 def _cell_in_words(cell: Cell) -> str:
     place = f"{units.signal_name(cell.signal)}, {cell.regime}, {units.band(cell.band_Hz)}, {cell.file}"
     return f"{units.percent(cell.share)} in {place}"
-
-
-def _place(regime: str) -> tuple[int, str]:
-    """Sort key of a regime in the order of a cycle; unknown regimes are last."""
-    return (_REGIMES.index(regime) if regime in _REGIMES else len(_REGIMES), regime)
 
 
 def rig_row(parameter: RigNumber) -> RigRow:

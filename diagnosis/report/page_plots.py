@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from bridge.pages import png
-from diagnosis.result import Curve, Picture
+from diagnosis.result import Picture
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,7 +50,8 @@ def _figure(picture: Picture) -> "Figure":
     figure = Figure(figsize=(5.6, 3.1), layout="constrained")
     axis = figure.subplots()
     for curve in picture.curves:
-        x, y = _finite(curve)
+        # matplotlib draws NaN as a hole
+        x, y = (np.where(np.isfinite(values), values, np.nan) for values in (curve.x, curve.y))
         axis.plot(x, y, label=_plain(curve.label), **_STYLES[curve.style])
     axis.set_xlabel(_plain(picture.x_label), fontsize=9)
     axis.set_ylabel(_plain(picture.y_label), fontsize=9)
@@ -62,12 +63,6 @@ def _figure(picture: Picture) -> "Figure":
         # above the curves, as a legend between the curves could hide them
         figure.legend(loc="outside upper left", ncols=3, fontsize=8, frameon=False)
     return figure
-
-
-def _finite(curve: Curve) -> tuple[Any, Any]:
-    """The points of a curve, with infinity as NaN: matplotlib draws NaN as a hole."""
-    x, y = (np.where(np.isfinite(values), values, np.nan) for values in (curve.x, curve.y))
-    return x, y
 
 
 def _plain(text: str) -> str:

@@ -1,15 +1,16 @@
-"""Relations in an answer: shares of the difference, the remainder, refitted numbers, a picture."""
+"""Relations and latent friction in an answer: shares, the remainder, sizes, refitted numbers, a picture."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
+from bridge.log.finding import Finding
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.gap.prepare import Prepared
 from diagnosis.latent.answer import LatentSignal
+from diagnosis.latent.components import NOISE, SCATTER
 from diagnosis.relations.answer import Answered, Relations
 from diagnosis.relations.decide import Decision
-from diagnosis.report.latent_block import latent_findings, latent_remainder, latent_rows, latent_shares
 from diagnosis.report.summary import summary
 from diagnosis.result import (
     Curve,
@@ -23,8 +24,10 @@ from diagnosis.result import (
 )
 
 _SIGNALS = {"spring": "spring relation", "motion": "motion relation", "drive": "drive relation"}
+_NUMBER_OF = {"drive-stiffness": "drive_stiffness_N_per_m", "drive-damping": "drive_damping_Ns_per_m"}  # of the rig
 _POINTS = 1500  # most points of a curve
 _TWO_SIDED_90 = 1.645
+_LEAST_SHARE = 0.02  # smallest share of a cause of the friction that is reported
 
 
 def with_relations(
@@ -36,30 +39,22 @@ def with_relations(
     latent: Sequence[LatentSignal],
 ) -> Diagnosis:
     """The diagnosis with shares, remainder, numbers and picture of relations and latent friction, and with its sentences."""
+    answered, missing = relations
     complete = done._replace(
-        shares=(*(share for answered in relations.answered for share in _shares(answered)), *latent_shares(latent)),
-        remainder=_remainder(relations, decision) or latent_remainder(latent),
-        relations=(
-            *(
-                RelationRow(
-                    signal_of(answered.name),
-                    answered.unit,
-                    answered.described,
-                    answered.refitted,
-                    answered.left,
-                    answered.noise,
-                    answered.chosen.causes,
-                )
-                for answered in relations.answered
-            ),
-            *latent_rows(latent),
-        ),
-        findings=(*done.findings, *latent_findings(latent)),
-        left_out=tuple(LeftOut(signal_of(missing.name), missing.why) for missing in relations.missing),
-        numbers=tuple(number for answered in relations.answered for number in _numbers(answered, rig)),
+        shares=(*(share for relation in answered for share in _shares(relation)), *latent_shares(latent)),
+        remainder=_remainder(relations, decision) or _latent_remainder(latent),
+        relations=(*map(_row, answered), *latent_rows(latent)),
+        findings=(*done.findings, *_latent_findings(latent)),
+        left_out=tuple(LeftOut(signal_of(relation.name), relation.why) for relation in missing),
+        numbers=tuple(number for relation in answered for number in _numbers(relation, rig)),
         pictures=(*_pictures(relations, runs), *done.pictures),
     )
     return complete._replace(summary=summary(complete))
+
+
+def _row(answered: Answered) -> RelationRow:
+    sizes = answered.described, answered.refitted, answered.left, answered.noise
+    return RelationRow(signal_of(answered.name), answered.unit, *sizes, answered.chosen.causes)
 
 
 def signal_of(relation: str) -> str:
@@ -81,14 +76,11 @@ def in_a_line(decision: Decision) -> str:
 def _shares(answered: Answered) -> list[Share]:
     if answered.shares is None:
         return []
-    signal = signal_of(answered.name)
-    shares = [
-        Share(signal, cause.cause, cause.share, cause.interval_90, cause.null_90) for cause in answered.shares.causes
-    ]
+    signal, shares = signal_of(answered.name), answered.shares
     return [
-        *shares,
-        Share(signal, "noise", answered.shares.noise, None, None),
-        Share(signal, "unexplained", answered.shares.unexplained, answered.shares.unexplained_90, None),
+        *(Share(signal, cause.cause, cause.share, cause.interval_90, cause.null_90) for cause in shares.causes),
+        Share(signal, "noise", shares.noise, None, None),
+        Share(signal, "unexplained", shares.unexplained, shares.unexplained_90, None),
     ]
 
 
@@ -110,22 +102,15 @@ def _remainder(relations: Relations, decision: Decision) -> Remainder | None:
 
 def _numbers(answered: Answered, rig: RigTable) -> list[RelationNumber]:
     known = rig.values()
-    extra = {"drive-stiffness": "drive_stiffness_N_per_m", "drive-damping": "drive_damping_Ns_per_m"}
-    moved: dict[str, tuple[float, float]] = {}
-    for name, size, deviation in answered.nuisances:
-        if name in known:
-            moved[name] = (size, deviation)
-    for term, sizes, deviations in zip(
-        answered.chosen.terms, answered.chosen.sizes, answered.chosen.deviations, strict=True
-    ):
-        name = extra.get(term.cause)
-        if name is not None:
-            before = moved.get(name, (0.0, 0.0))
-            moved[name] = (before[0] + float(sizes[0]), float(np.hypot(before[1], deviations[0])))
+    moved = {name: (size, deviation) for name, size, deviation in answered.nuisances if name in known}
+    chosen = answered.chosen
+    for term, sizes, deviations in zip(chosen.terms, chosen.sizes, chosen.deviations, strict=True):
+        if (name := _NUMBER_OF.get(term.cause)) is not None:
+            size, deviation = moved.get(name, (0.0, 0.0))
+            moved[name] = (size + float(sizes[0]), float(np.hypot(deviation, deviations[0])))
     numbers: list[RelationNumber] = []
     for name, (size, deviation) in moved.items():
-        described = known[name] or 0.0
-        half = _TWO_SIDED_90 * deviation
+        described, half = known[name] or 0.0, _TWO_SIDED_90 * deviation
         value = described + size
         numbers.append(RelationNumber(name, signal_of(answered.name), described, value, (value - half, value + half)))
     return numbers
@@ -143,6 +128,47 @@ def _pictures(relations: Relations, runs: list[Prepared]) -> list[Picture]:
         label = "with " + " and ".join(dict.fromkeys(worst.chosen.causes))
         curves.append(Curve(label, trace.t_s[thin], trace.with_causes[thin], "effect"))
     run = runs[trace.run].file.rsplit(".", 1)[0]
-    unit = f" / {worst.unit}" if worst.unit else ""
+    unit = f" [{worst.unit}]" if worst.unit else ""
     title = f"Residual of the {signal_of(worst.name)} in {run}"
-    return [Picture("residual", title, "time / s", f"left{unit}", tuple(curves))]
+    return [Picture("residual", title, "time [s]", f"residual{unit}", tuple(curves))]
+
+
+def latent_shares(latent: Sequence[LatentSignal]) -> tuple[Share, ...]:
+    """The shares of every signal, in the format of the diagnosis."""
+    return tuple(
+        Share(signal.signal, share.what, share.share, None if share.what == NOISE else share.interval_90, share.null_90)
+        for signal in latent
+        for share in signal.shares
+        if share.share > _LEAST_SHARE or share.what in (SCATTER, NOISE)
+    )
+
+
+def latent_rows(latent: Sequence[LatentSignal]) -> tuple[RelationRow, ...]:
+    """Sizes of the difference and the noise in every signal."""
+    return tuple(
+        RelationRow(
+            signal.signal,
+            "N",
+            signal.described,
+            signal.differs,
+            signal.left,
+            signal.noise,
+            tuple(share.what for share in signal.shares if share.beyond_chance),
+        )
+        for signal in latent
+    )
+
+
+def _latent_remainder(latent: Sequence[LatentSignal]) -> Remainder | None:
+    """The largest scatter that depends on no variable."""
+    if not latent:
+        return None
+    worst = max(latent, key=lambda signal: signal.left)
+    share = sum(share.share for share in worst.shares if share.what == SCATTER)
+    return Remainder(share, worst.signal, "", worst.left, worst.noise, "N")
+
+
+def _latent_findings(latent: Sequence[LatentSignal]) -> tuple[Finding, ...]:
+    """A finding for each signal in which a dependence on position cannot be separated from a dependence on time."""
+    text = "no position is passed twice, so a dependence on position cannot be separated from a dependence on time"
+    return tuple(Finding("one-pass", signal.signal, text) for signal in latent if not signal.revisited)

@@ -2,30 +2,18 @@
 
 import math
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from bridge.config import validate
 from bridge.faults import Fault
 from bridge.files import write_whole
 from diagnosis.evidence.folder import Evidence
+from diagnosis.evidence.manifest import rig_file_tables
 from diagnosis.model.per_run import as_in_rig_file
 from diagnosis.report.words import headline
 from diagnosis.result import Diagnosis
 from plant.config import RigConfig
 
-# name in the evidence's rig table -> table and key of a rig file
-_PLACES: Final = {
-    "mass_kg": ("slide", "mass_kg"),
-    "drive_stiffness_N_per_m": ("drive", "stiffness_N_per_m"),
-    "drive_damping_Ns_per_m": ("drive", "damping_Ns_per_m"),
-    "contact_stiffness_N_per_m": ("contact", "stiffness_N_per_m"),
-    "contact_damping_Ns_per_m": ("contact", "damping_Ns_per_m"),
-    "viscous_damping_Ns_per_m": ("contact", "viscous_damping_Ns_per_m"),
-    "coulomb_force_N": ("contact", "coulomb_force_N"),
-    "static_force_N": ("contact", "static_force_N"),
-    "stribeck_velocity_mps": ("contact", "stribeck_velocity_mps"),
-    "stribeck_tail": ("contact", "stribeck_tail"),
-}
 _DIGITS = 7
 RIG_BEGINS = "# Written by `stickslip diagnose` "
 
@@ -40,7 +28,7 @@ def write_rig(diagnosis: Diagnosis, evidence: Evidence, path: Path) -> None:
     if diagnosis.verdict in ("unexplained", "partly"):
         raise Fault(
             "CONFIG",
-            f"{name}: the verdict is {diagnosis.verdict}: there is no effect to apply; measure the next run that the diagnosis "
+            f"{name}: the verdict is {diagnosis.verdict}: no effect to apply; measure the next run that the diagnosis "
             "suggests, and diagnose again",
         )
     table = rig_table(diagnosis, evidence)
@@ -61,14 +49,9 @@ def refuse_force_drive(evidence: Evidence) -> None:
 
 def rig_table(diagnosis: Diagnosis, evidence: Evidence) -> dict[str, Any]:
     """The corrected rig as the tables of a rig file, named after the evidence's folder."""
-    values = {name: value for name, value in evidence.rig.values().items() if value is not None}
-    values |= {parameter.name: parameter.retuned for parameter in diagnosis.rig}
-    # The two forces are refitted independently and may cross; the plant refuses a static force below the Coulomb force.
-    values["static_force_N"] = max(values["static_force_N"], values["coulomb_force_N"])
-    table: dict[str, Any] = {"name": f"{_word(evidence.folder.name)}-diagnosed"}
-    for name, (part, key) in _PLACES.items():
-        if name in values:
-            table.setdefault(part, {})[key] = values[name]
+    # The two forces are refitted independently and may cross.
+    values = evidence.rig.values() | {parameter.name: parameter.retuned for parameter in diagnosis.rig}
+    table: dict[str, Any] = {"name": f"{_word(evidence.folder.name)}-diagnosed", **rig_file_tables(values)}
     effects: dict[str, dict[str, float | str]] = {}
     for name in diagnosis.effects:
         candidate = next(candidate for candidate in diagnosis.candidates if candidate.effect == name)

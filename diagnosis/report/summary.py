@@ -3,18 +3,23 @@
 import math
 
 from bridge.units import percent, signal_name, times
-from diagnosis.evidence.exciter_harmonics import DISTORTED
-from diagnosis.evidence.force_pickup import PICK_UP
+from diagnosis.evidence.foreign_vibration import DISTORTED, PICK_UP
 from diagnosis.model.per_run import has_own_phases
-from diagnosis.report.latent_block import latent_answer, latent_sentences
-from diagnosis.report.relation_words import remainder_in_words
-from diagnosis.report.words import EFFECT_WORDS, closed_between, closed_in_words, estimate_in_words, is_undecided
+from diagnosis.report.words import (
+    EFFECT_WORDS,
+    closed_between,
+    closed_in_words,
+    estimate_in_words,
+    is_undecided,
+    latent_answer,
+    latent_sentences,
+    remainder_in_words,
+)
 from diagnosis.result import Diagnosis
 from diagnosis.verdict.held_out import MORE_THAN_RIGHT
 
-_WORSE = (
-    1.1  # gap of the baseline over the gap as described from which a refit makes held-out runs worse, not by chance
-)
+# gap of the baseline over the gap as described from which a refit makes held-out runs worse, not by chance
+_WORSE = 1.1
 _SMALL_SHARE = 0.05  # smallest share of the gap of a regime that is reported
 
 

@@ -1,19 +1,25 @@
-"""A diagnosis in words: verdicts, numbers with their units, and the meaning of each effect on a machine."""
+"""A diagnosis in words: verdicts, relations, latent friction, numbers with their units, the meaning of each effect."""
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
-from bridge.units import decimals_of, fixed_digits, interval, name_and_unit, percent, prefixed, times
+from bridge.units import decimals_of, fixed_digits, interval, name_and_unit, percent, prefixed, quantity, times
 from diagnosis.hypotheses.catalogue import CATALOGUE
-from diagnosis.report.latent_block import mostly
-from diagnosis.result import PARAMETERS, Diagnosis, Estimate
+from diagnosis.latent.answer import LatentSignal
+from diagnosis.latent.components import NOISE, SCATTER
+from diagnosis.latent.rows import BREAKAWAY, SLIDING
+from diagnosis.result import PARAMETERS, Diagnosis, Estimate, RelationNumber, RelationRow, Remainder, RigNumber, Share
+from diagnosis.verdict.by_latent import MOST
 from diagnosis.verdict.held_out import FAR_FOR_NO_GAP
+from plant.effects.library import EFFECTS
 
 EFFECT_WORDS: Final = {name: row.words for name, row in CATALOGUE.items()} | {
     "none": "the rig as described, inside its tolerances, is enough",
     "unexplained": "there is a gap, and nothing in the library closes it",
 }
 _BELOW_0: Final = {("drive-hardening", "ratio"): "a softening"}  # text for negative values, by effect and parameter
+_MOST_IN_SENTENCE = 3  # most causes in a sentence
 
 
 def headline(diagnosis: Diagnosis) -> str:
@@ -81,3 +87,129 @@ def estimate_in_words(effect: str, name: str, estimate: Estimate) -> str:
         text += f" (90 %: {fixed_digits(low * factor, digits)} to {fixed_digits(high * factor, digits)})"
     below = _BELOW_0.get((effect, name))
     return f"{text}, {below}" if below and estimate.value < 0.0 else text
+
+
+def relation_lines(diagnosis: Diagnosis) -> list[str]:
+    """Lines of the summary: every relation with its sizes and shares, omitted relations, the largest remainder."""
+    lines: list[str] = []
+    for row in diagnosis.relations:
+        lines.append(sizes_in_words(row))
+        lines += [f"  {share_in_words(share)}" for share in diagnosis.shares if share.signal == row.relation]
+    lines += [f"{omitted.relation}: left out: {omitted.why}" for omitted in diagnosis.left_out]
+    if diagnosis.remainder is not None:
+        lines.append(remainder_in_words(diagnosis.remainder))
+    return lines
+
+
+def number_lines(diagnosis: Diagnosis) -> list[str]:
+    """Every number that a relation or the baseline refits, next to the described number."""
+    lines = [number_in_words(number) for number in diagnosis.numbers]
+    lines += [rig_number_in_words(number) for number in diagnosis.rig if number.described and number.tolerance]
+    return lines
+
+
+def sizes_in_words(row: RelationRow) -> str:
+    """Residuals of a relation for the described rig, the refitted rig and with its causes; and its noise."""
+    described, refitted, left, noise = (
+        _size(size, row.unit) for size in (row.described, row.refitted, row.left, row.noise)
+    )
+    caused = f", {left} with {' and '.join(row.causes)}" if row.causes else ""
+    return f"{row.relation}: {described} as described, {refitted} refitted{caused}; noise {noise}"
+
+
+def _size(size: float, unit: str) -> str:
+    """A size with its best prefix, three digits: a common prefix for a whole line would write newtons as 1.93e+03 mN."""
+    factor, shown = prefixed(size, unit)
+    return f"{size * factor:.3g} {shown}".rstrip()
+
+
+def share_in_words(share: Share) -> str:
+    """A share with its interval, and the share that chance alone reaches."""
+    text = f"{share.what} {_percent(share.share)}"
+    if known := _between(share.interval_90):
+        text += f" (90 %: {known})"
+    return text if share.null_90 is None else f"{text}; chance alone shows up to {_percent(share.null_90)}"
+
+
+def _between(pair: tuple[float, float] | None) -> str:
+    return interval(None if pair is None else (max(pair[0], 0.0), max(pair[1], 0.0)))
+
+
+def _percent(share: float) -> str:
+    return percent(max(share, 0.0))
+
+
+def remainder_in_words(remainder: Remainder) -> str:
+    """The size and the relation of the remainder."""
+    size, noise = _size(remainder.size, remainder.unit), _size(remainder.noise, remainder.unit)
+    if not remainder.what:
+        return f"largest remainder: {size} in the {remainder.where}, where noise is {noise}: no pattern"
+    how = f"{remainder.what}" if remainder.what.startswith(("over ", "in ")) else f"({remainder.what})"
+    return f"{size} remain in the {remainder.where} {how}, where noise is {noise}: nothing in the library"
+
+
+def number_in_words(number: RelationNumber) -> str:
+    """A number of the rig, fitted by a relation."""
+    word, unit = name_and_unit(number.name)
+    low, high = number.interval_90
+    factor, shown = prefixed(max(abs(number.refitted), abs(number.described)), unit)
+    digits = decimals_of((high - low) * factor) if high > low else None
+    inside = f"{fixed_digits(low * factor, digits)} to {fixed_digits(high * factor, digits)}"
+    value = fixed_digits(number.refitted * factor, digits)
+    return f"{word} {value} {shown} (90 %: {inside}) by the {number.relation}, described {quantity(number.described, unit)}"
+
+
+def rig_number_in_words(number: RigNumber) -> str:
+    """A number of the rig in the fits."""
+    word, unit = name_and_unit(number.name)
+    return f"{word} {quantity(number.retuned, unit)}, described {quantity(number.described, unit)}"
+
+
+def latent_line(latent: Sequence[LatentSignal]) -> str:
+    """The largest share whose interval exceeds chance, as a progress message; empty without such a share."""
+    candidates = [
+        (share.share, latent_signal.signal, share)
+        for latent_signal in latent
+        for share in latent_signal.shares
+        if share.beyond_chance
+    ]
+    if not candidates:
+        return ""
+    _, signal, share = max(candidates, key=lambda candidate: candidate[0])
+    return f"{signal}: {share_in_words(Share(signal, share.what, share.share, share.interval_90, share.null_90))}"
+
+
+def mostly(diagnosis: Diagnosis) -> Share | None:
+    """A cause outside the verdict that explains most of a signal, with an interval above chance; None without such a cause."""
+    sure = [
+        share
+        for share in diagnosis.shares
+        if share.signal in (BREAKAWAY, SLIDING)
+        and share.what not in (SCATTER, NOISE, *diagnosis.effects)
+        and share.share > MOST
+        and share.beyond_chance
+    ]
+    return max(sure, key=lambda share: share.share, default=None)
+
+
+def latent_answer(diagnosis: Diagnosis) -> str:
+    """The share of `mostly` as a sentence; empty without such a cause."""
+    top = mostly(diagnosis)
+    if top is None:
+        return ""
+    why = "it is not certain enough to be named" if top.what in EFFECTS else "the library has no effect for it"
+    return f"Largest cause in the {top.signal}: {share_in_words(top)}; {why}."
+
+
+def latent_sentences(diagnosis: Diagnosis, kept: str) -> list[str]:
+    """One sentence per signal: the size of the difference, and the share that each cause explains."""
+    sentences: list[str] = []
+    for row in diagnosis.relations:
+        if row.relation not in (BREAKAWAY, SLIDING):
+            continue
+        shares = [share for share in diagnosis.shares if share.signal == row.relation and share.what in row.causes]
+        largest = sorted((share for share in shares if share.what != NOISE), key=lambda share: -share.share)
+        listed = "; ".join(share_in_words(share) for share in largest[:_MOST_IN_SENTENCE])
+        off = f"The {row.relation}{kept} is off by {quantity(row.refitted, row.unit)} rms"
+        sentences.append(f"{off}: {listed}." if listed else f"{off}; no cause explains it better than chance.")
+    return sentences

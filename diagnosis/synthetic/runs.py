@@ -1,7 +1,11 @@
-"""Simulation of a run of a synthetic rig: from a random start, by its plan, to the columns of its file."""
+"""Runs of a synthetic rig: their plans, the ladder of runs, and the simulation from a random start to the columns of a file.
+
+Two lengths of drive travel determine a stick-slip run with the paper's pair: the spring turns from +17 N to -17 N over 2.9 mm,
+and a period takes about 0.5 mm. So a dwell lasts 0.25 s at 2 mm/s, 1 s at 0.5 mm/s and 5 s at 0.1 mm/s.
+"""
 
 import math
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -9,10 +13,7 @@ import numpy.typing as npt
 from bridge.arrays import Floats
 from bridge.wire.channels import CHANNELS
 from diagnosis.features.grid import BLOCK_S
-from diagnosis.synthetic.protocols import AxisPlan, RunPlan
-from diagnosis.synthetic.sensors import DrawnChain, measured
-from plant.config import RigConfig
-from plant.core import advance_disturbed
+from plant.config import RigConfig, SensorsConfig
 from plant.effects.drive import even_m, extension_m
 from plant.records import TRUTH, build
 from plant.simulate import run_blocks
@@ -20,7 +21,21 @@ from plant.simulate import run_blocks
 Columns = dict[str, npt.NDArray[Any]]
 
 _SAME_PLACE_M = 2e-5  # standard deviation of the position at which a run starts
+_RAMP_S = 0.05  # duration of a change of velocity
+_AMPLITUDE_M = 2e-8  # amplitude of the vibration in the paper
 _PRIMER_M = 1e-15  # amplitude that turns the exciter's phase without moving the rig
+RATE_HZ = 20_000.0  # sampling rate of the records, to which the noise levels belong
+
+
+class DrawnChain(NamedTuple):
+    """One measuring chain; arrays have one value for each of `bridge.wire.channels.CHANNELS`."""
+
+    sensors: SensorsConfig  # bandwidths, range and resolution
+    noise: Floats  # rms [unit of the channel]
+    pink_share: float  # share of the noise power that is pink (1/f); the rest is white
+    hum: Floats  # amplitude [unit of the channel]
+    hum_Hz: float
+    drift_N: float  # drift of the force over a run
 
 
 class DrawnRig(NamedTuple):
@@ -28,73 +43,86 @@ class DrawnRig(NamedTuple):
 
     config: RigConfig
     chain: DrawnChain
-    rate_Hz: float  # sampling rate of the simulation
-    average: int  # samples of the simulation in each sample of the record
 
 
-def spring_run(random: np.random.Generator, rig: DrawnRig, plan: RunPlan, start_m: float) -> Columns:
-    """Drag the slide by a spring, from about `start_m` on; return the columns of the run, [samples] each, SI units."""
-    params, state = build(rig.config)
-    blocks = round(plan.duration_s / BLOCK_S)
-    force_N = random.uniform(0.3, 0.95) * float(params[0].F_c)
-    _at_rest(random, params, state, force_N, start_m + random.normal(0.0, _SAME_PLACE_M))
-    points = np.array(plan.velocity)
-    velocity_mps = np.interp(np.arange(blocks) * BLOCK_S, points[:, 0], points[:, 1])
-    frequency_Hz, amplitude_m = np.zeros(blocks), np.zeros(blocks)
-    for step in plan.vibration:
-        at = round(step.from_s / BLOCK_S)
-        frequency_Hz[at:], amplitude_m[at:] = step.frequency_Hz, step.amplitude_m
-    analogue = np.empty((len(CHANNELS), blocks * round(rig.rate_Hz * BLOCK_S)))
-    truth = np.empty((len(TRUTH), analogue.shape[1]))
-    commanded_Hz, commanded_m = _primed(random, frequency_Hz, amplitude_m)
-    run_blocks(params, state, velocity_mps, commanded_Hz, commanded_m, analogue, truth)
-    rows = _averaged(measured(random, rig.chain, analogue, rig.rate_Hz), rig.average)
-    columns: Columns = {"t_s": np.arange(rows.shape[1]) * rig.average / rig.rate_Hz}
-    columns |= {name: values.astype(np.float32) for name, values in zip(CHANNELS, rows, strict=True)}
-    if plan.vibration:
-        block = (columns["t_s"] / BLOCK_S + 1e-6).astype(np.int64)
-        columns["vibration_frequency_Hz"] = frequency_Hz[block]
-        columns["vibration_amplitude_m"] = amplitude_m[block]
-    return columns
+class Vibration(NamedTuple):
+    """Command to the piezo from a time on; an amplitude of 0 turns it off."""
+
+    from_s: float
+    frequency_Hz: float
+    amplitude_m: float
 
 
-def axis_run(random: np.random.Generator, rig: DrawnRig, plan: AxisPlan) -> Columns:
-    """Move the mass to and fro by a motor with a PD controller; return the columns, [samples of the controller] each.
+class RunPlan(NamedTuple):
+    """A run with a spring drive."""
 
-    The force of a sample acts from the time of that sample to the next.
-    """
-    params, state = build(rig.config)
-    p: Any = params[0]
-    p.disturbed = p.force_driven = 1
-    blocks = round(plan.duration_s / BLOCK_S)
-    middle_m = random.uniform(0.4, 0.6) * float(p.position_range_m)
-    _at_rest(random, params, state, 0.0, middle_m + random.normal(0.0, 1e-3))
-    t_s = np.arange(blocks) * BLOCK_S
-    swing_m = np.zeros(blocks)
-    for size_m, frequency_Hz in plan.sines:
-        swing_m += size_m * np.sin(2.0 * math.pi * frequency_Hz * t_s + random.uniform(0.0, 2.0 * math.pi))
-    # the motion starts from rest without a jerk
-    wanted_m = middle_m + swing_m * np.square(np.sin(0.5 * math.pi * np.minimum(t_s / 1.5, 1.0)))
-    omega = 2.0 * math.pi * 3.0  # natural frequency of the closed loop, well damped
-    stiffness_N_per_m, damping_Ns_per_m = float(p.m * omega * omega), float(1.4 * p.m * omega)
-    limit_N = 0.8 * float(p.force_range_N)
-    samples = round(rig.rate_Hz * BLOCK_S)
-    analogue, truth = np.empty((len(CHANNELS), samples)), np.empty((len(TRUTH), samples))
-    rows = np.empty((len(CHANNELS), blocks))
-    wanted_mps = np.gradient(wanted_m, BLOCK_S)
-    s: Any = state[0]
-    for block in range(blocks):
-        force_N = stiffness_N_per_m * (wanted_m[block] - s.x) + damping_Ns_per_m * (wanted_mps[block] - s.v)
-        rows[3, block] = s.mass_position_f
-        advance_disturbed(params, state, min(max(float(force_N), -limit_N), limit_N), 0.0, 0.0, analogue, truth)
-        rows[:3, block] = analogue[:3, -1]
-    rows[4] = rows[3]
-    columns: Columns = {"t_s": t_s}
-    seen = measured(random, rig.chain, rows, 1.0 / BLOCK_S)
-    return columns | {"drive_force_N": seen[0].astype(np.float32), "mass_position_m": seen[3].astype(np.float32)}
+    velocity: tuple[tuple[float, float], ...]  # points [s, m/s], linear in between; one point: constant
+    vibration: tuple[Vibration, ...] = ()
+    duration_s: float = 10.0
+    holdout: bool = False
+    track: int = 0  # runs with the same number start at the same position
+
+    def columns(self, random: np.random.Generator, rig: DrawnRig, start_m: float) -> Columns:
+        """Drag the slide from about `start_m` on; return the columns of the run, [samples] each, SI units."""
+        params, state = build(rig.config)
+        blocks = round(self.duration_s / BLOCK_S)
+        force_N = random.uniform(0.3, 0.95) * float(params[0].F_c)
+        at_rest(random, params, state, force_N, start_m + random.normal(0.0, _SAME_PLACE_M))
+        points = np.array(self.velocity)
+        velocity_mps = np.interp(np.arange(blocks) * BLOCK_S, points[:, 0], points[:, 1])
+        frequency_Hz, amplitude_m = np.zeros(blocks), np.zeros(blocks)
+        for step in self.vibration:
+            at = round(step.from_s / BLOCK_S)
+            frequency_Hz[at:], amplitude_m[at:] = step.frequency_Hz, step.amplitude_m
+        analogue = np.empty((len(CHANNELS), blocks * round(RATE_HZ * BLOCK_S)))
+        truth = np.empty((len(TRUTH), analogue.shape[1]))
+        commanded_Hz, commanded_m = _primed(random, frequency_Hz, amplitude_m)
+        run_blocks(params, state, velocity_mps, commanded_Hz, commanded_m, analogue, truth)
+        rows = measured(random, rig.chain, analogue, RATE_HZ)
+        columns: Columns = {"t_s": np.arange(rows.shape[1]) / RATE_HZ}
+        columns |= {name: values.astype(np.float32) for name, values in zip(CHANNELS, rows, strict=True)}
+        if self.vibration:
+            block = (columns["t_s"] / BLOCK_S + 1e-6).astype(np.int64)
+            columns["vibration_frequency_Hz"] = frequency_Hz[block]
+            columns["vibration_amplitude_m"] = amplitude_m[block]
+        return columns
 
 
-def _at_rest(random: np.random.Generator, params: Any, state: Any, force_N: float, position_m: float) -> None:
+def steps(*steps: tuple[float, float]) -> tuple[tuple[float, float], ...]:
+    """A velocity profile that changes to each velocity at its time, over a short ramp."""
+    points = [steps[0]]
+    for time_s, velocity_mps in steps[1:]:
+        points += [(time_s, points[-1][1]), (time_s + _RAMP_S, velocity_mps)]
+    return tuple(points)
+
+
+def constant(velocity_mps: float) -> tuple[tuple[float, float], ...]:
+    """A velocity profile of one velocity."""
+    return ((0.0, velocity_mps),)
+
+
+def vibration(*steps: tuple[float, float]) -> tuple[Vibration, ...]:
+    """Vibration with the paper's amplitude: [s, Hz] each, from this time on; a frequency of 0 is off."""
+    return tuple(Vibration(time_s, f_Hz, _AMPLITUDE_M if f_Hz > 0.0 else 0.0) for time_s, f_Hz in steps)
+
+
+# the shortest protocol that separates ageing, direction, position, piezo and drive
+LADDER: Final = (
+    RunPlan(constant(0.0005), track=0),
+    # 3 mm forward; 5 mm back, of which 2.1 mm slide; 0.9 mm of slow drag with dwells of 3 s
+    RunPlan(steps((0.0, 0.002), (1.5, -0.002), (4.0, -0.00015)), track=1),
+    # frequencies in no order: if they rose with time, a roll-off would look like an exciter that warms up
+    RunPlan(constant(0.0005), vibration((2.0, 3000.0), (4.0, 1000.0), (6.0, 4500.0), (8.0, 2000.0)), track=2),
+    RunPlan(
+        steps((0.0, 0.0007), (5.0, -0.002), (7.2, -0.0002)),
+        vibration((2.5, 2500.0), (5.0, 0.0)),
+        holdout=True,
+        track=3,
+    ),
+)
+
+
+def at_rest(random: np.random.Generator, params: Any, state: Any, force_N: float, position_m: float) -> None:
     """Set the state to a slide at rest under a spring force, consistent with springs, sensors and delays."""
     p, s = params[0], state[0]
     s.x, s.z = position_m, force_N / p.k_t
@@ -117,5 +145,75 @@ def _primed(random: np.random.Generator, frequency_Hz: Floats, amplitude_m: Floa
     return commanded_Hz, commanded_m
 
 
-def _averaged(rows: Floats, average: int) -> Floats:
-    return rows if average == 1 else rows.reshape(len(rows), -1, average).mean(axis=2)
+def draw_chain(random: np.random.Generator, sensors: SensorsConfig, force_scale: float) -> DrawnChain:
+    """Draw a chain; `force_scale` is the static friction relative to the paper's pair, and scales the errors of the force."""
+    force_N = force_scale * _log_uniform(random, 0.005, 0.040)
+    accel_mps2 = _log_uniform(random, 0.0015, 0.05)
+    position_m = _log_uniform(random, 5e-8, 1e-6)
+    noise = np.array([force_N, accel_mps2, accel_mps2, position_m, position_m])
+    # hum of 0 to 20 mN on the force, for any noise; on the other channels the same ratio to the noise, or less
+    hum_share = force_scale * random.uniform(0.0, 0.020) / force_N
+    hum = hum_share * noise * np.concatenate([[1.0], random.uniform(0.0, 1.0, 4)])
+    wide_open = random.random(3) < 0.5
+    # a first-order filter far above the highest sampling rate, 100 kHz, has no effect
+    open_to = {"force_bandwidth_Hz": 1e6, "accel_bandwidth_Hz": 1e6, "position_bandwidth_Hz": 1e6}
+    changed: dict[str, float] = {
+        name: f_Hz for (name, f_Hz), is_open in zip(open_to.items(), wide_open, strict=True) if is_open
+    }
+    changed["position_linearity"] = random.uniform(0.0, sensors.position_linearity)
+    return DrawnChain(
+        sensors.model_copy(update=changed),
+        noise,
+        random.uniform(0.0, 1.0),
+        hum,
+        float(random.choice([50.0, 60.0])) * (1.0 + random.normal(0.0, 2e-4)),  # the grid keeps 0.02 %
+        force_scale * random.uniform(0.0, 0.010),
+    )
+
+
+def measured(random: np.random.Generator, chain: DrawnChain, analogue: Floats, rate_Hz: float) -> Floats:
+    """The signals [5, samples] that the chain reports for the analogue signals [5, samples], in the order of `CHANNELS`."""
+    samples = analogue.shape[1]
+    t_s = np.arange(samples) / rate_Hz
+    phase_rad = random.uniform(0.0, 2.0 * math.pi)
+    hum = np.sin(2.0 * math.pi * chain.hum_Hz * t_s + phase_rad)
+    # rectifiers give the mains a third harmonic
+    hum += random.uniform(0.0, 0.4) * np.sin(6.0 * math.pi * chain.hum_Hz * t_s + 3.0 * phase_rad)
+    result = analogue + chain.hum[:, None] * hum
+    share = t_s / t_s[-1]
+    slow = random.normal(0.0, 0.5) * share + 0.5 * np.sin(math.pi * share + random.uniform(0.0, 2.0 * math.pi))
+    result[0] += chain.drift_N * slow
+    # white noise has a density, not a level: its rms grows with the root of the sampling rate
+    level = math.sqrt(rate_Hz / RATE_HZ)
+    for row in range(len(result)):
+        result[row] += chain.noise[row] * level * _noise(random, samples, chain.pink_share)
+    sensors = chain.sensors
+    _digital(result[0], -sensors.force_range_N, sensors.force_range_N, sensors.force_resolution_N)
+    for row in (1, 2):
+        _digital(result[row], -sensors.accel_range_mps2, sensors.accel_range_mps2, sensors.accel_resolution_mps2)
+    for row in (3, 4):
+        along = analogue[row] / sensors.position_range_m
+        result[row] += 4.0 * sensors.position_linearity * sensors.position_range_m * along * (1.0 - along)
+        _digital(result[row], 0.0, sensors.position_range_m, sensors.position_resolution_m)
+    return result
+
+
+def _noise(random: np.random.Generator, samples: int, pink_share: float) -> Floats:
+    """Noise of unit rms, [samples]: white, with a share of the power that falls with 1/f."""
+    white = random.standard_normal(samples)
+    spectrum: Any = np.fft.rfft(random.standard_normal(samples))
+    at = np.arange(len(spectrum), dtype=np.float64)
+    at[0] = np.inf  # no constant part: an offset is a separate effect
+    pink = np.fft.irfft(spectrum / np.sqrt(at), samples)
+    return math.sqrt(1.0 - pink_share) * white + math.sqrt(pink_share) * pink / pink.std()
+
+
+def _digital(values: Floats, low: float, high: float, resolution: float) -> None:
+    if resolution > 0.0:
+        np.rint(values / resolution, out=values)
+        values *= resolution
+    np.clip(values, low, high, out=values)
+
+
+def _log_uniform(random: np.random.Generator, low: float, high: float) -> float:
+    return math.exp(random.uniform(math.log(low), math.log(high)))

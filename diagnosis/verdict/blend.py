@@ -11,7 +11,7 @@ from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.fits.screening import Directions
 from diagnosis.hypotheses.starts import Trial
-from diagnosis.processes import each
+from diagnosis.processes import spread
 from diagnosis.verdict.held_out import HeldOut
 
 # Step for the derivatives of the nuisances on the held-out runs, in tolerances. Too small: the grid of the features shows.
@@ -34,25 +34,22 @@ def flexible_differences(fitter: Fitter, baseline: Fit, trials: list[Trial], hel
     directions = Directions(baseline, fitter.most)
     base_features = fitter.predicted(baseline.deviations, {})
     _, slope = fitter.whitened(base_features)
-    shown = each(jobs, _shown, fitter, [(baseline.deviations, trials[i::jobs]) for i in range(jobs)])
-    columns = [fitter.column(base_features, shown[i % jobs][i // jobs], slope) for i in range(len(trials))]
+    added = [(baseline.deviations, trial.hypothesis.tables(trial.w)) for trial in trials]
+    columns = [
+        fitter.column(base_features, shown, slope) for shown in spread(jobs, Fitter.predicted_many, fitter, added)
+    ]
     free = np.stack([directions.freed(column) for column in columns], axis=1)
     shares = np.linalg.solve(free.T @ free + np.eye(len(trials)), free.T @ directions.left)
     blended = np.stack(columns, axis=1) @ shares
     moved = directions.moved(blended) - baseline.deviations
     points = [fitter.nuisances.point(baseline.deviations, {})]
-    points += [fitter.nuisances.point(baseline.deviations, trial.hypothesis.tables(trial.w)) for trial in trials]
+    points += [fitter.nuisances.point(*at) for at in added]
     points += [fitter.nuisances.point(ahead, {}) for ahead in baseline.deviations + _STEP * np.eye(len(moved))]
     unmoved, *others = held_out.problem.predicted_many(points)
     total = unmoved.copy()
     for share, moved_features in zip([*shares, *(moved / _STEP)], others, strict=True):
         total += share * _finite(moved_features - unmoved)
     return held_out.differences_of(total)
-
-
-def _shown(fitter: Fitter, work: tuple[Floats, list[Trial]]) -> list[Floats]:
-    deviations, trials = work
-    return fitter.predicted_many([(deviations, trial.hypothesis.tables(trial.w)) for trial in trials])
 
 
 def _finite(values: Floats) -> Floats:

@@ -6,6 +6,7 @@ from diagnosis.latent.answer import LatentSignal
 from diagnosis.latent.components import DIRECTION, PLACE, TIME
 from diagnosis.verdict.held_out import FAR_FOR_NO_GAP, HeldOut
 from diagnosis.verdict.judge import Verdict
+from diagnosis.verdict.probabilities import swapped
 
 _KNOWN = (PLACE, DIRECTION, TIME)  # processes that are effects of the library
 # Log likelihood that the rows must lose without a process that is named: by chance 0.3 % of records lose 4, and eight processes
@@ -34,7 +35,5 @@ def with_latent(verdict: Verdict, latent: Sequence[LatentSignal], held_out: Held
     not_explained = verdict.kind == "unexplained" or shows_elsewhere
     if not not_explained or not names or verdict.outside or set(names) & set(verdict.refuted):
         return verdict
-    top, value = next(iter(verdict.probabilities.items()))
-    swapped = {top: verdict.probabilities.get(names[0], 0.0), names[0]: value}
-    probabilities = dict(sorted((verdict.probabilities | swapped).items(), key=lambda item: -item[1]))
+    probabilities = swapped(verdict.probabilities, next(iter(verdict.probabilities)), names[0])
     return verdict._replace(kind="partly", named=None, by_relations=names, probabilities=probabilities)

@@ -1,12 +1,12 @@
 """A verdict of the contest in view of the relations, which decide what they can."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.random_friction import is_random
 from diagnosis.relations.decide import SHOWN_BY, Decided, Decision
 from diagnosis.verdict.judge import Verdict
+from diagnosis.verdict.probabilities import swapped
 
 # Share of a relation on the held-out runs from which a known cause counts although something outside the library acts as well.
 _MOST = 0.5
@@ -15,15 +15,8 @@ _LEAST_CLOSED = 0.5  # share of the held-out gap that two effects must close to 
 _SEEN = SHOWN_BY | dict.fromkeys(("piezo-roll-off", "piezo-resonance", "piezo-sag"), "exciter")
 
 
-class ClosedByRelations(NamedTuple):
-    """The best explanation of a contest that ended unexplained, and the share of the held-out gap that it closes."""
-
-    fit: Fit | None
-    share: float | None
-
-
 def with_relations_verdict(
-    verdict: Verdict, decision: Decision, fits: Sequence[Fit], nearest: ClosedByRelations
+    verdict: Verdict, decision: Decision, fits: Sequence[Fit], nearest: Fit | None, closes: float | None
 ) -> Verdict:
     """The verdict of the contest, corrected by the relations.
 
@@ -31,7 +24,8 @@ def with_relations_verdict(
         verdict: of the contest, after the held-out runs.
         decision: what the relations decide.
         fits: the best fit of each single effect and of each pair.
-        nearest: what came nearest where the verdict is "unexplained".
+        nearest: the best explanation of a contest that ended unexplained.
+        closes: share of the held-out gap that it closes.
 
     """
     known = [cause for cause in decision.decided if cause.known]
@@ -42,22 +36,12 @@ def with_relations_verdict(
         return _unexplained(verdict)
     if known:
         return _with_known(verdict, known, fits)
-    if verdict.kind == "unexplained" and _is_pair(nearest):
-        names = () if nearest.fit is None else nearest.fit.hypothesis.effects
-        if not set(names) & set(verdict.refuted):
-            return verdict._replace(kind="partly", named=nearest.fit)
+    if verdict.kind == "unexplained" and nearest is not None and closes is not None and closes >= _LEAST_CLOSED:
+        hypothesis = nearest.hypothesis
+        is_pair = len(hypothesis.effects) > 1 and not is_random(hypothesis)
+        if is_pair and not set(hypothesis.effects) & set(verdict.refuted):
+            return verdict._replace(kind="partly", named=nearest)
     return verdict
-
-
-def _is_pair(nearest: ClosedByRelations) -> bool:
-    fit, share = nearest
-    return (
-        fit is not None
-        and share is not None
-        and share >= _LEAST_CLOSED
-        and len(fit.hypothesis.effects) > 1
-        and not is_random(fit.hypothesis)
-    )
 
 
 def _with_known(verdict: Verdict, known: list[Decided], fits: Sequence[Fit]) -> Verdict:
@@ -83,10 +67,7 @@ def _named(verdict: Verdict, kind: str, causes: list[Decided], fits: Sequence[Fi
 
 def _with_names(verdict: Verdict, kind: str, names: tuple[str, ...], fits: Sequence[Fit]) -> Verdict:
     fit_of_names = next((fit for fit in fits if set(fit.hypothesis.effects) == set(names)), None)
-    top, value = next(iter(verdict.probabilities.items()))
-    first = names[0]
-    swapped = {top: verdict.probabilities.get(first, 0.0), first: value}
-    probabilities = dict(sorted((verdict.probabilities | swapped).items(), key=lambda item: -item[1]))
+    probabilities = swapped(verdict.probabilities, next(iter(verdict.probabilities)), names[0])
     # a name without a fit has no size that a rig file could take, and no gap that it closes
     return verdict._replace(
         kind="effect" if kind == "effect" and fit_of_names is not None else "partly",
@@ -98,9 +79,7 @@ def _with_names(verdict: Verdict, kind: str, names: tuple[str, ...], fits: Seque
 
 
 def _unexplained(verdict: Verdict) -> Verdict:
-    top, value = next(iter(verdict.probabilities.items()))
-    swapped = {top: verdict.probabilities["unexplained"], "unexplained": value}
-    probabilities = dict(sorted((verdict.probabilities | swapped).items(), key=lambda item: -item[1]))
+    probabilities = swapped(verdict.probabilities, next(iter(verdict.probabilities)), "unexplained")
     return verdict._replace(
         kind="unexplained", named=None, runner_up=verdict.named or verdict.runner_up, probabilities=probabilities
     )

@@ -12,8 +12,7 @@ import numpy as np
 from bridge.arrays import Floats
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.random_friction import RANDOM, is_random
-from diagnosis.gap.floor import Floor, floor_of, replicates
-from diagnosis.gap.measure import cell_squares, chi2_of, differences, whitened
+from diagnosis.gap.measure import Floor, cell_squares, chi2_of, differences, floor_of, replicates, whitened
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.hypothesis import NOTHING, Hypothesis
 from diagnosis.hypotheses.nuisances import Nuisances

@@ -17,7 +17,7 @@ from diagnosis.fits.expected import MUCH, NEVER_WITHOUT_GAP, hidden_by_noise, mu
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.random_friction import LOAD, TRACK, RandomFriction, Scattered, is_random
 from diagnosis.gap.measure import chi2_of
-from diagnosis.verdict.probabilities import MISTAKEN_DOUBTFUL, mistaken_of, softmax, with_mistakes
+from diagnosis.verdict.probabilities import MISTAKEN_DOUBTFUL, mistaken_of, softmax, swapped, with_mistakes
 from plant.effects.library import EFFECTS
 
 _NO_ALARM = 1.0  # log evidence that `unexplained` stays behind `none` up to there
@@ -272,8 +272,7 @@ def with_outside(verdict: Verdict, imitators: frozenset[str] = frozenset()) -> V
         won = named.hypothesis.effects[0]
     else:
         return verdict
-    swapped = {won: verdict.probabilities["unexplained"], "unexplained": verdict.probabilities[won]}
-    probabilities = dict(sorted((verdict.probabilities | swapped).items(), key=lambda item: -item[1]))
+    probabilities = swapped(verdict.probabilities, won, "unexplained")
     return verdict._replace(
         kind="unexplained", named=None, runner_up=named or verdict.runner_up, probabilities=probabilities, outside=True
     )

@@ -38,6 +38,12 @@ def softmax(scores: dict[str, float]) -> dict[str, float]:
     return {name: weight / total for name, weight in sorted(weights.items(), key=lambda item: -item[1])}
 
 
+def swapped(probabilities: dict[str, float], first: str, second: str) -> dict[str, float]:
+    """The probabilities with those of two explanations exchanged, the largest first."""
+    exchanged = {first: probabilities.get(second, 0.0), second: probabilities[first]}
+    return dict(sorted((probabilities | exchanged).items(), key=lambda item: -item[1]))
+
+
 def mistaken_of(leaders: tuple[str, ...], random: bool) -> _Mistaken:
     """How often verdicts on these leaders were wrong; `random` says that the best model varies at random."""
     if leaders == ("none",):

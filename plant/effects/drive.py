@@ -11,11 +11,11 @@ from typing import Any, Final
 
 from bridge.kernel import kernel
 from bridge.layouts import PlantParams
-from plant.effects.row import WAVE_SHAPE, Effect, Formula, Parameter, one_form, ratio, wave_shape
+from plant.effects.row import WAVE_SHAPE, Effect, Formula, Parameter, one_form, ratio
 from plant.effects.waves import TWO_PI, wave
 
 _EVENED = 200  # rounds of `even_m` with half steps: whole steps diverge if the speed more than doubles
-_HALVINGS = 44  # rounds of `extension_m`: 10 / 2^44 is 6e-13
+_HALVINGS = 44  # bisections of `extension_m`: 10 / 2^44 = 6e-13 of a linear spring's extension is left
 MOST_UNEVEN: Final = 0.95  # largest relative ripple of the velocity; below 1, so that the drive never stops
 
 
@@ -38,13 +38,13 @@ def spring_law_N(
 
 @kernel
 def yield_m(hardening_per_m2: float) -> float:
-    """Extension at which a softening spring has its largest force: beyond it the cubic law falls and finally pushes."""
+    """Extension [m] of a softening spring at its largest force: beyond it the cubic law falls; infinite for other springs."""
     return math.sqrt(-1.0 / (3.0 * hardening_per_m2)) if hardening_per_m2 < 0.0 else math.inf
 
 
 @kernel
 def spring_N(p: PlantParams, extension_m: float) -> float:
-    """Force of the drive's spring."""
+    """Force of the drive's spring at an extension [N]."""
     most_m = yield_m(p.hardening_per_m2)
     return spring_law_N(p.k_d, 0.5 * p.gap_m, most_m, p.hardening_per_m2, p.knee_m, p.knee_ratio, extension_m)
 
@@ -72,7 +72,7 @@ def unevenness(p: PlantParams, t_s: float, even_m: float, force_N: float) -> flo
         turns = even_m / p.ripple_wavelength_m
     angle_rad = TWO_PI * turns + p.ripple_phase_rad
     size = min(p.ripple_ratio + p.ripple_per_N * math.fabs(force_N), MOST_UNEVEN)
-    return 1.0 + size * wave(angle_rad, p.ripple_sin_2, p.ripple_cos_2)
+    return 1.0 + size * wave(angle_rad, p.ripple_second_sin, p.ripple_second_cos)
 
 
 @kernel
@@ -88,7 +88,7 @@ def even_m(p: PlantParams, drive_m: float) -> float:
         for _ in range(_EVENED):
             sin = math.sin(result_m / per_rad_m + p.ripple_phase_rad)
             cos = math.cos(result_m / per_rad_m + p.ripple_phase_rad)
-            error = p.ripple_cos_2 * sin * cos - cos - 0.5 * p.ripple_sin_2 * (2.0 * cos * cos - 1.0)
+            error = p.ripple_second_cos * sin * cos - cos - 0.5 * p.ripple_second_sin * (2.0 * cos * cos - 1.0)
             result_m += 0.5 * (drive_m - p.ripple_ratio * per_rad_m * error - result_m)
     return result_m
 
@@ -100,25 +100,14 @@ def _set_damping(p: Any, form: str, value: dict[str, float]) -> None:
         p.relaxing_Ns_per_m, p.relaxation_s = value["damping_Ns_per_m"], value["relaxation_s"]
 
 
-def _set_stiffness(p: Any, _form: str, value: dict[str, float]) -> None:
-    p.k_d *= 1.0 + value["ratio"]
-
-
 def _set_hardening(p: Any, form: str, value: dict[str, float]) -> None:
     p.hardening_per_m2 = value["ratio"] * 1e6 if form == "cubic" else 0.0
     p.knee_m, p.knee_ratio = value.get("knee_m", 0.0), value["ratio"] if form == "bilinear" else 0.0
 
 
-def _set_backlash(p: Any, _form: str, value: dict[str, float]) -> None:
-    p.gap_m = value["gap_m"]
-
-
 def _set_ripple(p: Any, form: str, value: dict[str, float]) -> None:
-    p.ripple_ratio, p.ripple_per_N = value["ratio"], 0.0
     if form == "load":
         p.ripple_ratio, p.ripple_per_N = 0.0, value["ratio"] / p.F_s
-    p.ripple_phase_rad, p.ripple_sin_2, p.ripple_cos_2 = wave_shape(value)
-    p.ripple_wavelength_m, p.ripple_frequency_Hz = value.get("wavelength_m", 0.0), value.get("frequency_Hz", 0.0)
 
 
 _SPRING = ("spring",)
@@ -142,7 +131,7 @@ DRIVE: Final = {
         drives=_SPRING,
     ),
     "drive-stiffness": Effect(
-        "drive", one_form("k_d times 1 + ratio", ratio(0.1)), _set_stiffness, drives=_SPRING, first=True
+        "drive", one_form("k_d times 1 + ratio", ratio(0.1)), scales="k_d", drives=_SPRING, first=True
     ),
     "drive-hardening": Effect(
         "drive",
@@ -164,9 +153,7 @@ DRIVE: Final = {
     "drive-backlash": Effect(
         "drive",
         one_form("no force over a gap of gap_m around e = 0", Parameter("gap_m", 0.0, 0.1, 1e-4)),
-        _set_backlash,
-        numbers=("gap_m",),
-        switches=("gap_m",),
+        prefix="",
         drives=_SPRING,
     ),
     "drive-speed-ripple": Effect(
@@ -186,11 +173,9 @@ DRIVE: Final = {
             ),
         },
         _set_ripple,
-        numbers=(
-            *("ripple_ratio", "ripple_per_N", "ripple_wavelength_m", "ripple_frequency_Hz", "ripple_phase_rad"),
-            *("ripple_sin_2", "ripple_cos_2"),
-        ),
-        switches=("ripple_ratio", "ripple_per_N"),
+        prefix="ripple_",
+        numbers=("ripple_per_N",),
+        switches=("ripple_per_N",),
         memory=(("even_m", "f8"),),
         drives=_SPRING,
     ),

@@ -1,18 +1,18 @@
-"""The level of friction: over speed, position, direction, time and load, and its nominal numbers."""
+"""Effects on the level of friction: of speed, position, direction, time and load, and changes of its nominal numbers."""
 
 import math
 from typing import Any, Final
 
 from bridge.kernel import kernel
 from bridge.layouts import PlantParams
-from plant.effects.row import TURN_RAD, WAVE_SHAPE, Effect, Formula, Parameter, one_form, ratio, wave_shape
+from plant.effects.row import TURN_RAD, WAVE_SHAPE, Effect, Formula, Parameter, one_form, ratio
 from plant.effects.waves import TWO_PI, smooth_noise, wave, with_second
 
 
 @kernel
 def level(p: PlantParams, t_s: float, x: float, v_r: float, load_sin: float, load_cos: float) -> float:
     """Factor of the friction at the present position and time; sine and cosine give the phase of the load's wave."""
-    result = 1.0 + p.drift_per_s * t_s
+    result = 1.0 + p.drift_rate_per_s * t_s
     if p.drift_settling_s > 0.0:
         result += p.drift_ratio * (1.0 - math.exp(-(p.drift_before_s + t_s) / p.drift_settling_s))
     result = max(result, 0.0)
@@ -20,7 +20,7 @@ def level(p: PlantParams, t_s: float, x: float, v_r: float, load_sin: float, loa
         result *= max(1.0 + p.position_ratio * _along_track(p, x), 0.0)
     if p.load_ratio != 0.0:
         if p.load_seed < 0.0:
-            load = with_second(load_sin, load_cos, p.load_sin_2, p.load_cos_2)
+            load = with_second(load_sin, load_cos, p.load_second_sin, p.load_second_cos)
         else:
             load = smooth_noise(2.0 * p.load_frequency_Hz * t_s, p.load_seed)
         result *= max(1.0 + p.load_ratio * load, 0.0)
@@ -32,7 +32,7 @@ def level(p: PlantParams, t_s: float, x: float, v_r: float, load_sin: float, loa
 
 @kernel
 def _along_track(p: PlantParams, x: float) -> float:
-    """The shape of the friction along the track: a wave, two waves, bumps, or noise."""
+    """Change of the friction along the track, in units of `position_ratio`: a wave, two waves, bumps, or noise."""
     if p.position_seed >= 0.0:
         return smooth_noise(2.0 * x / p.position_wavelength_m, p.position_seed)
     angle_rad = TWO_PI * x / p.position_wavelength_m + p.position_phase_rad
@@ -40,7 +40,7 @@ def _along_track(p: PlantParams, x: float) -> float:
         apart = angle_rad / TWO_PI - math.floor(angle_rad / TWO_PI + 0.5)
         along = math.exp(-0.5 * (apart / p.position_width) ** 2)
     else:
-        along = wave(angle_rad, p.position_sin_2, p.position_cos_2)
+        along = wave(angle_rad, p.position_second_sin, p.position_second_cos)
     if p.position_other_share != 0.0:
         other_rad = TWO_PI * x / p.position_other_wavelength_m + p.position_other_phase_rad
         along += p.position_other_share * math.sin(other_rad)
@@ -52,46 +52,12 @@ def _set_viscous(p: Any, _form: str, value: dict[str, float]) -> None:
     p.quadratic_Ns2_per_m2 = value.get("damping_Ns2_per_m2", 0.0)
 
 
-def _set_position(p: Any, _form: str, value: dict[str, float]) -> None:
-    p.position_ratio, p.position_wavelength_m = value["ratio"], value["wavelength_m"]
-    p.position_phase_rad, p.position_sin_2, p.position_cos_2 = wave_shape(value)
-    p.position_width = value.get("width", 0.0)
-    p.position_other_share = value.get("other_share", 0.0)
-    p.position_other_wavelength_m = value.get("other_wavelength_m", 0.0)
-    p.position_other_phase_rad = value.get("other_phase_rad", 0.0)
-    p.position_seed = value.get("seed", -1.0)
-
-
 def _set_direction(p: Any, form: str, value: dict[str, float]) -> None:
     if form == "kinetic":
         p.kinetic_backward_ratio = value["ratio"]
     else:
         p.forward_ratio = 0.5 * value["ratio"] if form == "both" else 0.0
         p.backward_ratio = -0.5 * value["ratio"] if form == "both" else value["ratio"]
-
-
-def _set_load(p: Any, _form: str, value: dict[str, float]) -> None:
-    p.load_ratio, p.load_frequency_Hz = value["ratio"], value["frequency_Hz"]
-    p.load_phase_rad, p.load_sin_2, p.load_cos_2 = wave_shape(value)
-    p.load_seed = value.get("seed", -1.0)
-
-
-def _set_drift(p: Any, _form: str, value: dict[str, float]) -> None:
-    p.drift_per_s = value.get("rate_per_s", 0.0)
-    p.drift_ratio, p.drift_settling_s = value.get("ratio", 0.0), value.get("settling_s", 0.0)
-    p.drift_before_s = value.get("before_s", 0.0)
-
-
-def _set_coulomb(p: Any, _form: str, value: dict[str, float]) -> None:
-    p.F_c *= 1.0 + value["ratio"]
-
-
-def _set_static(p: Any, _form: str, value: dict[str, float]) -> None:
-    p.F_s *= 1.0 + value["ratio"]
-
-
-def _set_stribeck(p: Any, _form: str, value: dict[str, float]) -> None:
-    p.v_s *= 1.0 + value["ratio"]
 
 
 _PLACES = Parameter("wavelength_m", 1e-5, 1.0, 4e-3)
@@ -133,13 +99,7 @@ FRICTION: Final = {
                 (_SWING, _PLACES, _SEED),
             ),
         },
-        _set_position,
-        numbers=(
-            *("position_ratio", "position_wavelength_m", "position_phase_rad", "position_sin_2", "position_cos_2"),
-            *("position_other_share", "position_other_wavelength_m", "position_other_phase_rad", "position_seed"),
-            "position_width",
-        ),
-        switches=("position_ratio",),
+        prefix="position_",
         off={"position_seed": -1.0},
     ),
     "direction-dependent-friction": Effect(
@@ -164,9 +124,7 @@ FRICTION: Final = {
                 (_SWING, _TIMES, _SEED),
             ),
         },
-        _set_load,
-        numbers=("load_ratio", "load_frequency_Hz", "load_phase_rad", "load_sin_2", "load_cos_2", "load_seed"),
-        switches=("load_ratio",),
+        prefix="load_",
         off={"load_seed": -1.0},
     ),
     "friction-drift": Effect(
@@ -185,11 +143,9 @@ FRICTION: Final = {
                 ),
             ),
         },
-        _set_drift,
-        numbers=("drift_per_s", "drift_ratio", "drift_settling_s", "drift_before_s"),
-        switches=("drift_per_s", "drift_ratio"),
+        prefix="drift_",
     ),
-    "coulomb-level": Effect("friction", one_form("F_c times 1 + ratio", ratio(0.1)), _set_coulomb),
-    "static-level": Effect("friction", one_form("F_s times 1 + ratio", ratio(0.1)), _set_static, first=True),
-    "stribeck-velocity": Effect("friction", one_form("v_s times 1 + ratio", ratio(0.5)), _set_stribeck),
+    "coulomb-level": Effect("friction", one_form("F_c times 1 + ratio", ratio(0.1)), scales="F_c"),
+    "static-level": Effect("friction", one_form("F_s times 1 + ratio", ratio(0.1)), scales="F_s", first=True),
+    "stribeck-velocity": Effect("friction", one_form("v_s times 1 + ratio", ratio(0.5)), scales="v_s"),
 }

@@ -19,7 +19,7 @@ _LAG_LINE = round(LONGEST_LAG_S / LAG_CELL_S) + 2  # the cells of the longest la
 
 @kernel
 def ageing_N(p: PlantParams, age_s: float) -> float:
-    """Excess of the static friction over F_s at this age of the contact."""
+    """Excess of the static friction over F_s [N] at this age of the contact; below 0 before the age `rested_s`."""
     if p.age_exponent > 0.0:
         return p.age_growth_N * age_s**p.age_exponent - p.age_rested_N
     if p.age_settling_s > 0.0:

@@ -19,11 +19,6 @@ from plant.effects.structure import STRUCTURE
 EFFECTS: Final[dict[str, Effect]] = FRICTION_MEMORY | FRICTION | DRIVE | STRUCTURE | PIEZO | SENSORS
 
 
-def first_form(name: str) -> str:
-    """The default form of an effect."""
-    return next(iter(EFFECTS[name].forms))
-
-
 def checked(name: str, table: Any) -> dict[str, float | str]:
     """One `[effects.NAME]` table with its form and every parameter filled in. Raises ValueError: key, value, rule, remedy."""
     if name not in EFFECTS:
@@ -33,7 +28,7 @@ def checked(name: str, table: Any) -> dict[str, float | str]:
             f"effects.{name} = {in_short(table)}: must be a table; write [effects.{name}] and its keys below it"
         )
     forms = EFFECTS[name].forms
-    form = table.get("form", first_form(name))
+    form = table.get("form", next(iter(forms)))
     if not isinstance(form, str) or form not in forms:
         known = ", ".join(f'"{known}"' for known in forms if known) or "none; leave it out"
         raise ValueError(f"effects.{name}.form = {in_short(form)}: unknown form; known: {known}")

@@ -1,6 +1,6 @@
 """Delivered share of the commanded amplitude: over frequency, under load, and during warm-up.
 
-Source: a mode that takes part by a share: Ewins, Modal Testing, 2000.
+Source of the form `mode`, one mode in parallel with a rigid path: Ewins, Modal Testing, 2000.
 """
 
 import math
@@ -13,7 +13,7 @@ from plant.effects.row import Effect, Formula, Parameter, ratio
 
 @kernel
 def roll_off(p: PlantParams, frequency_Hz: float) -> float:
-    """Divisor of the amplitude at this frequency."""
+    """Factor by which the roll-off divides the amplitude at this frequency."""
     r = frequency_Hz / p.rolloff_Hz
     return math.sqrt(1.0 + r * r) if p.rolloff_order == 1.0 else 1.0 + r * r
 
@@ -54,10 +54,6 @@ def _set_resonance(p: Any, form: str, value: dict[str, float]) -> None:
         p.mount_resonance_Hz *= value["ratio"] > 0.0  # a mode of share 0 leaves a rigid mount
 
 
-def _set_sag(p: Any, _form: str, value: dict[str, float]) -> None:
-    p.sag_ratio, p.sag_settling_s = value["ratio"], value.get("settling_s", 0.0)
-
-
 _MODE = (Parameter("resonance_Hz", 100.0, 1e6, 8000.0), Parameter("damping_ratio", 0.005, 2.0, 0.05))
 _SAG = ratio(0.2, -0.9, 0.9)
 PIEZO: Final = {
@@ -95,9 +91,7 @@ PIEZO: Final = {
                 (_SAG, Parameter("settling_s", 0.05, 1e4, 3.0)),
             ),
         },
-        _set_sag,
-        numbers=("sag_ratio", "sag_settling_s"),
-        switches=("sag_ratio",),
+        prefix="sag_",
         memory=(("vibrating_s", "f8"),),
     ),
 }

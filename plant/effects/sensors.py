@@ -28,31 +28,14 @@ def force_reading_N(p: PlantParams, s: PlantMemory, force_N: float, t_s: float) 
         older = s.delay_line[(s.delay_at - int(cells) - 1) % _DELAY_LINE]
         force_N = newer + (back - cells) * (older - newer)
         s.delay_at = (s.delay_at + 1) % _DELAY_LINE
-    offset_N = p.force_bias_N + p.force_drift_N_per_s * t_s
+    offset_N = p.force_bias_N + p.force_rate_N_per_s * t_s
     if p.force_settling_s > 0.0:
         offset_N += p.force_drift_N * (1.0 - math.exp(-t_s / p.force_settling_s))
-    return force_N * (1.0 + p.force_ratio) + offset_N / p.force_gain  # the gain is applied to the sum when it is read
+    return force_N * (1.0 + p.force_ratio) + offset_N / p.force_gain  # `plant.sensors` multiplies the sum by the gain
 
 
-def _set_force_gain(p: Any, _form: str, value: dict[str, float]) -> None:
-    p.force_ratio = value["ratio"]
-
-
-def _set_bias(p: Any, _form: str, value: dict[str, float]) -> None:
-    p.force_bias_N = value["bias_N"]
-
-
-def _set_drift(p: Any, _form: str, value: dict[str, float]) -> None:
-    p.force_drift_N_per_s = value.get("rate_N_per_s", 0.0)
-    p.force_drift_N, p.force_settling_s = value.get("drift_N", 0.0), value.get("settling_s", 0.0)
-
-
-def _set_lag(p: Any, form: str, value: dict[str, float]) -> None:
-    p.force_lag_s, p.force_lag_order = value["lag_s"], LAG_ORDERS[form]
-
-
-def _set_delay(p: Any, _form: str, value: dict[str, float]) -> None:
-    p.force_delay_s = value["delay_s"]
+def _set_lag(p: Any, form: str, _value: dict[str, float]) -> None:
+    p.force_lag_order = LAG_ORDERS[form]
 
 
 def _set_accelerometer(p: Any, form: str, value: dict[str, float]) -> None:
@@ -61,19 +44,9 @@ def _set_accelerometer(p: Any, form: str, value: dict[str, float]) -> None:
 
 
 SENSORS: Final = {
-    "force-sensor-gain": Effect(
-        "sensor",
-        one_form("reading times 1 + ratio", ratio(0.05)),
-        _set_force_gain,
-        numbers=("force_ratio",),
-        switches=("force_ratio",),
-    ),
+    "force-sensor-gain": Effect("sensor", one_form("reading times 1 + ratio", ratio(0.05)), prefix="force_"),
     "force-sensor-bias": Effect(
-        "sensor",
-        one_form("reading plus bias_N", Parameter("bias_N", -1e5, 1e5, 0.5)),
-        _set_bias,
-        numbers=("force_bias_N",),
-        switches=("force_bias_N",),
+        "sensor", one_form("reading plus bias_N", Parameter("bias_N", -1e5, 1e5, 0.5)), prefix="force_"
     ),
     "force-sensor-drift": Effect(
         "sensor",
@@ -84,9 +57,7 @@ SENSORS: Final = {
                 (Parameter("drift_N", -1e5, 1e5, 0.5), Parameter("settling_s", 0.1, 1e4, 5.0)),
             ),
         },
-        _set_drift,
-        numbers=("force_drift_N_per_s", "force_drift_N", "force_settling_s"),
-        switches=("force_drift_N_per_s", "force_drift_N"),
+        prefix="force_",
     ),
     "force-sensor-lag": Effect(
         "sensor",
@@ -96,16 +67,14 @@ SENSORS: Final = {
             "fourth-order": Formula("reading through four equal low-passes", (Parameter("lag_s", 0.0, 1.0, 2.5e-4),)),
         },
         _set_lag,
-        numbers=("force_lag_s", "force_lag_order"),
-        switches=("force_lag_s",),
+        prefix="force_",
+        numbers=("force_lag_order",),
         memory=(("force_lag", "f8", (max(LAG_ORDERS.values()),)),),
     ),
     "force-sensor-delay": Effect(
         "sensor",
         one_form("reading is delayed by delay_s", Parameter("delay_s", 0.0, 0.012, 1e-3)),
-        _set_delay,
-        numbers=("force_delay_s",),
-        switches=("force_delay_s",),
+        prefix="force_",
         memory=(("delay_line", "f8", (_DELAY_LINE,)), ("delay_at", "i8")),
     ),
     "accelerometer-gain": Effect(

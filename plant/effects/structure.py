@@ -20,7 +20,7 @@ def frame_gain_mps(
     """Change of the frame's velocity over a step under the drive's force: m q'' = F_d - q / c - damping, m = 1 / (c omega^2).
 
     Args:
-        dt, omega: step [s]; the frame's own frequency [rad/s].
+        dt, omega: step [s]; the frame's natural frequency [rad/s].
         loss: damping ratio times omega dt.
         frame_m_per_N: compliance c.
         h_d: damping of the drive that acts on the frame now [N s/m]. It is taken implicitly, as a light frame on a strong

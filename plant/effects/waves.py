@@ -9,7 +9,7 @@ TWO_PI = 2.0 * math.pi
 
 @kernel
 def lattice_value(index: float, seed: float) -> float:
-    """A number of unit variance for a lattice point: the same on every computer, without a generator."""
+    """A pseudo-random number of variance 1 for a lattice point: the same on every computer, without a generator."""
     mixed = math.sin(index * 12.9898 + seed * 78.233) * 43758.5453
     return (mixed - math.floor(mixed) - 0.5) * math.sqrt(12.0)
 
@@ -25,7 +25,7 @@ def smooth_noise(at: float, seed: float) -> float:
 def noise_in_cell(share: float, before: float, after: float) -> float:
     """Smooth noise between two lattice points, from its values there and the share of the distance."""
     share = share * share * (3.0 - 2.0 * share)
-    # the mean of (1 - share)^2 + share^2 over a cell is 26/35
+    # scaled to variance 1: the mean of (1 - share)^2 + share^2 over a cell is 26/35
     return (before * (1.0 - share) + after * share) / math.sqrt(26.0 / 35.0)
 
 

@@ -1,12 +1,11 @@
 """Injected faults of sensors, exciter, clock and bus; the same seed gives the same numbers.
 
-    kinds     every kind of fault: its targets, and the meaning of its value
-    table     one table `[[fault]]` of a scenario, checked
+    kinds     every kind of fault: its targets, and the meaning of its value (kinds.toml)
+    table     one table `[[fault]]` of a scenario or of an operator's request, checked
     sensors   off, stuck, garbage, scaled, delayed, clipped, nan, swapped, drifting, jumping, ...
     exciter   weak, resonant, clipping, hot, dead, slow
     clock     the time and the numbers of the blocks
     line      the bus in one direction: dropped, repeated, reordered, late, held, cut, corrupted, forged
-    orders    an operator's fault-injection request to a running rig
     schedule  the faults that act in a block; events at their begin and end
 
 `PlantNode` and the plant process hold one `schedule.Faults`, in real time and in simulated time alike.

@@ -6,8 +6,8 @@ from typing import Any
 from plant.faults.table import FaultTable
 
 FIELDS = ("delivered_ratio", "mount_resonance_Hz", "mount_damping_ratio", "amplitude_max_m", "amplitude_slew_m_per_s")
-_WARMING_S = 1.0  # time constant of `hot`
-_LOOSE_DAMPING = 0.05  # damping ratio of `resonant`
+_WARMING_S = 1.0  # time constant of the fault `hot`
+_LOOSE_DAMPING = 0.05  # damping ratio of the mount in the fault `resonant`
 
 
 class ExciterFaults:

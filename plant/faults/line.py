@@ -12,7 +12,7 @@ from plant.faults.table import FaultTable
 
 _CORRUPTED_BYTES = 3  # changed bytes of a corrupted message
 _FOREIGN_RUN = 666  # run number of a forged command
-_MOST_WAITING = 20_000  # messages: ten seconds of both directions
+_MOST_WAITING = 20_000  # most messages under way in one direction: 20 s of blocks of 1 ms
 
 
 class Message(NamedTuple):

@@ -1,21 +1,26 @@
 """The faults that act in a block: their effects on the rig and its bus, and events at their begin and end."""
 
+import collections
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Records
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.payloads import parsed
+from bridge.wire.topics import FAULT
 from plant.faults.clock import ClockFault
 from plant.faults.exciter import ExciterFaults
 from plant.faults.kinds import BUS, CLOCK, EXCITER, LINK, SENSORS
 from plant.faults.line import Line, Message
 from plant.faults.sensors import SensorFault
-from plant.faults.table import FaultTable
+from plant.faults.table import FaultTable, ordered
 
 BEGAN, ENDED = "INJECTED", "INJECTION_ENDED"  # codes of the events
 _STREAM = 2  # random stream of the faults: noise and jitter of a rig use other streams of its seed
 _NEVER = 1 << 62
+_REMEMBERED = 64  # orders whose ids are stored; a repeated order arrives within a second
 
 
 class _Planned(NamedTuple):
@@ -40,19 +45,17 @@ class Faults:
 
     """
 
-    def __init__(
-        self, tables: Sequence[FaultTable], seed: int, block_s: float, samples: int, params: npt.NDArray[Any]
-    ) -> None:
+    def __init__(self, tables: Sequence[FaultTable], seed: int, block_s: float, samples: int, params: Records) -> None:
         self.busy = False  # whether any fault is planned or acts, or a message is delayed
         self.on_the_bus = False  # whether any fault of the bus acts, or a message is delayed
         self._seed, self._block_s, self._sample_s = seed, block_s, block_s / samples
-        self._params = params
-        self._exciter: ExciterFaults | None = None
+        self._exciter = ExciterFaults(params[0])
         self._planned: list[_Planned] = []
         self._acting: list[_Planned] = []
         self._news: list[tuple[str, str]] = []
         self._lines = {"blocks": Line(block_s, commands=False), "commands": Line(block_s, commands=True)}
         self._made = 0
+        self._taken: collections.deque[str] = collections.deque(maxlen=_REMEMBERED)
         for table in tables:
             self.add(table, 0)
 
@@ -67,9 +70,20 @@ class Faults:
         self._planned.append(_Planned(table, begin, end, random, sensor, clock))
         self.busy = True
 
-    def clear(self, block: int) -> None:
-        """End all acting faults and drop all planned ones."""
-        self._planned = [fault._replace(end=block) for fault in self._acting]
+    def take(self, payload: bytes, block: int) -> None:
+        """Add the fault of an operator's request from block `block` on; a repeated request is ignored.
+
+        Raises Fault BAD_MESSAGE for a malformed request, CONFIG for an invalid fault of a rig.
+        """
+        order = parsed(wire.Inject, payload, FAULT.name)
+        if order.id and order.id in self._taken:
+            return
+        self._taken.append(order.id)
+        table = ordered(order.fault) if order.fault else None
+        if order.clear:  # ends all acting faults and drops all planned ones
+            self._planned = [fault._replace(end=block) for fault in self._acting]
+        if table is not None:
+            self.add(table, block)
 
     def begin_block(self, block: int) -> None:
         """Update the acting faults; call it before the rig is advanced."""
@@ -84,10 +98,7 @@ class Faults:
                 self._news.append((ENDED, fault.table.in_words()))
         self._planned = [fault for fault in self._planned if block < fault.end]
         exciter = [(fault.table, self._since_s(fault, block)) for fault in self._acting if fault.table.group == EXCITER]
-        if exciter or self._exciter is not None:
-            self._exciter = self._exciter or ExciterFaults(self._params[0])
-            self._exciter.set(exciter)
-            self._exciter = self._exciter if exciter else None
+        self._exciter.set(exciter)
         self.on_the_bus = any(fault.table.group == BUS for fault in self._acting) or not self._lines_empty
         self.busy = bool(self._planned) or bool(self._acting) or not self._lines_empty
 
@@ -98,7 +109,7 @@ class Faults:
     def _since_s(self, fault: _Planned, block: int) -> float:
         return (block - fault.begin) * self._block_s
 
-    def spoil(self, sensors: npt.NDArray[Any], block: int) -> None:
+    def spoil(self, sensors: Records, block: int) -> None:
         """Apply the sensor faults to the samples of a block, one record."""
         for fault in self._planned:
             if fault.sensor is not None:
@@ -107,7 +118,7 @@ class Faults:
                 elif fault.begin == block + 1:
                     fault.sensor.look(sensors[0])
 
-    def misdate(self, messages: Sequence[npt.NDArray[Any]], block: int) -> None:
+    def misdate(self, messages: Sequence[Records], block: int) -> None:
         """Apply the clock faults to times and numbers of the messages of a block, one record each."""
         for fault in self._acting:
             if fault.clock is not None:

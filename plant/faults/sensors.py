@@ -11,9 +11,9 @@ from bridge.wire.channels import CHANNELS
 from plant.faults.kinds import ALL_SENSORS, LARGEST
 from plant.faults.table import FaultTable
 
-_JUMP_S = 0.1
-_HUM_HZ = 50.0
-_LOOSE_BLOCKS = 5.0  # mean length of a burst [blocks]
+_JUMP_S = 0.1  # time with, then without the offset of the fault `jumping`
+_HUM_HZ = 50.0  # mains frequency, of the fault `hum`
+_LOOSE_BLOCKS = 5.0  # mean length of a burst of the fault `loose` [blocks]
 
 
 class SensorFault:
@@ -83,7 +83,7 @@ class _Channel:
         return np.zeros_like(samples) if self.is_off else samples
 
     def flipped(self, samples: Floats, _s: float) -> Floats:
-        """Samples with a random bit of a random sample inverted, as a 4-byte number on the wire."""
+        """In a share `size` of the blocks, a random bit of a random sample inverted, as a 4-byte number on the wire."""
         if self.random.random() < self.size:
             carried = samples.astype(np.float32)
             carried.view(np.uint32)[self.random.integers(len(samples))] ^= np.uint32(1 << int(self.random.integers(32)))
@@ -91,12 +91,12 @@ class _Channel:
         return samples
 
     def huge(self, samples: Floats, _s: float) -> Floats:
-        """Samples with the value in place of the middle sample."""
+        """Samples whose middle one is replaced by the fault's value."""
         samples[len(samples) // 2] = self.size
         return samples
 
     def times_s(self, samples: Floats, since_s: float) -> Floats:
-        """Times of the samples since the begin of the fault."""
+        """Times of the samples since the begin of the fault [s]."""
         return since_s + self.sample_s * np.arange(len(samples))
 
 

@@ -1,13 +1,17 @@
 """One table `[[fault]]` of a scenario: kind, target, begin and duration of a fault."""
 
+import json
 from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from bridge.config import Strict
+from bridge.config import Strict, validate
+from bridge.faults import Fault
 from bridge.wire.channels import CHANNELS
+from bridge.wire.topics import FAULT
 from plant.faults.kinds import BUS, KINDS, LARGEST, PROCESS, SENSORS, TARGETS, group_of
 
+_LONGEST = 10_000  # longest table of an operator's request [bytes]; every valid table has fewer than 500
 _LONGEST_S = 1e9  # 30 years; a far longer time overflows the count of blocks
 
 
@@ -15,16 +19,14 @@ class FaultTable(Strict):
     """A fault injected into a run. The rig must be simulated."""
 
     name: str = Field(
-        default="", pattern=r"^[^\x00-\x1f\x7f]*$", description="Name in events and verdicts; not given: TARGET KIND."
+        "", pattern=r"^[^\x00-\x1f\x7f]*$", description="Name in events and verdicts; not given: TARGET KIND."
     )
     kind: str = Field(description="Kind of the fault: `stickslip fault --list` lists all kinds.")
     target: str = Field(description="A channel, sensors, exciter, clock, blocks, commands, link, or a process.")
-    from_s: Annotated[float, Field(ge=0, le=_LONGEST_S)] = Field(
-        default=0.0, description="Time of the run at which it begins."
-    )
-    for_s: Annotated[float, Field(ge=0, le=_LONGEST_S)] = Field(default=0.0, description="Duration; 0: to the end.")
-    value: float | None = Field(default=None, description="Size of the fault; its meaning depends on the kind.")
-    other: str = Field(default="", description="For `swapped`: the other channel.")
+    from_s: Annotated[float, Field(ge=0, le=_LONGEST_S)] = Field(0.0, description="Time of the run at which it begins.")
+    for_s: Annotated[float, Field(ge=0, le=_LONGEST_S)] = Field(0.0, description="Duration; 0: to the end.")
+    value: float | None = Field(None, description="Size of the fault; its meaning depends on the kind.")
+    other: str = Field("", description="For `swapped`: the other channel.")
 
     @model_validator(mode="after")
     def _is_a_fault(self) -> "FaultTable":
@@ -78,3 +80,18 @@ class FaultTable(Strict):
         size = f" {self.size:g}" if KINDS[(self.group, self.kind)].value else ""
         text = f"{self.target} {self.kind}{size}{f' with {self.other}' if self.other else ''}"
         return f"{self.name}: {text}" if self.name else text
+
+
+def ordered(text: str) -> FaultTable:
+    """The fault in a request. Raises Fault BAD_MESSAGE for a malformed request, CONFIG for an invalid fault of a rig."""
+    try:
+        table = json.loads(text) if len(text) < _LONGEST else None
+    except (ValueError, RecursionError):
+        table = None
+    if not isinstance(table, dict):
+        raise Fault("BAD_MESSAGE", f"{FAULT.name}: fault: is not a JSON object; send a table [[fault]]")
+    made = validate(FaultTable, table, FAULT.name)
+    if made.group == PROCESS:
+        line = f"{FAULT.name}: target = {made.target}: a rig cannot end a process; must belong to sensors, exciter, clock or bus"
+        raise Fault("CONFIG", f"{line}; end the process by its pid")
+    return made

@@ -5,9 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.synthetic.folder import Case, make_evidence
+from diagnosis.synthetic.folder import make_evidence
 from tests.blind.generators import Plan
 from tests.blind.plant_sizes import EFFECT_SIZES, Sizes, possible
+from tests.made_protocols import case_of
 
 
 class PlantEffect(NamedTuple):
@@ -34,7 +35,7 @@ class Plant:
     """Rigs of the plant.
 
     Args:
-        protocol: of every evidence, in `diagnosis/protocols`.
+        protocol: of every evidence, in `tests/made_protocols.py`.
 
     """
 
@@ -57,7 +58,7 @@ class Plant:
 
     def make(self, folder: Path, plan: Plan, seed: int) -> None:
         effects = {effect.name: effect.numbers for effect in plan.effects}
-        case = Case(self._protocol, effects, leave_out=plan.leave_out, spread=plan.tolerances, rough=not plan.smooth)
+        case = case_of(self._protocol, effects, leave_out=plan.leave_out, spread=plan.tolerances, rough=not plan.smooth)
         make_evidence(folder, case, seed)
 
 

@@ -18,11 +18,11 @@ import numpy.typing as npt
 
 from diagnosis.evidence.folder import load_evidence
 from diagnosis.features.feature import POWERS
+from diagnosis.fits.batch import together
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.fits.retuning import FIRST_REPLICATES, REPLICATES, ROUGHNESS, roughness_of
-from diagnosis.gap.floor import Floor, floor_of, replicates
-from diagnosis.gap.measure import cell_names, cell_squares
+from diagnosis.gap.measure import Floor, cell_names, cell_squares, floor_of, replicates
 from diagnosis.gap.prepare import Prepared, prepare
 from diagnosis.gap.problem import Point, Problem
 from diagnosis.hypotheses.hypothesis import NOTHING
@@ -101,7 +101,11 @@ class Bench:
 def _refitted(fitter: Fitter, deviations: Floats) -> Fit:
     """The baseline, refitted further where much chi2 is left, as a single refit may stop early (docs/method/diagnosis.md)."""
     fit = fitter.refit(NOTHING, deviations, np.zeros(0))
-    return fit if fit.chi2 <= _MUCH * len(fit.residual) else fitter.further(fit)
+    return (
+        fit
+        if fit.chi2 <= _MUCH * len(fit.residual)
+        else together(fitter.predicted_many, [fitter.going_further(fit)])[0]
+    )
 
 
 def _runs(folder: Path) -> list[Prepared]:

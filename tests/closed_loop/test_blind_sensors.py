@@ -21,7 +21,7 @@ from cockpit.run.scenario import Scenario
 from cockpit.run.sensor_needs import refuse_blind_sensors, refuse_out_of_travel
 from diagnosis.slips import find_cycles, smallest_drop_N
 from plant.records import TRUTH, build
-from plant.simulate import drive_velocity_mps, run_blocks
+from plant.simulate import held_velocity, run_blocks
 
 Floats = npt.NDArray[np.float64]
 FACTORS = {  # of the drawn value, ranges of the force of F_s
@@ -124,7 +124,7 @@ def _loses_slips(scenario: Scenario) -> bool:
 def _signals(scenario: Scenario) -> tuple[Floats, npt.NDArray[np.int64]]:
     rig = scenario.rig
     samples, blocks = rig.solver.samples_per_block, round(min(scenario.duration_s, SIMULATED_S) / rig.solver.block_s)
-    drive_mps = drive_velocity_mps(rig, np.arange(blocks) * rig.solver.block_s)
+    drive_mps = held_velocity(rig)(np.arange(blocks) * rig.solver.block_s)
     signals, truth = (np.empty((len(rows), blocks * samples)) for rows in (CHANNELS, TRUTH))
     run_blocks(*build(rig), drive_mps, np.zeros(blocks), np.zeros(blocks), signals, truth)
     return signals, np.repeat(np.sign(drive_mps), samples).astype(np.int64)

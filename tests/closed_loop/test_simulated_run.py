@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bench.faults.truth import TruthRun
 from bridge.log.logfile import STREAMING, RunData, read_run
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.clock import time
 from cockpit.run.in_process import TimedAction, run_onboard
 from cockpit.run.scenario import Scenario, load_scenario
-from cockpit.run.simulated.log import run_with_faults
-from cockpit.run.simulated.run import SimulatedRun
+from cockpit.run.simulated.run import SimulatedRun, run_with_faults
 from controller.replay import Change, replay
 from plant.faults.table import FaultTable
 
@@ -74,8 +74,10 @@ def test_a_frozen_controller_is_reported_and_nothing_arms_by_itself(tmp_path: Pa
 
 
 def test_an_operator_arms_the_rig_and_the_log_holds_its_true_state() -> None:
-    run = SimulatedRun(scenario(2.2), [TimedAction(20_000_000, wire.Operator.ARM)], arm=False)
-    truth = run.play()
+    disarmed = scenario(2.2).model_copy(update={"arm": False})
+    run = TruthRun(disarmed, [TimedAction(20_000_000, wire.Operator.ARM)])
+    run.play()
+    truth = run.truth
     assert len(truth.t_s) >= 2200
     np.testing.assert_allclose(truth.drive_mps[10:], 5e-4, rtol=1e-6)
     assert not truth.vibration_mps[truth.t_s < 0.5].any()

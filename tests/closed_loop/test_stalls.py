@@ -10,7 +10,7 @@ import pytest
 from bridge.log.logfile import RunData, read_run
 from bridge.wire.event_codes import TRIPS, WEAK_REASONS
 from cockpit.run.scenario import load_scenario
-from cockpit.run.simulated.log import run_with_faults
+from cockpit.run.simulated.run import run_with_faults
 from controller.trips.stall import MOST_S, SETTLED_S
 from plant.faults.table import FaultTable
 

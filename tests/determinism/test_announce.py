@@ -18,7 +18,7 @@ from controller.node import ControllerNode
 from controller.replay import replay
 from plant.config import MOST_BLOCKS_AHEAD
 from plant.node import PlantNode
-from plant.simulate import drive_velocity_mps
+from plant.simulate import held_velocity
 
 STROKES = [
     "rig.drive.profile=[[0.0, 0.0], [0.2, 0.002], [0.5, 0.002], [0.7, -0.002], [1.0, -0.002], [1.2, 0.0]]",
@@ -45,7 +45,7 @@ def test_each_announcement_holds_the_velocity_of_its_time_and_arrives_in_time(ru
     announced = run.announce
     assert announced["sequence"].tolist() == list(range(len(announced)))
     assert (announced["holds_from_ns"] % 1_000_000 == 0).all()
-    expected = drive_velocity_mps(strokes().rig, announced["holds_from_ns"] * 1e-9)
+    expected = held_velocity(strokes().rig)(announced["holds_from_ns"] * 1e-9)
     assert announced["drive_velocity_mps"] == pytest.approx(expected, abs=1e-12)
     ahead_ns = announced["holds_from_ns"] - announced["t_ns"]
     assert (ahead_ns[announced["t_ns"] > 1_000_000] == AHEAD_BLOCKS * 1_000_000).all()
@@ -53,7 +53,7 @@ def test_each_announcement_holds_the_velocity_of_its_time_and_arrives_in_time(ru
     # at every moment the newest past announcement holds
     blocks = np.arange(2, 2700)
     newest = np.searchsorted(announced["holds_from_ns"], blocks * 1_000_000, side="right") - 1
-    driven = drive_velocity_mps(strokes().rig, blocks * 1e-3)
+    driven = held_velocity(strokes().rig)(blocks * 1e-3)
     assert announced["drive_velocity_mps"][newest] == pytest.approx(driven, abs=2e-12)
     assert len(announced) < 2200  # none while the drive keeps its velocity
 
@@ -120,7 +120,7 @@ def test_the_ring_holds_all_that_lies_ahead() -> None:
         from_ns, said_mps = memory["announced_from_ns"][order], memory["announced_mps"][order]
         # the block of the next step is the oldest, and no block after it is missing
         assert from_ns.tolist() == [1_000_000 * (loop.block + block) for block in range(MOST_ANNOUNCED)]
-        assert said_mps == pytest.approx(drive_velocity_mps(scenario.rig, from_ns * 1e-9), abs=1e-15)
+        assert said_mps == pytest.approx(held_velocity(scenario.rig)(from_ns * 1e-9), abs=1e-15)
 
 
 def test_a_rig_without_announcements_is_unchanged(tmp_path: Path) -> None:

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bridge.arrays import Records
 from bridge.log.logfile import RunData, read_run
-from bridge.wire.messages import COMMAND, TRACE, Records
+from bridge.wire.messages import COMMAND, TRACE
 from cockpit.run.replay import changes_of, outcome
 from cockpit.run.scenario import processor
 from controller.core import step

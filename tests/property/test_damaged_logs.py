@@ -274,8 +274,8 @@ def test_a_rig_that_leaves_before_its_first_word_ends_the_record(tmp_path: Path)
     log = RunLog(tmp_path / "run.mcap", lockstep=False)
     bus: Any = Left()
     inbox: Any = Quiet()
-    dropped, complaints = recorder._Dropped(log, inbox), Complaints(log.add_event)
-    assert recorder._record(log, bus, inbox, threading.Event(), None, dropped, complaints) is True
+    complaints = Complaints(log.add_event)
+    assert recorder._record(log, bus, inbox, threading.Event(), None, complaints) is True
     log.close()
     assert [event.code for event in read_run(log.path).events] == ["PLANT_LOST"]
 
@@ -311,7 +311,7 @@ def test_a_stop_ends_the_record_of_a_rig_that_goes_on(tmp_path: Path, monkeypatc
     stop.set()
     bus: Any = None
     inbox: Any = Endless()
-    dropped, complaints = recorder._Dropped(log, inbox), Complaints(log.add_event)
-    assert recorder._record(log, bus, inbox, stop, None, dropped, complaints) is False
+    complaints = Complaints(log.add_event)
+    assert recorder._record(log, bus, inbox, stop, None, complaints) is False
     assert inbox.count > 0
     log.close()

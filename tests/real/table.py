@@ -6,9 +6,8 @@ from diagnosis.gap.prepare import prepare
 from diagnosis.latent.answer import latent_of
 from diagnosis.relations.answer import Answered, relations_of
 from diagnosis.relations.decide import decision_of
-from diagnosis.report.latent_block import latent_shares
-from diagnosis.report.relation_words import share_in_words
-from diagnosis.report.words import estimate_in_words, headline
+from diagnosis.report.relations_block import latent_shares
+from diagnosis.report.words import estimate_in_words, headline, share_in_words
 from diagnosis.result import Diagnosis, Shrinkage
 
 _SHOWN = 4  # candidates

@@ -9,12 +9,12 @@ from typer.testing import CliRunner
 
 import diagnosis.diagnose
 from cockpit.cli import app
+from cockpit.run.scenario import load_rig
 from diagnosis.evidence.folder import load_evidence
 from diagnosis.gap.problem import Problem
-from diagnosis.hypotheses.trials import trials
+from diagnosis.hypotheses.catalogue import trials
 from diagnosis.synthetic.folder import Case
-from diagnosis.synthetic.protocols import PROTOCOLS, RunPlan
-from plant.config import load_rig
+from diagnosis.synthetic.runs import RunPlan
 from plant.effects.library import EFFECTS
 from tests.made_evidence import made_evidence
 
@@ -33,16 +33,9 @@ def quiet(_text: str, _share: float) -> None:
 
 
 @pytest.fixture(scope="module")
-def short():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(PROTOCOLS, "shortest", SHORT)
-        yield "shortest"
-
-
-@pytest.fixture(scope="module")
-def damped(short):
+def damped():
     """A drive that damps by 12 N s/m, everything else within its tolerances."""
-    return made_evidence(Case(short, {"drive-damping": {"damping_Ns_per_m": 12.0}}), seed=21)
+    return made_evidence(Case(SHORT, {"drive-damping": {"damping_Ns_per_m": 12.0}}), seed=21)
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +83,7 @@ def test_the_report_and_the_rig_file_are_there(command):
     page = (out / "d.html").read_text()
     assert len(page) < 5e6
     assert "drive-damping" in page
-    assert "drive-damping" in load_rig(out / "rig.toml").effects
+    assert "drive-damping" in load_rig(str(out / "rig.toml"), []).effects
 
 
 def diagnosed(folder, jobs: int):
@@ -111,11 +104,11 @@ def one(damped):
 
 
 @pytest.mark.nightly  # 37 s of CPU
-def test_nothing_leaks_from_the_held_out_run(damped, one, short, tmp_path):
+def test_nothing_leaks_from_the_held_out_run(damped, one, tmp_path):
     """A held-out run of another rig refutes the name, and changes no digit of the fits."""
     other = tmp_path / "other"
     shutil.copytree(damped, other)
-    shutil.copy(made_evidence(Case(short), seed=99) / "run-03.parquet", other / "run-03.parquet")
+    shutil.copy(made_evidence(Case(SHORT), seed=99) / "run-03.parquet", other / "run-03.parquet")
     two = diagnosed(other, 2)
     assert one.effects == ("drive-damping",)
     own_fits, other_fits = (
@@ -135,9 +128,9 @@ def test_the_number_of_processes_changes_not_a_digit(damped, one):
 
 
 @pytest.mark.nightly
-def test_force_alone_gives_an_answer_that_is_not_confidently_wrong(short):
+def test_force_alone_gives_an_answer_that_is_not_confidently_wrong():
     missing = ("mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m")
-    case = Case(short, {"drive-damping": {"damping_Ns_per_m": 12.0}}, leave_out=missing)
+    case = Case(SHORT, {"drive-damping": {"damping_Ns_per_m": 12.0}}, leave_out=missing)
     result = diagnosis.diagnose.diagnose(load_evidence(made_evidence(case, seed=22)), quiet, jobs=2)
     best = result.candidates[0]
     group = {*result.effects, *(name for names in result.not_distinguishable for name in names)}

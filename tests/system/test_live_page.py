@@ -132,7 +132,7 @@ def test_the_headline_names_the_age_of_old_data(reports: dict[str, dict[str, Any
     shown = reports["screen"]
     assert shown["fresh"][0].startswith("no slip in the last")
     assert shown["old"][0].startswith("2 s old: no slip in the last")
-    assert shown["late"][0].startswith("no data for 6 s: this browser is too slow")
+    assert shown["late"][0].startswith("no data for 6 s: this browser or its connection is too slow")
     assert "s: no connection to `stickslip serve`" in shown["lost"][0]
 
 

@@ -14,7 +14,7 @@ from cockpit.run.scenario import load_scenario
 from tests.patience import PATIENCE_S
 from tests.system.ports import free_endpoint
 
-_HEAVY = {"numba", "scipy", "matplotlib", "pyarrow", "rich", "cockpit.commands.run"}
+_HEAVY = {"numba", "scipy", "matplotlib", "pyarrow", "rich", "cockpit.commands.processes"}
 _TELL = """
 import json, sys
 from cockpit.entry import main

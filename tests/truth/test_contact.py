@@ -16,7 +16,7 @@ from plant.contact import step
 from plant.core import advance
 from plant.pairs import PAIRS
 from plant.records import TRUTH, build
-from plant.simulate import drive_velocity_mps, run_blocks, simulate
+from plant.simulate import held_velocity, run_blocks, simulate
 
 PAIR = "C45-C45 @ 0.063"
 DRIVE_MPS = 0.0005
@@ -154,7 +154,7 @@ def test_long_steps_of_a_slide_that_sticks_make_no_slip_and_miss_none(pair, mass
             params[0].disturbed = 1
         blocks = 12_000
         analogue, truth = np.empty((len(CHANNELS), 20 * blocks)), np.empty((len(TRUTH), 20 * blocks))
-        drive = drive_velocity_mps(config, np.arange(blocks) * 1e-3)
+        drive = held_velocity(config)(np.arange(blocks) * 1e-3)
         run_blocks(params, state, drive, np.zeros(blocks), np.zeros(blocks), analogue, truth)
         fast = truth[TRUTH.index("true_velocity_mps")] > 10 * DRIVE_MPS
         return np.flatnonzero(fast[1:] & ~fast[:-1]) * 5e-5

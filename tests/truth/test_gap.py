@@ -7,8 +7,7 @@ import pytest
 
 import diagnosis.model.rig
 from diagnosis.evidence.folder import load_evidence
-from diagnosis.gap.floor import Floor, compress, floor_of, replicates
-from diagnosis.gap.measure import between, differences, gap, whitened
+from diagnosis.gap.measure import Floor, between, compress, differences, floor_of, gap, replicates, whitened
 from diagnosis.gap.prepare import prepare
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.nuisances import Nuisances

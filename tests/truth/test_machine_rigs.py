@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cockpit.run.scenario import load_scenario
-from plant.simulate import drive_velocity_mps, simulate
+from plant.simulate import held_velocity, simulate
 
 
 @pytest.mark.parametrize(
@@ -24,7 +24,7 @@ def test_a_machine_sticks_and_slips(name: str, ways: tuple[float, ...], stuck: f
     duration_s = rig.drive.repeat_every_s or 45.0
     result = simulate(rig, duration_s)
     blocks = np.arange(round(duration_s / rig.solver.block_s))
-    drive_mps = np.repeat(drive_velocity_mps(rig, blocks * rig.solver.block_s), rig.solver.samples_per_block)
+    drive_mps = np.repeat(held_velocity(rig)(blocks * rig.solver.block_s), rig.solver.samples_per_block)
     speed_mps = float(np.abs(drive_mps).max())
     assert (drive_mps.min() < 0.0) == (-1.0 in ways)
     for way in ways:

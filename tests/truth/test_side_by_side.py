@@ -9,8 +9,8 @@ from bridge.wire.channels import CHANNELS
 from diagnosis.features.grid import SIGNALS
 from diagnosis.features.segments import CommandedRun
 from diagnosis.gap.problem import Problem
+from diagnosis.hypotheses.catalogue import trials
 from diagnosis.hypotheses.nuisances import Nuisances
-from diagnosis.hypotheses.trials import trials
 from diagnosis.model import predict as twin
 from diagnosis.model.per_run import as_in_rig_file
 from diagnosis.model.predict import predict, predict_many

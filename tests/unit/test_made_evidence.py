@@ -3,29 +3,24 @@
 import pytest
 
 from diagnosis.synthetic.folder import Case, make_evidence
-from diagnosis.synthetic.protocols import PROTOCOLS, RunPlan
+from diagnosis.synthetic.runs import RunPlan
 from tests.made_evidence import MAKERS, digest_of, made_evidence
 
-
-@pytest.fixture
-def moment(monkeypatch):
-    monkeypatch.setitem(PROTOCOLS, "moment", (RunPlan(((0.0, 0.002),), duration_s=1.0),))
-    return "moment"
+MOMENT = (RunPlan(((0.0, 0.002),), duration_s=1.0),)
 
 
-def test_the_evidence_is_made_once_and_equals_fresh_evidence(moment, tmp_path, monkeypatch):
-    kept = made_evidence(Case(moment), 4)
-    make_evidence(tmp_path, Case(moment), 4)
+def test_the_evidence_is_made_once_and_equals_fresh_evidence(tmp_path):
+    kept = made_evidence(Case(MOMENT), 4)
+    make_evidence(tmp_path, Case(MOMENT), 4)
     assert {path.name: path.read_bytes() for path in kept.iterdir()} == {
         path.name: path.read_bytes() for path in tmp_path.iterdir()
     }
-    assert made_evidence(Case(moment), 4) == kept
+    assert made_evidence(Case(MOMENT), 4) == kept
     others = {
-        made_evidence(Case(moment), 5),
-        made_evidence(Case(moment, {"drive-damping": {"damping_Ns_per_m": 3.0}}), 4),
+        made_evidence(Case(MOMENT), 5),
+        made_evidence(Case(MOMENT, {"drive-damping": {"damping_Ns_per_m": 3.0}}), 4),
+        made_evidence(Case((RunPlan(((0.0, 0.001),), duration_s=1.0),)), 4),
     }
-    monkeypatch.setitem(PROTOCOLS, moment, (RunPlan(((0.0, 0.001),), duration_s=1.0),))
-    others.add(made_evidence(Case(moment), 4))
     assert len(others - {kept}) == 3
 
 

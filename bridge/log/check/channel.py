@@ -13,15 +13,15 @@ from bridge.wire.channels import SENSOR_CHANNELS
 # Noise over resolution from which a live channel never repeats a value for long: 2 sigma are then half a step. Larger: a dead
 # channel of coarse steps passes. Smaller: a channel at rest, whose samples all fall on the same step, counts as dead.
 _NOISY = 0.25
-_DEAD_S = 1.0  # duration of equal samples. Larger: a shorter failure passes; smaller: a position at rest counts as dead
+_DEAD_S = 1.0  # equal samples for this long: a dead channel. Larger: a shorter failure passes; smaller: a position at rest counts
 # Samples at the largest value from which a noisy channel is clipped although no two of them are neighbours: a count for short
 # logs and a share for long ones, both above chance. Larger: a clipped channel passes.
 FEW_AT_END, _SHARE_AT_END = 20, 1e-5
 # Range of the values over the noise up to which a channel shows noise alone (which spans 8 sigma) and may have more samples at
 # its extreme. Smaller: 41 samples of an accelerometer at rest count as clipped. Larger: a clipped channel passes.
 _NOISE_ALONE = 20.0
-_BEYOND = 1e-3  # excess over the range, as a share. Smaller: float32 rounding, 1e-7, counts; larger: wrong units pass
-_ROUNDING = 1e-6  # tolerance at an end of the range. Below 6e-8: float32 misses it; larger: sound signals fail
+_BEYOND = 1e-3  # share of the range from which an excess is a wrong unit. Below 1e-7: float32 rounding counts; larger: it passes
+_ROUNDING = 1e-6  # relative distance from an end of the range that counts as reached. Below 6e-8: float32 misses it
 
 
 class ChannelLimits(NamedTuple):

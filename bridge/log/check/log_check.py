@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from bridge.arrays import Indices
+from bridge.arrays import Indices, Records
 from bridge.faults import Fault
 from bridge.log.check.channel import ChannelLimits, channel_findings, channels_of
 from bridge.log.check.schema_check import schema_findings
@@ -18,12 +18,13 @@ from bridge.log.logfile import STREAMING, block_period_ns, check_log_file, feed
 from bridge.log.metadata import configuration_of, number_of
 from bridge.log.storage.checksums import Checksums, checksum_findings
 from bridge.log.topic_watch import TopicWatch
-from bridge.log.watches.event_watch import EventWatch, is_weighty
+from bridge.log.watches.event_watch import EventWatch
 from bridge.units import counted
 from bridge.wire.channels import CHANNELS
-from bridge.wire.messages import Records
+from bridge.wire.event_codes import event_code
 from bridge.wire.payloads import READABLE_VERSIONS
 from bridge.wire.topics import BY_NAME
+from bridge.wire.words import FAILURE, MAINTENANCE, OUTSIDE
 
 LATE_NS = 1_000_000  # 1 ms, the usual block: a later answer arrives after the next block is due
 # Share of late messages from which a rig is too slow. Smaller: any desktop fails; larger: a slow controller passes.
@@ -35,11 +36,11 @@ _OF_EVERY_BLOCK = {
 
 
 class LogCheck(NamedTuple):
-    """The result of a check."""
+    """The result of the check of a log."""
 
     log: str
     findings: list[Finding]
-    messages: dict[str, int]  # number by streaming topic
+    messages: dict[str, int]  # number of messages by streaming topic
     seconds: float  # duration of all sensor blocks
     late_share: dict[str, float]  # share of messages later than 1 ms: /applied (block sent), /trace (answer ready)
     checksums: Checksums
@@ -165,7 +166,7 @@ def _of_file(path: Path, reader: LogReader, seen: LogWatch) -> list[Finding]:
         key = event.source, event.code
         dropped = re.search(r"dropped=(\d{1,18})\b", event.text)
         # a gap is already a finding of its topic
-        if event.code != "GAP" and is_weighty(event.code):
+        if event.code != "GAP" and event_code(event.code).letter in {FAILURE, OUTSIDE, MAINTENANCE}:
             if key not in listed:
                 listed.add(key)
                 times = events.counts[key]

@@ -1,7 +1,6 @@
 """Range, clipping and dead stretches of a signal, found piece by piece with a memory of a few numbers."""
 
 import math
-from copy import copy
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,9 +12,9 @@ from bridge.arrays import Floats
 # slope s would rise by s L / 4 above them. A signal is clipped if this rise exceeds the following share of its range.
 # Smaller: round peaks count as clipped; larger: flat clipping passes.
 _OVERSHOOT_SHARE = 1e-3
-_LONGEST_DWELL = 40.0  # most samples counted in a run of a position, which may rest at an end of its range
+_LONGEST_DWELL = 40.0  # a position may rest at an end: at most so many samples of a run count for its overshoot
 _SHORTEST_RUN = 3.0  # fewest equal samples at the limit that count; noise alone rarely makes three
-_STEPS_OF_RESOLUTION = 2.5  # smallest step into a clipped run, in resolutions; a real peak ends in steps of 1 or 2
+_STEPS_OF_RESOLUTION = 2.5  # smallest step into and out of a clipped run, in resolutions; real peaks have 1 or 2
 
 
 class SignalLook(NamedTuple):
@@ -46,67 +45,50 @@ class _Side:
         self.extreme = -math.inf
         self.at_extreme = 0  # number of samples equal to the extreme
         self._longest = longest
-        self.runs = self.overshoot = 0.0  # samples in runs that count; the largest overshoot
+        self._runs = self._overshoot = 0.0  # samples in runs that count; their largest overshoot
         # the first run of the signal: its length, and the step out of it
-        self.begin: tuple[float, float] | None = None
-        # length of the run that has not ended, and the step into it
-        self._open: tuple[float, float] | None = None
+        self._first: tuple[float, float] | None = None
 
-    def add(self, values: Floats, before: float | None, resolution: float) -> None:
-        """Add finite samples, at least one; `before` is the sample before them, `resolution` the smallest step so far."""
+    def add(self, values: Floats, ended: Floats, lengths: Floats, steps: Floats, resolution: float) -> None:
+        """Add finite samples, at least one, and the runs that ended with them.
+
+        `ended`: their values; `lengths`; `steps` into each and out of the last; `resolution`: the smallest step so far.
+        """
         highest = float(values.max())
         if highest > self.extreme:
-            self.extreme = highest
-            self.at_extreme = 0
-            self.runs = self.overshoot = 0.0
-            self.begin = self._open = None
-        elif highest < self.extreme:
-            self.end_run(self.extreme - float(values[0]), resolution)
-            return
-        at = np.flatnonzero(values == self.extreme)
-        self.at_extreme += len(at)
-        if at[0] > 0:
-            self.end_run(self.extreme - float(values[0]), resolution)
-        apart = np.diff(at) > 1
-        firsts, ends = at[np.concatenate([[True], apart])], at[np.concatenate([apart, [True]])] + 1
-        # shorter runs do not count, and a channel that rests at its end has thousands; runs at the ends may go on in other pieces
-        kept = (ends - firsts >= _SHORTEST_RUN) | (firsts == 0) | (ends == len(values))
-        for first, end in zip(firsts[kept].tolist(), ends[kept].tolist(), strict=True):
-            if first == 0 and self._open is not None:
-                self._open = self._open[0] + end, self._open[1]
+            self.extreme, self.at_extreme, self._first = highest, 0, None
+            self._runs = self._overshoot = 0.0
+        if highest == self.extreme:
+            self.at_extreme += int(np.count_nonzero(values == highest))
+        # shorter runs do not count, and a channel that rests at its end has thousands
+        for run in np.flatnonzero((ended == self.extreme) & (lengths >= _SHORTEST_RUN)).tolist():
+            length, step_in, step_out = float(lengths[run]), float(steps[run]), float(steps[run + 1])
+            if math.isinf(step_in):
+                # at the beginning the resolution is not known yet: the run is judged when the signal has ended
+                self._first = length, step_out
             else:
-                last = before if first == 0 else float(values[first - 1])
-                self._open = float(end - first), math.inf if last is None else self.extreme - last
-            if end < len(values):
-                self.end_run(self.extreme - float(values[end]), resolution)
+                self._count(length, min(step_in, step_out), min(length, self._longest), resolution)
 
-    def end_run(self, step_out: float, resolution: float) -> None:
-        """End the open run, if any, with this step."""
-        if self._open is None:
-            return
-        (length, step_in), self._open = self._open, None
-        # a run at the very beginning or end of the signal has one flank only, and is counted by its step alone
-        if math.isinf(step_in) and math.isfinite(step_out):
-            # at the beginning the resolution is not known yet: the run is judged when the signal has ended
-            self.begin = length, step_out
-            return
-        one_flank = math.isinf(step_in) or math.isinf(step_out)
-        self.count(length, min(step_in, step_out), 4.0 if one_flank else min(length, self._longest), resolution)
-
-    def count(self, length: float, step: float, flank: float, resolution: float) -> None:
+    def _count(self, length: float, step: float, flank: float, resolution: float) -> None:
         """Count a run if it is long and its step is large enough."""
         if length >= _SHORTEST_RUN and step >= _STEPS_OF_RESOLUTION * resolution:
             if math.isfinite(step):
-                self.overshoot = max(self.overshoot, step * flank / 4.0)
-            self.runs += length
+                self._overshoot = max(self._overshoot, step * flank / 4.0)
+            self._runs += length
 
-    def clipped(self, resolution: float, begins: bool, limit: float) -> int:
-        """Number of samples in runs at the extreme; `begins`: whether the first run of the signal counts."""
-        side = copy(self)
-        side.end_run(math.inf, resolution)
-        if begins and side.begin is not None:
-            side.count(*side.begin, 4.0, resolution)
-        return int(side.runs) if side.overshoot > limit else 0
+    def clipped(self, last: tuple[float, float, float], resolution: float, limit: float, begins: bool) -> int:
+        """Number of samples in runs at the extreme; `begins`: whether the first run of the signal counts.
+
+        The first and the `last` run (value, length, step into it) have one flank, and are counted by its step alone.
+        """
+        runs, overshoot = self._runs, self._overshoot
+        if last[0] == self.extreme:
+            self._count(*last[1:], 4.0, resolution)
+        if begins and self._first is not None:
+            self._count(*self._first, 4.0, resolution)
+        result = int(self._runs) if self._overshoot > limit else 0
+        self._runs, self._overshoot = runs, overshoot  # restored: the signal may go on
+        return result
 
 
 class CheckedSignal:
@@ -118,16 +100,15 @@ class CheckedSignal:
         self._sides = _Side(longest), _Side(longest)  # the top, and mirrored the bottom
         self._samples = self._not_finite = 0
         self._first_not_finite = -1
-        self._last: float | None = None
+        self._last = math.nan, 0.0, math.inf  # the run that has not ended: value, length, step into it
         self._resolution = math.inf
-        self._run = self._longest_run = self._longest_run_end = 0
+        self._longest_run = self._longest_run_end = 0
 
     def add(self, values: npt.NDArray[Any]) -> None:
         """Check the next samples, [samples]."""
-        at = self._samples
+        at, places = self._samples, None  # places: indices of the finite samples, if not all are
         self._samples += len(values)
         finite = np.isfinite(values)
-        places: npt.NDArray[np.int64] | None = None
         if not finite.all():
             self._not_finite += int(np.count_nonzero(~finite))
             if self._first_not_finite < 0:
@@ -136,53 +117,39 @@ class CheckedSignal:
             values = values[places]
         if not len(values):
             return
-        self._runs_of_equals(values, at, places)
-        self._sides[0].add(values, self._last, self._resolution)
-        self._sides[1].add(-values, None if self._last is None else -self._last, self._resolution)
-        self._last = float(values[-1])
-
-    def _runs_of_equals(self, values: Floats, at: int, places: npt.NDArray[np.int64] | None) -> None:
-        """Update the longest run of equal samples and the smallest step; `places`: indices of finite samples, if not all are."""
-        steps = np.abs(np.diff(values, prepend=values[:1] if self._last is None else values.dtype.type(self._last)))
-        changes = np.flatnonzero(steps)
-        if len(changes):
-            self._resolution = min(self._resolution, float(steps[changes].min()))
-        begins = changes if self._last is not None else np.concatenate([[0], changes])
-        lengths = np.diff(begins, append=len(values))
-        # number of samples that continue the last run of the previous piece
-        before = int(begins[0]) if len(begins) else len(values)
-        runs = np.concatenate([[self._run + before], lengths]) if self._last is not None else lengths
-        ends = np.concatenate([[before], begins[1:], [len(values)]])[-len(runs) :] - 1
-        longest = int(np.argmax(runs))
-        if runs[longest] > self._longest_run:
-            self._longest_run = int(runs[longest])
-            end = int(ends[longest])
-            self._longest_run_end = at + (end if places is None else int(places[end]))
-        self._run = int(runs[-1])
+        value, length, step_in = self._last
+        begins = np.flatnonzero(np.diff(values, prepend=values.dtype.type(value)) != 0.0)
+        ends = np.append(begins, len(values))
+        runs, lengths = np.append(value, values[begins]), np.diff(ends, prepend=-length)
+        steps = np.append(step_in, np.abs(np.diff(runs)))
+        if not length:  # no run came before
+            runs, lengths, ends, steps = runs[1:], lengths[1:], ends[1:], np.append(math.inf, steps[2:])
+        self._resolution = min(self._resolution, float(steps[1:].min(initial=math.inf)))
+        longest = int(np.argmax(lengths))
+        if lengths[longest] > self._longest_run:
+            end = int(ends[longest]) - 1
+            self._longest_run = int(lengths[longest])
+            self._longest_run_end = at + int(end if places is None else places[end])
+        self._sides[0].add(values, runs[:-1], lengths[:-1], steps, self._resolution)
+        self._sides[1].add(-values, -runs[:-1], lengths[:-1], steps, self._resolution)
+        self._last = float(runs[-1]), float(lengths[-1]), float(steps[-1])
 
     def result(self) -> SignalLook:
         """Range and faults of all samples so far."""
         high, low = self._sides[0].extreme, -self._sides[1].extreme
         limit = max(_OVERSHOOT_SHARE * (high - low), 0.0)
-        # a position rests before it moves, so its first run is not clipping
-        clipped = [side.clipped(self._resolution, not self._dwells, limit) if high > low else 0 for side in self._sides]
-        # a unipolar sensor at rest clips its noise at 0: the end of its scale, but no signal is lost
-        if low == 0.0:
-            clipped[1] = 0
-        if high == 0.0:
-            clipped[0] = 0
+        value, length, step_in = self._last
+        # a position rests before it moves, so its first run is not clipping; a unipolar sensor at rest clips its noise at 0: the
+        # end of its scale, but no signal is lost
+        clipped = [
+            side.clipped((last, length, step_in), self._resolution, limit, begins=not self._dwells)
+            if high > low and end
+            else 0
+            for side, last, end in zip(self._sides, (value, -value), (high, low), strict=True)
+        ]
         return SignalLook(
-            self._samples,
-            low,
-            high,
-            self._not_finite,
-            self._first_not_finite,
-            clipped[0],
-            clipped[1],
-            self._longest_run,
-            self._longest_run_end,
-            self._sides[0].at_extreme,
-            self._sides[1].at_extreme,
+            *(self._samples, low, high, self._not_finite, self._first_not_finite, *clipped),
+            *(self._longest_run, self._longest_run_end, self._sides[0].at_extreme, self._sides[1].at_extreme),
         )
 
 

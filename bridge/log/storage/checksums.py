@@ -1,4 +1,4 @@
-"""Checksums over a whole log: a changed byte, and a verdict file that belongs to other bytes.
+"""Checksums over a whole log: they show a changed byte, and a verdict file that belongs to other bytes.
 
 Each file ends with a CRC of its data and a CRC of its index, as MCAP defines them. They show damage and no manipulation: whoever
 changes a file can compute them again, and a new verdict file too. Only a SHA-256 that was noted elsewhere proves the bytes.
@@ -82,7 +82,7 @@ def _read_through(file: IO[bytes], digest: Any) -> tuple[bool, bool]:
     index_start = min(summary_start or size - _ENDING.size, size)
     opcode, length, data_crc = _DATA_END.unpack(_read_at(file, index_start - size - _DATA_END.size, _DATA_END.size))
     data_ends = (opcode, length) == (Opcode.DATA_END, _DATA_END.size - HEAD.size)
-    # data; index, and footer up to its CRC
+    # the bytes of the two CRCs: all data; the index, and the footer up to its CRC
     places = (0, index_start - _DATA_END.size), (index_start, size - len(MAGIC) - 4)
     sums = [0, 0]
     at = 0

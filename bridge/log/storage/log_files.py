@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from bridge.log.runlog import RunLog
 
 _LOOK_S = 1.0  # time between two checks of the file's path, and of a full disk
-_LONGEST_WAIT_S = 64.0  # longest wait between two tries; it doubles each time, as a quota shows only on writing
-_ROOM_BYTES = 16 << 20  # free space on a full disk from which the log continues: half a minute of it
+_LONGEST_WAIT_S = 64.0  # longest wait between two tries on a full disk; it doubles, as a quota shows only on writing
+_ROOM_BYTES = 16 << 20  # free space on a full disk from which the log continues: half a minute of a run
 _SLOW_S = 1.0  # writing time of a chunk from which the disk is reported as slow
 
 

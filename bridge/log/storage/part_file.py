@@ -1,17 +1,39 @@
 """One file of a log while it is being written: opened, locked, watched, closed, also on a full disk."""
 
 import contextlib
+import fcntl
 import os
 import stat
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import IO
 
 from bridge.faults import Fault
 from bridge.files import LOG, followed, open_new, refuse_to_replace
 from bridge.log.library import LIBRARY
-from bridge.log.live import locked
 from bridge.log.mcap_chunks import ChunkWriter
+
+
+def _locked(file: IO[bytes], kind: int = fcntl.LOCK_EX) -> bool:
+    """Lock a log against writing and replacing by other processes; False when another process has the lock."""
+    try:
+        fcntl.flock(file, kind | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:  # a file system without locks
+        pass
+    return True
+
+
+def refuse_a_live_log(path: Path, option: str) -> None:
+    """Raise Fault LOG_WRITE when `path` is a log that is being recorded; `option` is the option that names another file."""
+    if not path.is_file():
+        return
+    with path.open("rb") as file:
+        if not _locked(file, fcntl.LOCK_SH):
+            line = f"{path}: is being recorded: must be closed before it is replaced, or the rest of the run is lost"
+            raise Fault("LOG_WRITE", f"{line}; wait for the end of the run, or give another {option}")
 
 
 class PartFile:
@@ -39,7 +61,7 @@ class PartFile:
                 self._file = os.fdopen(os.open(followed(path), flags, 0o666), "wb")
             else:
                 self._file = open_new(path)
-            if not locked(self._file):
+            if not _locked(self._file):
                 self._file.close()
                 line = f"{path}: is being recorded: must not be the log of a run in progress"
                 raise Fault("LOG_WRITE", f"{line}; wait for the end of that run, or choose another --log")
@@ -123,7 +145,7 @@ class PartFile:
             self._file.close()
 
         with contextlib.suppress(OSError), self.path.open("r+b", buffering=0) as file:
-            for words in (last_words, lambda: None):  # `give_up` drops them, so the second try writes 50 bytes
+            for words in (last_words, lambda: None):  # `give_up` drops the last words: the second try writes 50 bytes
                 file.truncate(self.whole_bytes)
                 file.seek(self.whole_bytes)
                 self.writer.give_up(file)

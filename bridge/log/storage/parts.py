@@ -50,7 +50,9 @@ def part_of(path: Path) -> LogPart | None:
             if opcode == Opcode.METADATA:
                 record = Metadata.read(ReadDataStream(BytesIO(data[at : at + length])))
                 if record.name == PART:
-                    return LogPart(*(json.loads(record.metadata[key]) for key in LogPart._fields))
+                    return LogPart(
+                        int(json.loads(record.metadata["number"])), str(json.loads(record.metadata["begins"]))
+                    )
                 if record.name == RECOVERED:
                     recovered = record.metadata.get("begins", "")
                 if record.name == _CHAIN:

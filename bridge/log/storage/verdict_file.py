@@ -19,7 +19,7 @@ def verdict_path(log: Path) -> Path:
     return log.with_suffix(".verdict.json")
 
 
-def refuse_to_lose_json(log: Path) -> None:
+def refuse_to_lose_other_file(log: Path) -> None:
     """Raise Fault CONFIG if the verdict file of a log would replace a file that holds no verdict."""
     refuse_to_replace_text(verdict_path(log), _BEGINS, str(log))
 
@@ -30,13 +30,13 @@ def remove_verdict(log: Path) -> None:
     A verdict file that cannot be removed is reported later: its digest differs.
     """
     with contextlib.suppress(OSError, Fault):
-        refuse_to_lose_json(log)
+        refuse_to_lose_other_file(log)
         verdict_path(log).unlink()
 
 
 def write_verdict(log: Path, sha256: str, fields: dict[str, Any]) -> None:
     """Write the verdict on a log with this digest, completely or not at all. Raises Fault CONFIG, LOG_WRITE."""
-    refuse_to_lose_json(log)
+    refuse_to_lose_other_file(log)
     path = verdict_path(log)
     try:
         write_json(path, {_DIGEST: sha256} | fields)

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.log.block_rows import FIELDS_BYTES, MessageRows, rows
-from bridge.log.chunk_messages import HEAD, Bytes, Column, cut
+from bridge.log.chunk_messages import HEAD, INDEX_ENTRY, Bytes, Column, cut
 from bridge.log.viewers.stretches import ScopeBlocks, Stretches, last_of_stretches
 from bridge.wire import topics
 from bridge.wire.channels import CHANNELS
@@ -16,7 +16,6 @@ from bridge.wire.messages import APPLIED, TRACE, Layout, sensor_block
 # Blocks that become messages at once: one second. Fewer: numpy's call overhead dominates; with the 100 blocks of a chunk it is a
 # third of the cost of writing the log. More: a kill loses more of this topic, and viewers must look further ahead.
 AT_ONCE_BLOCKS = 1000
-_ENTRY_BYTES = 16  # size of an index entry
 
 
 class ScopeMaker:
@@ -43,7 +42,7 @@ class ScopeMaker:
         names = topics.SENSORS.name, topics.APPLIED.name, topics.TRACE.name
         indexes = {name: b"".join(entries.get(channels[name], ())) for name in names}
         self._waiting.append((data, indexes))
-        self._blocks_waiting += len(indexes[topics.SENSORS.name]) // _ENTRY_BYTES
+        self._blocks_waiting += len(indexes[topics.SENSORS.name]) // INDEX_ENTRY.itemsize
         due = self.ends or self._blocks_waiting >= AT_ONCE_BLOCKS
         return self._made(channels, last=self.ends) if due else None
 

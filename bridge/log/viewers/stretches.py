@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from bridge.arrays import Floats, Indices
+from bridge.arrays import Floats, Indices, Records
 from bridge.log.chunk_messages import Column
 from bridge.wire import topics
 from bridge.wire.channels import CHANNELS
-from bridge.wire.messages import APPLIED, SCOPE, TRACE, Layout, Records
+from bridge.wire.messages import APPLIED, SCOPE, TRACE, Layout
 
 PERIOD_NS = 5_000_000
 # Most messages of a topic that wait for their block: 4 s. A controller whose rig is silent repeats itself at 1 kHz.
@@ -23,7 +23,7 @@ _OF_BOTH = {"sequence", "t_ns"}  # fields of every message
 
 
 class Envelope(NamedTuple):
-    """Values of groups of neighbouring samples."""
+    """Smallest, mean and largest value of each group of neighbouring samples."""
 
     least: Floats
     mean: Floats
@@ -91,7 +91,7 @@ class _Latest:
 
 
 class Stretches:
-    """Makes the messages of a run, in order.
+    """Makes one message for each stretch of a run, in order.
 
     Args:
         blank: makes records with the fields of `Scope`, and possibly further ones of `Applied` and `Trace`.

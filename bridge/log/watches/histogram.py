@@ -9,7 +9,7 @@ import numpy.typing as npt
 # (now 5500 bins of 8 bytes). Larger: visibly stepped percentiles.
 _RATIO = 1.005
 _LOWEST, _HIGHEST = 1e-3, 1e9  # range of the bins; values outside count in the first or last bin
-_BINS_PER_BAR = 23  # 20 bars a decade
+_BINS_PER_BAR = 23  # bins in a bar of a diagram: 20 bars a decade
 _BINS = int(np.ceil(np.log(_HIGHEST / _LOWEST) / np.log(_RATIO)))
 
 
@@ -18,7 +18,7 @@ class Histogram:
 
     def __init__(self) -> None:
         self.count = 0
-        self.most = 0.0  # exact
+        self.most = 0.0  # the largest value, exact
         self._bins = np.zeros(_BINS, np.int64)
 
     def add(self, values: npt.NDArray[Any]) -> None:

@@ -8,6 +8,7 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Sequence
+from functools import cache
 from typing import NamedTuple
 
 from bridge.tables.cells import APOSTROPHES, BLANKS, is_time
@@ -15,7 +16,7 @@ from bridge.tables.text.unit_cells import number_and_unit
 
 BLANK = " "  # the delimiter of columns separated by any number of blanks and tabs
 _DELIMITERS = (",", ";", "\t", "|", " ")
-_SNIFFED_LINES = 60  # CleverCSV takes 30 ms for these, and its time grows with them
+_SNIFFED_LINES = 60  # lines given to CleverCSV, which takes 30 ms for them
 _NO_NUMBER = frozenset(("", *"- -- --- nan #nv #n/a n/a na null none inf -inf ovl ovr ovrflw #nan 1.#qnan".split(" ")))  # noqa: SIM905
 _FIRST_LINES = 2000  # lines in which a time that begins at 0 is still below 1 s, up to 2 kHz
 _BELOW_ONE = re.compile(r"[-+]?0([.,])\d+")
@@ -125,21 +126,14 @@ def _numbers(lines: Sequence[str], begin: Sequence[str], delimiter: str, quote: 
     return best
 
 
-_PATTERNS: dict[tuple[str, str], re.Pattern[str]] = {}
-
-
+@cache
 def _pattern(decimal: str, thousands: str) -> re.Pattern[str]:
     """Pattern of a number: digits with a decimal mark, or in groups of three."""
-    key = (decimal, thousands)
-    if key not in _PATTERNS:
-        point = re.escape(decimal)
-        grouped = ""
-        if thousands:
-            marks = BLANKS if thousands == " " else APOSTROPHES if thousands == "'" else (thousands,)
-            between = "[" + "".join(re.escape(mark) for mark in marks) + "]"
-            # a number with thousands does not begin with 0: `0,001` has a decimal comma
-            grouped = rf"|[1-9]\d{{0,2}}(?:{between}\d{{3}})+(?:{point}\d*)?"
-        _PATTERNS[key] = re.compile(
-            rf"[-+]?(?:\d+(?:{point}\d*)?|{point}\d+{grouped})(?:[eEdD][-+]?\d+)?|[-+]?(?:nan|inf)", re.I
-        )
-    return _PATTERNS[key]
+    point = re.escape(decimal)
+    grouped = ""
+    if thousands:
+        marks = BLANKS if thousands == " " else APOSTROPHES if thousands == "'" else (thousands,)
+        between = "[" + "".join(re.escape(mark) for mark in marks) + "]"
+        # a number with thousands does not begin with 0: `0,001` has a decimal comma
+        grouped = rf"|[1-9]\d{{0,2}}(?:{between}\d{{3}})+(?:{point}\d*)?"
+    return re.compile(rf"[-+]?(?:\d+(?:{point}\d*)?|{point}\d+{grouped})(?:[eEdD][-+]?\d+)?|[-+]?(?:nan|inf)", re.I)

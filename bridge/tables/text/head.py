@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from bridge.faults import Fault
+from bridge.log.finding import Finding
 from bridge.tables.text.dialect import BLANK, Dialect, TextLayout
-from bridge.tables.unit_words import is_unit_row, known_unit
+from bridge.tables.unit_words import is_unit_row, known_unit, unknown_units
 
 COMMENTS = ("#", "%", "//", "!", "*", ";;", "'")
 _CONFIRMED = 5  # number of lines after the first row of which at least half must be rows too
@@ -40,6 +41,15 @@ class Head(NamedTuple):
     def unit_of(self) -> dict[str, str]:
         """The units by column, as the line of units writes them."""
         return {name: unit for name, unit in zip(self.names, self.units, strict=False) if unit}
+
+    def unit_findings(self, file: str) -> list[Finding]:
+        """Findings on the line of units."""
+        if not self.units:
+            return []
+        text = f"line {self.units_line + 1} holds units: {', '.join(filter(None, self.units))}"
+        unknown = unknown_units(self.unit_of)
+        more = [Finding("units", file, f"unknown unit: {unknown}; kept as written")] if unknown else []
+        return [Finding("assumed", file, text), *more]
 
 
 def read_head(lines: Sequence[str], body: Sequence[str], form: TextLayout, given: Dialect, file: str) -> Head:

@@ -10,13 +10,12 @@ import pyarrow.csv as pa_csv
 
 from bridge.faults import Fault
 from bridge.log.finding import Finding
-from bridge.tables.cells import is_text, texts_of
+from bridge.tables.cells import texts_of
 from bridge.tables.table import Table
 from bridge.tables.text.dialect import BLANK, Dialect, TextLayout, form_of
 from bridge.tables.text.encoding import decoded
 from bridge.tables.text.head import COMMENTS, Head, read_head
 from bridge.tables.text.unit_cells import units_apart
-from bridge.tables.unit_words import unknown_units
 from bridge.units import counted
 
 # While reading a CSV file, Arrow handles Ctrl-C and SIGTERM itself, and loses a signal near the end.
@@ -52,7 +51,8 @@ def read_text(path: Path, given: Dialect) -> Table:
     findings = [*_assumed(path.name, head, form, encoding, given), *_lost(path.name, left_out, example, rows.num_rows)]
     units = head.unit_of
     for name, column in columns.items():
-        if is_text(column.type) and (apart := units_apart(texts_of(column), form.decimal, form.thousands)):
+        texts = texts_of(column.to_numpy()) if pa.types.is_string(column.type) else []
+        if texts and (apart := units_apart(texts, form.decimal, form.thousands)):
             columns[name], units[name] = np.array(apart[0]), apart[1]
             findings.append(Finding("assumed", path.name, f"column {name} has the unit {apart[1]} in its cells"))
     written: dict[str, Any] = {"delimiter": form.delimiter, "decimal": form.decimal, "encoding": encoding}
@@ -76,7 +76,7 @@ def _spread(text: str, head_lines: list[str], given: Dialect) -> list[str]:
         filled = [
             line for line in head_lines if line.strip() and not line.lstrip().startswith(given.comment or COMMENTS)
         ]
-        # the end may have a trailing line, and the beginning titles
+        # without the beginning, which may hold titles; at least two lines, as the last may be no row
         return filled[max(len(filled) // 3, min(len(filled) - 2, 60)) :] if len(filled) > 3 else filled[-1:]
     lines: list[str] = []
     for piece in range(1, _PIECES + 1):
@@ -87,8 +87,8 @@ def _spread(text: str, head_lines: list[str], given: Dialect) -> list[str]:
 
 def _rows(text: str, head: Head, form: TextLayout, given: Dialect) -> tuple[Any, int, str]:
     """The rows as an Arrow table, the number of omitted rows, and the first of them."""
-    at = _offset(text, head.lines)
-    rows = text[at:]
+    # the lines of the head end as `read_text` splits them
+    rows = text[sum(map(len, text[:_HEAD_CHARACTERS].splitlines(keepends=True)[: head.lines])) :]
     delimiter = form.delimiter
     if given.comment or any(f"\n{mark}" in rows for mark in COMMENTS):
         marks = tuple([given.comment] if given.comment else COMMENTS)
@@ -113,17 +113,6 @@ def _rows(text: str, head: Head, form: TextLayout, given: Dialect) -> tuple[Any,
     return table, len(lost), lost[0] if lost else ""
 
 
-def _offset(text: str, lines: int) -> int:
-    """Characters before line number `lines`, from 0; lines end with CR, LF or both."""
-    at = 0
-    for _ in range(lines):
-        line_end = re.compile(r"\r\n|\n|\r").search(text, at)
-        if line_end is None:
-            return len(text)
-        at = line_end.end()
-    return at
-
-
 def _assumed(file: str, head: Head, form: TextLayout, encoding: str, given: Dialect) -> list[Finding]:
     """Findings for detected properties that the map does not state and that are not the usual ones."""
     findings: list[Finding] = []
@@ -137,13 +126,7 @@ def _assumed(file: str, head: Head, form: TextLayout, encoding: str, given: Dial
     ]
     if texts := [text for wanted, text in parts if wanted]:
         findings.append(Finding("assumed", file, ", ".join(texts)))
-    if head.units:
-        findings.append(
-            Finding("assumed", file, f"line {head.units_line + 1} holds units: {', '.join(filter(None, head.units))}")
-        )
-        if unknown := unknown_units(head.unit_of):
-            findings.append(Finding("units", file, f"unknown unit: {unknown}; kept as written"))
-    return findings
+    return findings + head.unit_findings(file)
 
 
 def _lost(file: str, left_out: int, example: str, rows: int) -> list[Finding]:

@@ -21,7 +21,7 @@ from cockpit.run.writable import check_output, writing
 STDOUT = Path("-")
 _OPTION = "--json"
 _SUFFIX = ".json"
-# the word after `--json`; it is an input of the command unless it ends in .json
+# the word after `--json` on the command line, for a hint: unless it ends in .json it is an input of the command
 _AFTER: ContextVar[Sequence[str]] = ContextVar("after", default=())
 # typer contains click since 0.27 and depended on it before; BadParameter has the same base classes in both
 _UsageError: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "UsageError")
@@ -93,24 +93,24 @@ def _perhaps_meant(message: str) -> str:
 
 
 def print_result(as_json: Path | None, result: Any, words: Iterable[str], indent: int | None = None) -> None:
-    """Print a result as JSON, or write it to a file and print its lines. Raises Fault LOG_WRITE.
+    """Print a result as JSON, or print its lines and write the JSON to a file. Raises Fault LOG_WRITE.
 
-    Args:
-        as_json: value of `--json`.
-        result: named tuples, dictionaries, lists, numbers and texts.
-        words: lines for the operator.
-        indent: indentation of JSON on stdout; one line if not given.
-
+    `result` consists of named tuples, dictionaries, lists, numbers and texts; `words` are lines for the operator; `indent` is the
+    indentation of JSON on stdout, which is one line without it.
     """
     if as_json == STDOUT:
         print(json.dumps(strict_json(result), allow_nan=False, indent=indent))
         return
-    if as_json is not None:
-        refuse_to_replace(as_json, JSON, f"{_OPTION} {as_json}")  # the command itself may have written its log there
-        with writing(as_json):  # written before the lines: a reader that closes stdout ends the command
-            write_json(as_json, result)
-    for line in words:
-        print(plain(line))
+    try:
+        for line in words:
+            print(plain(line))
+    finally:  # written also if a reader closes stdout, which ends the command
+        if as_json is not None:
+            refuse_to_replace(
+                as_json, JSON, f"{_OPTION} {as_json}"
+            )  # the command itself may have written its log there
+            with writing(as_json):
+                write_json(as_json, result)
 
 
 def _check(as_json: Path | None) -> None:
@@ -120,4 +120,6 @@ def _check(as_json: Path | None) -> None:
     if as_json.suffix.lower() != _SUFFIX:
         line = f"{_OPTION}={as_json}: must be - for stdout or end in {_SUFFIX}; choose another name"
         raise Fault("CONFIG", line)
+    if as_json.name.endswith(".verdict.json"):
+        raise Fault("CONFIG", f"{_OPTION}={as_json}: is named like the verdict of a log; choose another name")
     check_output(_OPTION, as_json, (_SUFFIX,))

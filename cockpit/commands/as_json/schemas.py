@@ -1,22 +1,37 @@
 """Every TOML and JSON format of the project by name, each with its JSON Schema."""
 
+import types
 from collections.abc import Callable
+from functools import cache
 from importlib import import_module
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, NotRequired, Union, get_args, get_origin, get_type_hints
+
+from pydantic import ConfigDict, TypeAdapter
+from typing_extensions import TypedDict  # pydantic refuses typing.TypedDict before Python 3.12
+
+from bridge.results import json_names
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 class Format(NamedTuple):
-    """One kind of file or result."""
+    """One format: a kind of TOML file, or of JSON result."""
 
     name: str
     about: str
-    make: Callable[[], dict[str, Any]]
+    source: (
+        Callable[[], dict[str, Any]] | str
+    )  # a function that makes the schema, or `module:name` of the type from which the schema is derived
 
     def schema(self) -> dict[str, Any]:
         """The JSON Schema of this format."""
-        return {"$schema": DIALECT, "title": self.name} | _untitled(self.make()) | {"description": self.about}
+        if isinstance(self.source, str):
+            module, _, name = self.source.partition(":")
+            made = schema_of(getattr(import_module(module), name))
+        else:
+            made = self.source()
+        return {"$schema": DIALECT, "title": self.name} | _untitled(made) | {"description": self.about}
 
 
 def _untitled(schema: Any) -> Any:
@@ -132,20 +147,7 @@ def _with_channels(schema: dict[str, Any]) -> dict[str, Any]:
 # JSON: from the types of the results
 
 
-def result_of(place: str) -> Callable[[], dict[str, Any]]:
-    """The schema of a result or a table, from the place `module:name` of its type."""
-
-    def make() -> dict[str, Any]:
-        from cockpit.commands.as_json.types import schema_of
-
-        module, _, name = place.partition(":")
-        return schema_of(getattr(import_module(module), name))
-
-    return make
-
-
 def _log_info() -> dict[str, Any]:
-    from cockpit.commands.as_json.types import schema_of
     from cockpit.judge.judged import Judged
     from cockpit.run.child_process import ReportedFault
 
@@ -153,7 +155,7 @@ def _log_info() -> dict[str, Any]:
 
 
 _RESULTS = {
-    "run": "cockpit.run.outcome:RunOutcome",
+    "run": "cockpit.judge.judged:RunOutcome",
     "plant": "cockpit.commands.processes:Served",
     "controller": "cockpit.commands.processes:Served",
     "record": "cockpit.commands.processes:Recorded",
@@ -164,7 +166,7 @@ _RESULTS = {
     "replay": "cockpit.run.replay:ReplayResult",
     "plot": "cockpit.figures.run_figure:Plotted",
     "review": "cockpit.review.page:Reviewed",
-    "look": "cockpit.look.result:Looked",
+    "look": "cockpit.look.source:Looked",
     "map": "cockpit.figures.stability_map:MapResult",
     "reproduce": "cockpit.paper.page:ReproduceResult",
     "example": "cockpit.commands.example:Example",
@@ -172,9 +174,9 @@ _RESULTS = {
     "log recover": "bridge.log.recover:Recovered",
     "log export": "bridge.tables.export:Exported",
     "log import": "diagnosis.evidence.import_table:Imported",
-    "scenarios": "cockpit.commands.scenarios:Shipped",
+    "scenarios": "cockpit.commands.scenarios:ScenariosResult",
     "explain": "cockpit.commands.explain:Explained",
-    "schema": "cockpit.commands.schema:SchemaNames",
+    "schema": "cockpit.commands.proof:SchemaNames",
 }
 TOML = (
     Format("rig", "A rig file, as in deploy/rigs: `--rig FILE.toml`.", _rig),
@@ -182,42 +184,88 @@ TOML = (
     Format(
         "faults",
         "A group of the catalogue of `python -m bench faults`, as in deploy/faults.",
-        result_of("cockpit.faults.catalogue:FaultGroup"),
+        "cockpit.faults.catalogue:FaultGroup",
     ),
     Format(
         "controller",
         "The table [controller] of a scenario, and the configuration in a log.",
-        result_of("controller.config:ControllerConfig"),
+        "controller.config:ControllerConfig",
     ),
     Format("evidence-1", "manifest.toml of an evidence folder, evidence/1.", _evidence),
     Format("import-map", "A channel map: `stickslip log import --map FILE.toml`.", _import_map),
 )
 JSON = (
-    Format("diagnosis-2", "`stickslip diagnose FOLDER --json`, diagnosis/2.", result_of("diagnosis.result:Diagnosis")),
+    Format("diagnosis-2", "`stickslip diagnose FOLDER --json`, diagnosis/2.", "diagnosis.result:Diagnosis"),
     Format(
         "diagnoses-2",
         "`stickslip diagnose --json` of several folders, diagnoses/2.",
-        result_of("cockpit.commands.diagnose_output:Diagnoses"),
+        "cockpit.commands.diagnose_output:Diagnoses",
     ),
     Format(
         "fleet-1",
         "index.json that `stickslip diagnose --report DIR` of several folders writes.",
-        result_of("cockpit.fleet.groups:Fleet"),
+        "cockpit.fleet.groups:Fleet",
     ),
-    Format(
-        "fault", "Any command that fails with JSON on stdout.", result_of("cockpit.run.child_process:ReportedFault")
-    ),
+    Format("fault", "Any command that fails with JSON on stdout.", "cockpit.run.child_process:ReportedFault"),
     Format(
         "word-result",
         "`stickslip arm --json`; disarm, stop and reset print the same format.",
-        result_of("cockpit.live.operator:CommandOutcome"),
+        "cockpit.live.operator:CommandOutcome",
     ),
-    Format("fault-list", "`stickslip fault --list --json`.", result_of("cockpit.faults.catalogue:FaultList")),
-    Format("closed-loop-result", "`stickslip replay --closed-loop --json`.", result_of("cockpit.run.replay:Compared")),
+    Format("fault-list", "`stickslip fault --list --json`.", "cockpit.faults.catalogue:FaultList"),
+    Format("closed-loop-result", "`stickslip replay --closed-loop --json`.", "cockpit.run.replay:Compared"),
     Format("log-info-result", "`stickslip log info --json`; of several logs a list.", _log_info),
     *(
-        Format(f"{command.replace(' ', '-')}-result", f"`stickslip {command} --json`.", result_of(place))
+        Format(f"{command.replace(' ', '-')}-result", f"`stickslip {command} --json`.", place)
         for command, place in _RESULTS.items()
     ),
 )
 FORMATS = {row.name: row for row in (*TOML, *JSON)}
+
+
+def schema_of(kind: Any) -> dict[str, Any]:
+    """JSON Schema of the JSON that `bridge.results.strict_json` makes of a value of type `kind`."""
+    return TypeAdapter[Any](_written(kind)).json_schema()
+
+
+def _written(kind: Any) -> Any:
+    """The type of the JSON for a type: an object for a named tuple, a list for a tuple, null for NaN and infinity."""
+    if kind is float:
+        return float | None
+    if kind is Path:
+        return str
+    if hasattr(kind, "_fields"):
+        return _object(kind)
+    origin, inner = get_origin(kind), get_args(kind)
+    if origin is None or origin is Literal:
+        return kind
+    if origin is tuple and inner[1:] == (Ellipsis,):
+        return list[_written(inner[0])]
+    plain = tuple(_written(part) for part in inner)
+    if origin in (Union, types.UnionType):
+        return Union[plain]  # noqa: UP007 (made of a list)
+    generic: Any = origin
+    return generic[plain]
+
+
+@cache
+def _object(kind: Any) -> Any:
+    make: Any = TypedDict
+    made = make(kind.__name__, _entries(kind))
+    made.__pydantic_config__ = ConfigDict(extra="forbid")
+    return made
+
+
+def _entries(kind: Any) -> dict[str, Any]:
+    """Types of the entries of a named tuple's JSON, by name."""
+    hints = get_type_hints(kind)
+    optional, merged = getattr(kind, "JSON_OPTIONAL", ()), getattr(kind, "JSON_MERGED", "")
+    entries = _entries(hints[merged]) if merged else {}
+    for name in json_names(kind):
+        hint = hints[name] if name in hints else get_type_hints(getattr(kind, name).fget)["return"]
+        if name in optional:
+            present = [part for part in get_args(hint) if part is not types.NoneType]
+            entries[name] = NotRequired[_written(present[0] if types.NoneType in get_args(hint) else hint)]
+        else:
+            entries[name] = _written(hint)
+    return entries

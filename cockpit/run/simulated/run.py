@@ -1,103 +1,56 @@
-"""A scenario in simulated time, with its faults: the unchanged loops of plant and controller, and the truth of the rig."""
+"""A scenario in simulated time, with its faults: the unchanged loops of plant and controller, and the log."""
 
 import threading
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, cast
-
-import numpy as np
-import numpy.typing as npt
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, cast
 
 from bridge.faults import Fault
-from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.inbox import WAITING
+from bridge.wire.complaints import BAD_MESSAGE, Complaints
+from bridge.wire.inbox import WAITING, Received
 from bridge.wire.session import LEASE_S
-from bridge.wire.topics import OPERATOR, TOPICS, Outgoing
-from cockpit.run.in_process import TimedAction
+from bridge.wire.topics import SENSORS, TOPICS
+from cockpit.run.in_process import log_of
 from cockpit.run.scenario import Scenario
-from cockpit.run.simulated.bus import Hub, Receive, Session
-from cockpit.run.simulated.stage import Player, Stage, WaitingInbox
+from cockpit.run.simulated.stage import Hub, Player, Receive, Session, Stage, WaitingInbox
 from controller.app import ControllerProcess
 from controller.node import ControllerNode
 from plant.app import PlantProcess
 from plant.faults.kinds import PROCESS
 from plant.faults.table import FaultTable
 from plant.node import PlantNode
-from plant.records import TRUTH
 
 _LINKED_S = 0.05  # time from the resumption of a frozen process to its new link
 _LONGEST_AFTER_S = 2.0  # time after the last block for the fade-out and the end of the processes
-_POSITION, _VELOCITY = TRUTH.index("true_drive_position_m"), TRUTH.index("true_velocity_mps")
-_GRANTED = "simulated time"  # text of the events START
-
-
-class Truth(NamedTuple):
-    """True motion of the rig, [blocks] each."""
-
-    t_s: npt.NDArray[np.float64]  # simulated time at the end of each block
-    vibration_mps: npt.NDArray[np.float64]  # v_a of the base
-    drive_mps: npt.NDArray[np.float64]  # v_d, mean of the block
-    slide_mps: npt.NDArray[np.float64]  # slide velocity of largest magnitude in the block, negative backwards
-
-
-class _TruthNode(PlantNode):
-    """A rig that appends the truth of each block to a list."""
-
-    def __init__(self, truths: list[tuple[float, float, float, float]], now_ns: Callable[[], int], **rest: Any) -> None:
-        PlantNode.__init__(self, **rest)
-        self._truths, self._now_ns = truths, now_ns
-        self._drive_m = 0.0
-
-    def advance(
-        self, commands: list[bytes], commands_late: int = 0, round_trip_ns: int = 0, late_ns: int = 0
-    ) -> tuple[Outgoing, Outgoing]:
-        """Advance one block."""
-        sent = PlantNode.advance(self, commands, commands_late, round_trip_ns, late_ns)
-        drive_m, speeds = float(self.truth[_POSITION, -1]), self.truth[_VELOCITY]
-        drive_mps = (drive_m - self._drive_m) / (self.block_ns * 1e-9)
-        self._drive_m = drive_m
-        fastest_mps = float(speeds[np.abs(speeds).argmax()])
-        self._truths.append((self._now_ns() * 1e-9, self.vibration_mps, drive_mps, fastest_mps))
-        return sent
+_GRANTED = "simulated time"  # text of the START events, in place of the granted real-time priority
 
 
 class SimulatedRun:
-    """One run. Runs share the simulated clock, so a process can make only one at a time.
+    """One run with its faults. Runs share the simulated clock, so a process can make only one at a time."""
 
-    Args:
-        scenario: the scenario with its faults, faults of processes included.
-        words: operator commands with their times.
-        arm: whether the rig starts ARMED; the scenario's value if not given.
-
-    """
-
-    def __init__(self, scenario: Scenario, words: Sequence[TimedAction] = (), arm: bool | None = None) -> None:
+    def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
-        self._arm = scenario.arm if arm is None else arm
         self._stage = Stage()
         self._hub = Hub(self._stage)
         self._stop = threading.Event()
-        self._truths: list[tuple[float, float, float, float]] = []
         self._players: dict[str, Player] = {}
         self._runs = 0
         self.ended: dict[str, Fault] = {}  # faults that ended processes, by role
         faults = [table for table in scenario.fault if table.group == PROCESS]
         for table in faults:
             self._stage.cue(round(table.from_s * 1e9), lambda table=table: self._disturb(table))
-        for order in words:
-            self._stage.cue(order.t_ns, lambda order=order: self._send(order))
 
     def listen(self, receive: Receive) -> None:
         """Receive every message of the run, as a recorder does."""
         for topic in TOPICS:
             self._hub.listen("recorder", topic, receive)
 
-    def play(self, stopped: Callable[[], bool] = lambda: False) -> Truth:
-        """Run to the end of the scenario. Raises the Fault of a process.
+    def plant_node(self, **settings: Any) -> PlantNode:
+        """Create the rig's node. A subclass may override this to record the simulated truth."""
+        return PlantNode(**settings)
 
-        Args:
-            stopped: called at every turn; True ends the run like Ctrl-C.
-
-        """
+    def play(self, stopped: Callable[[], bool] = lambda: False) -> None:
+        """Run to the end of the scenario; `stopped`, called at every turn, ends it like Ctrl-C. Raises the Fault of a process."""
         self._begin_controller()
         self._begin_plant(first=True)
         until_ns = round((self._scenario.duration_s + _LONGEST_AFTER_S) * 1e9)
@@ -108,11 +61,9 @@ class SimulatedRun:
             return self._stage.now_ns > until_ns if self._scenario.duration_s else False
 
         self._stage.play(over, self._silence, self._failed)
-        rows = np.array(self._truths).reshape(-1, 4)
-        return Truth(*rows.T)
 
     def _silence(self) -> None:
-        """Drop the messages that processes send while they are removed after the run."""
+        """Unsubscribe all roles, so that messages which processes send while they are removed do not reach the log."""
         for role in self._players:
             self._hub.forget(role)
 
@@ -128,13 +79,11 @@ class SimulatedRun:
         self._runs += 1
         block_s = scenario.rig.solver.block_s
         left = round((scenario.duration_s - stage.now_ns * 1e-9) / block_s) if scenario.duration_s > 0 else 1 << 62
-        node = _TruthNode(
-            self._truths,
-            lambda: stage.now_ns,
+        node = self.plant_node(
             config=scenario.rig,
             seed=scenario.seed,
             run=self._runs,
-            arm=self._arm and first,
+            arm=scenario.arm and first,
             faults=scenario.fault if first else (),
         )
         process = PlantProcess(node, cast(Any, Session(self._hub, "plant")), None)
@@ -159,10 +108,6 @@ class SimulatedRun:
         self._hub.announce("controller")
         self._players["controller"] = stage.enter(Player("controller", lambda: process.loop(self._stop, _GRANTED)))
 
-    def _send(self, order: TimedAction) -> None:
-        command = wire.Operator(action=cast(Any, order.action), who="the operator")
-        self._hub.put("cockpit", OPERATOR, command.SerializeToString())
-
     def _disturb(self, table: FaultTable) -> None:
         """Freeze, kill or restart a process now."""
         role, stage, hub = table.target, self._stage, self._hub
@@ -180,3 +125,43 @@ class SimulatedRun:
         if table.kind == "restarted":
             begin = self._begin_controller if role == "controller" else lambda: self._begin_plant(first=False)
             stage.cue(stage.now_ns + for_ns, begin)
+
+
+def run_with_faults(
+    scenario: Scenario,
+    path: Path,
+    about: dict[str, Any],
+    progress: Callable[[float], None] | None = None,
+    stopped: Callable[[], bool] = lambda: False,
+) -> None:
+    """Run a scenario with its faults and write its log. Raises Fault LOG_WRITE.
+
+    `about` is metadata for the log; `progress` is called every 0.1 s of simulated time with that time [s]; `stopped`, called at
+    every turn, ends the run as at its full duration.
+    """
+    run = SimulatedRun(scenario)
+    log = log_of(scenario, path, about)
+    complaints = Complaints(log.add_event)
+    block_s = scenario.rig.solver.block_s
+    every = max(round(0.1 / block_s), 1)
+    blocks = 0
+
+    def write(received: Received) -> None:
+        nonlocal blocks
+        if received.topic.logged:
+            try:
+                log.write(received.topic, received.payload)
+            except Fault as fault:
+                if fault.kind.code != "BAD_MESSAGE":
+                    raise
+                complaints.note(BAD_MESSAGE, received.topic.name, f"{fault.line.partition(': ')[2]}: dropped")
+        if received.topic is SENSORS:
+            blocks += 1
+            if progress is not None and blocks % every == 0:
+                progress(received.arrival_ns * 1e-9)
+
+    run.listen(write)
+    try:
+        run.play(stopped)
+    finally:
+        log.close()

@@ -1,13 +1,19 @@
 """Threads that take turns on a simulated clock: one runs at a time, and time passes only while all of them wait.
 
-So the loops of the processes, which sleep and wait for messages, run unchanged and always in the same order.
+So the loops of the processes, which sleep and wait for messages, run unchanged and always in the same order. Messages arrive at
+once and in order, unless the link of sender or receiver is down.
 """
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from functools import partial
 
+from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.clock import time
 from bridge.wire.inbox import Inbox, Received
+from bridge.wire.topics import Topic
+
+Receive = Callable[[Received], None]
 
 
 class _Left(BaseException):
@@ -15,20 +21,14 @@ class _Left(BaseException):
 
 
 class Player:
-    """A thread with the loop of one process.
-
-    Args:
-        name: role of the process.
-        work: loop of the process.
-
-    """
+    """A thread with the loop `work` of one process; `name` is its role."""
 
     def __init__(self, name: str, work: Callable[[], object]) -> None:
         self.name = name
         self.over = False
         self.failed: BaseException | None = None
         self.wakes_ns = 0  # time at which the thread continues
-        self.hears = False  # whether a message wakes the thread earlier
+        self.hears = False  # a message for this role wakes the thread before `wakes_ns`
         self.frozen_until_ns = 0
         self._killed = False
         self._work = work
@@ -79,12 +79,12 @@ class WaitingInbox(Inbox):
         Inbox.__init__(self, limit)
         self._stage = stage
 
-    def get(self, timeout_s: float) -> Received | None:
+    def get(self, timeout_s: float = 0.0) -> Received | None:
         """The oldest message, or None if no message arrived within `timeout_s`."""
-        received = self.get_nowait()
-        if received is None:
+        received = super().get()
+        if received is None and timeout_s:
             self._stage.wait(timeout_s, hears=True)
-            received = self.get_nowait()
+            received = super().get()
         return received
 
 
@@ -98,7 +98,7 @@ class Stage:
         self._cues: list[tuple[int, Callable[[], None]]] = []
 
     def enter(self, player: Player) -> Player:
-        """Add a player, whose first turn is now."""
+        """Add a player; its first turn is due at the present time."""
         player.wakes_ns = self.now_ns
         self.players.append(player)
         return player
@@ -109,13 +109,7 @@ class Stage:
         self._cues.sort(key=lambda cue: cue[0])
 
     def wait(self, for_s: float, hears: bool = False) -> None:
-        """Let simulated time pass; called by the player whose turn it is.
-
-        Args:
-            for_s: duration.
-            hears: a message for the player ends the wait early.
-
-        """
+        """Let simulated time pass; called by the player whose turn it is. With `hears` a message for it ends the wait early."""
         player = self._on_stage
         if player is None:  # no player has the turn: a test or a warm-up
             self.now_ns += round(for_s * 1e9)
@@ -139,13 +133,9 @@ class Stage:
             self._on_stage = before
 
     def play(self, until: Callable[[], bool], at_end: Callable[[], None], on_failure: Callable[[Player], None]) -> None:
-        """Let the players take turns until `until` returns True or all have ended.
+        """Let the players take turns until `until`, called before each turn, returns True or all have ended.
 
-        Args:
-            until: called before each turn.
-            at_end: called before the remaining players are removed.
-            on_failure: called with a player that ended with an error.
-
+        `at_end` is called before the remaining players are removed, `on_failure` with a player that ended with an error.
         """
         with time.simulated(lambda: self.now_ns, self.wait):
             try:
@@ -167,3 +157,80 @@ class Stage:
                 at_end()
                 for player in self.players:
                     self.remove(player)
+
+
+class Hub:
+    """State that all sessions share: listeners, present roles, and roles whose link is down."""
+
+    def __init__(self, stage: Stage) -> None:
+        self.stage = stage
+        self.present: set[str] = set()  # roles on the bus
+        self.came: dict[str, int] = {}  # by role: how often it has joined the bus
+        self.down: set[str] = set()  # roles without a link
+        self._listeners: dict[str, list[tuple[str, Receive]]] = {}
+
+    def listen(self, role: str, topic: Topic, receive: Receive) -> None:
+        """Subscribe to a topic as a role."""
+        self._listeners.setdefault(topic.name, []).append((role, receive))
+
+    def put(self, role: str, topic: Topic, payload: bytes) -> None:
+        """Publish a payload as a role; it is lost if the role's link is down."""
+        if role in self.down:
+            return
+        received = Received(topic, payload, self.stage.now_ns)
+        for listener, receive in self._listeners.get(topic.name, ()):
+            if listener not in self.down:
+                receive(received)
+                self.stage.heard(listener)
+
+    def announce(self, role: str) -> None:
+        """Let a role join the bus."""
+        self.down.discard(role)
+        self.present.add(role)
+        self.came[role] = self.came.get(role, 0) + 1
+
+    def lose(self, role: str) -> None:
+        """Take the link of a role down: others no longer see the role on the bus."""
+        self.down.add(role)
+        self.present.discard(role)
+
+    def forget(self, role: str) -> None:
+        """End the subscriptions of a role, as its process has ended."""
+        self.lose(role)
+        for name, listeners in self._listeners.items():
+            self._listeners[name] = [listener for listener in listeners if listener[0] != role]
+
+
+class Session:
+    """The session of one role; replaces `bridge.wire.zenoh_link.Bus` in the loops of the processes."""
+
+    def __init__(self, hub: Hub, role: str) -> None:
+        self._hub, self._role = hub, role
+
+    def publisher(self, topic: Topic) -> Callable[[bytes], None]:
+        """A function that sends bytes on a topic."""
+        return partial(self._hub.put, self._role, topic)
+
+    def listen(self, topic: Topic, receive: Receive) -> None:
+        """Call `receive` for every message of a topic."""
+        self._hub.listen(self._role, topic, receive)
+
+    def headers(self, _roles: Iterable[str], _timeout_s: float, _stop: threading.Event) -> dict[str, wire.Header]:
+        """Empty: rig and controller of a simulated run come from one scenario, and their headers need no comparison."""
+        return {}
+
+    def alive(self, role: str) -> bool:
+        """Whether this role sees another role on the bus; always False while its link is down."""
+        return self._role not in self._hub.down and role in self._hub.present
+
+    def came(self, role: str) -> int:
+        """How often a role has joined the bus: a restart is noticed by it."""
+        return self._hub.came.get(role, 0)
+
+    def linked(self) -> bool:
+        """Whether the link to the rig is up."""
+        return not self._hub.down & {self._role, "plant"}
+
+    def withdraw(self) -> None:
+        """Leave the bus in the eyes of the others; messages of this role still arrive."""
+        self._hub.present.discard(self._role)

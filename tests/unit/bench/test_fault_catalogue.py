@@ -29,7 +29,7 @@ def test_every_entry_is_a_scenario_with_its_faults() -> None:
     for case in load_catalogue():
         made = load_scenario(case.entry.scenario, case.settings)
         assert made.rig.solver.block_s > 0.0
-        assert case.faults or case.entry.said
+        assert case.entry.fault or case.entry.said
         assert case.told or case.entry.told == [], case.entry.name
 
 
@@ -72,7 +72,7 @@ def test_a_name_is_there_once(tmp_path: Path) -> None:
     for name in ("a", "b"):
         text = 'about = "x"\n[[entry]]\nname = "one"\nabout = "y"\n'
         (tmp_path / f"{name}.toml").write_text(text)
-    with pytest.raises(Fault, match="is in two files"):
+    with pytest.raises(Fault, match="is used twice"):
         load_catalogue(tmp_path)
 
 

@@ -1,5 +1,6 @@
 """Export: every value of a log comes back from every format."""
 
+import resource
 from pathlib import Path
 from typing import Any
 
@@ -78,6 +79,18 @@ def test_units_are_exported(log: Path, tmp_path: Path) -> None:
     assert units["units.sensors.drive_force_N"].tolist() == ["N"]
     assert units["units.trace.slips"].tolist() == ["1"]
     assert units["units.trace.vibration_velocity_mps"].tolist() == ["m/s"]
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".csv", ".mat"])
+def test_a_full_disk_is_reported_and_leaves_no_file(log: Path, tmp_path: Path, suffix: str) -> None:
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
+    try:
+        with pytest.raises(Fault, match=r"LOG_WRITE: .*File too large; free space"):
+            export(log, tmp_path / f"out{suffix}", ALL)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert list(tmp_path.iterdir()) == [log]
 
 
 def test_a_matlab_file_has_the_header_and_classes_of_version_7_3(

@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from bridge.log.check.log_check import check_log
-from bridge.log.in_charge import NO_COMMAND
 from bridge.log.logfile import read_run
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.event_codes import EVENTS, SEVERITIES, harms, is_listed
+from bridge.wire.messages import NO_BLOCK
 from cockpit.judge.judged import judge
 from cockpit.judge.verdict_words import headline, in_words
 from cockpit.run.in_process import run_onboard
@@ -74,7 +74,7 @@ def test_a_short_fallback_is_reported_without_a_fault(long_run: Path, tmp_path: 
 def test_the_fade_of_a_stopped_rig_does_not_count_as_fallback(long_run: Path, tmp_path: Path) -> None:
     def stopped(tables: Tables) -> None:
         tables["applied"]["fallback"][-40:] = 1
-        tables["applied"]["command_block"][-40:] = NO_COMMAND
+        tables["applied"]["command_block"][-40:] = NO_BLOCK
 
     assert judge(changed(long_run, tmp_path / "out.mcap", stopped)).charge.fallbacks == 0
 
@@ -83,7 +83,7 @@ def test_a_rig_that_never_got_a_command_is_reported(long_run: Path, tmp_path: Pa
     def nobody(tables: Tables) -> None:
         tables["command"] = tables["command"][:0]
         tables["applied"]["fallback"][:] = 1
-        tables["applied"]["command_block"][:] = NO_COMMAND
+        tables["applied"]["command_block"][:] = NO_BLOCK
 
     verdict = judge(changed(long_run, tmp_path / "nobody.mcap", nobody))
     assert not verdict.good
@@ -136,6 +136,13 @@ def test_definitions_that_differ_from_the_messages_are_found(
 
 def test_every_code_has_its_severity_and_place() -> None:
     assert {kind.letter for kind in EVENTS.values()} <= SEVERITIES.keys()
+    assert {sender for kind in EVENTS.values() for sender in kind.sources.split(", ")} == {
+        "plant",
+        "controller",
+        "recorder",
+    }
+    assert EVENTS["CLIPPED"].letter == "F"
+    assert "use a larger range" in EVENTS["CLIPPED"].help
     protocol = (Path(__file__).parents[3] / "bridge/wire/PROTOCOL.md").read_text(encoding="utf-8")
     assert not [code for code in EVENTS if f"`{code}`" not in protocol]
     assert (harms("GAP"), harms("STALE"), is_listed("STALE"), is_listed("START")) == (True, False, True, False)

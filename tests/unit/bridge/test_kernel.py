@@ -82,6 +82,25 @@ def test_a_shared_kernel_is_compiled_once_and_loaded_before_its_callers(tmp_path
         assert done.stdout.split() == ["1.75", "1", hits]
 
 
+LATER = """
+from plant.four_rigs_step import decayed
+decayed(0.5)
+import controller.core
+from bridge.kernel_cache import ROOT, sources_digest
+stamp = controller.core.step._cache._cache_file._source_stamp
+print(stamp == sources_digest(ROOT / "controller" / "core.py").encode())
+"""
+
+
+def test_a_kernel_defined_after_a_compilation_depends_on_all_its_sources(tmp_path: Path) -> None:
+    """Numba resets its configuration at the first compilation: a stale kernel then called an address that no longer existed."""
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
+    environment.pop("NUMBA_CACHE_DIR", None)  # set by `bridge.kernel`: a change of numba's environment
+    command = [sys.executable, "-c", LATER]
+    done = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout == "True\n"
+
+
 def test_no_numba_is_installed_whose_internals_may_differ() -> None:
     """The bound may rise where these tests pass with the next version: numba promises nothing about classes that link kernels."""
     major, minor = map(int, numba.__version__.split(".")[:2])

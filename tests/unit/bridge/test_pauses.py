@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from bridge.log.logfile import read_run
-from bridge.log.pause_events import CORE_PAUSE, RunPause, not_watched, pauses_of
 from bridge.log.pause_writer import PauseWriter, RunClock
 from bridge.log.runlog import RunLog
+from bridge.log.watches.event_watch import CORE_PAUSE, EventWatch, RunPause, pauses_of
 from bridge.wire import core_timer, pauses, realtime
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import APPLIED as APPLIED_LAYOUT
@@ -25,6 +25,12 @@ from tests.system.run_under_way import gone
 
 MS = 1_000_000
 needs_priority = pytest.mark.skipif(not realtime.may_claim(), reason="no real-time priority here")
+
+
+def not_watched(events: Iterable[wire.Event]) -> str:
+    watch = EventWatch()
+    watch.add(events)
+    return watch.not_watched
 
 
 def still(*stretches: tuple[int, int]) -> list[Pause]:

@@ -17,20 +17,13 @@ from bridge.log.runlog import RunLog
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.cli import _PANELS, app
 from cockpit.commands.as_json.schemas import FORMATS
-from cockpit.run.progress import progress_line
+from cockpit.run.processes import progress_line
 from cockpit.run.run import keep_aside
 from cockpit.run.scenario import load_scenario
 from tests.logs import doctored, short_log, verdict_of
 from tests.patience import PATIENCE_S
 
 PNG = b"\x89PNG"
-
-
-@pytest.fixture
-def log(tmp_path: Path) -> Path:
-    path = tmp_path / "run.mcap"
-    path.write_bytes(short_log())
-    return path
 
 
 def call(*arguments: str):
@@ -186,7 +179,7 @@ def test_results_from_a_damaged_log_carry_a_warning(log: Path, tmp_path: Path) -
     )
     for words, warning in (
         (replay, "warning: damaged: 1 chunk is damaged"),
-        (export, "lost: 1 damaged chunk, 160 messages that the log's statistics count\n"),
+        (export, "lost: 1 damaged chunk, 160 messages in its statistics, but not read\n"),
     ):
         output = call(*words)
         assert output.exit_code == 1

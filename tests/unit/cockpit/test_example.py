@@ -13,7 +13,7 @@ from cockpit.cli import app
 from cockpit.commands.as_json.schemas import FORMATS
 from diagnosis.evidence.folder import load_evidence
 from diagnosis.synthetic import folder as making
-from diagnosis.synthetic.protocols import PROTOCOLS, RunPlan
+from diagnosis.synthetic.runs import RunPlan
 from plant.effects.library import EFFECTS
 
 SHORT = (RunPlan(((0.0, 5e-4),), duration_s=1.0), RunPlan(((0.0, 5e-4),), duration_s=1.0, holdout=True))
@@ -22,7 +22,7 @@ SHORT = (RunPlan(((0.0, 5e-4),), duration_s=1.0), RunPlan(((0.0, 5e-4),), durati
 @pytest.fixture(autouse=True)
 def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     """Two runs of a second, made in an empty working folder."""
-    monkeypatch.setitem(PROTOCOLS, "ladder", SHORT)
+    monkeypatch.setattr(making, "LADDER", SHORT)
     monkeypatch.chdir(tmp_path)
 
 
@@ -72,14 +72,14 @@ def test_nothing_is_overwritten(existing: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_ctrl_c_leaves_nothing_behind(number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    made = making.spring_run
+    made = RunPlan.columns
 
     def interrupted(*arguments):
         if list(tmp_path.rglob("run-01.parquet")):
             os.kill(os.getpid(), number)
         return made(*arguments)
 
-    monkeypatch.setattr(making, "spring_run", interrupted)
+    monkeypatch.setattr(RunPlan, "columns", interrupted)
     result = example("new/example")
     assert result.exit_code == 130
     assert "INTERRUPTED" in result.stderr

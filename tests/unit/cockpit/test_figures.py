@@ -18,19 +18,12 @@ from bridge.log.runlog import RunLog
 from bridge.wire.messages import sensor_block
 from bridge.wire.topics import SENSORS
 from cockpit.cli import app
-from cockpit.figures.grid import Grid, on_grid
+from cockpit.figures.curves import Grid, on_grid
 from cockpit.judge.judged import judge
 from cockpit.judge.verdict_words import headline, in_words
 from cockpit.run.in_process import run_onboard
 from cockpit.run.scenario import load_scenario
-from tests.logs import empty_log, short_log, verdict_of
-
-
-@pytest.fixture
-def log(tmp_path: Path) -> Path:
-    path = tmp_path / "run.mcap"
-    path.write_bytes(short_log())
-    return path
+from tests.logs import empty_log, verdict_of
 
 
 def call(*arguments: str | Path):
@@ -76,13 +69,11 @@ def test_a_figure_names_its_source_and_is_reproducible(log: Path, monkeypatch: p
 
 def test_a_paper_has_its_width_and_its_metadata(log: Path) -> None:
     out = log.with_name("x.png")
-    result = call(
-        "plot", log, "--out", out, "--style", "paper", "--width", "50", "--dpi", "254", "--signals", "amplitude_m"
-    )
+    result = call("plot", log, "--out", out, "--style", "paper", "--width", "50", "--signals", "amplitude_m")
     assert result.exit_code == 0, result.output
     with Image.open(out) as picture:
         text: Any = picture.info
-        assert picture.width == 500
+        assert picture.width == int(50 / 25.4 * 600)
     assert re.match(r"stickslip \d", text["Software"])
     assert "--style paper" in text["Description"]
 
@@ -118,7 +109,6 @@ def test_the_numbers_of_the_curves_match_the_log(log: Path) -> None:
         (["--signals", "force"], "--signals force: unknown signal; known: drive_force_N, "),
         (["--style", "poster"], "--style poster: must be screen or paper"),
         (["--width", "2"], "--width 2: must be from 40 to 500 mm"),
-        (["--dpi", "5000"], "--dpi 5000: must be from 50 to 1200"),
         (["--data", "x.xls"], "--data x.xls: must end in .csv"),
         (["--vs", "none.mcap"], "none.mcap: no such file"),
     ],

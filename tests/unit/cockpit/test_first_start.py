@@ -10,33 +10,34 @@ import pytest
 
 from bridge.compiling import PROGRESS
 from bridge.faults import Fault
-from bridge.plain import LOADED
 from cockpit.run import processes
 from tests.patience import PATIENCE_S
 
 
 class Child:
-    """Fake of a started process: its role and its present activity."""
+    """Fake of a started process with its kernels left to compile."""
 
-    def __init__(self, role: str, still: str = processes.READY, left: tuple[int, int] = (0, 0)) -> None:
-        self.role, self.still, self.left = role, still, left
+    def __init__(self, left: tuple[int, int] = (0, 0)) -> None:
+        self.left = left
 
 
 def beginning(log: Path, wait_s: float | None, *children: Any) -> processes.StartWatch:
     return processes.StartWatch(list(children), log, wait_s)
 
 
-def test_a_starting_process_is_reported_now_and_then(tmp_path, monkeypatch, capsys):
+def test_a_run_that_has_not_begun_is_reported_now_and_then(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(processes, "_REPORT_S", 0.0)
-    start = beginning(tmp_path / "run.mcap", None, Child("plant"), Child("controller", processes.STARTS))
+    start = beginning(tmp_path / "run.mcap", None, Child(), Child())
     time.sleep(0.01)
     start.look()
-    assert re.search(r"waiting  the controller still starts, since \d+ s; Ctrl-C ends it", capsys.readouterr().err)
+    assert re.search(
+        r"waiting  plant, controller and recorder have not connected to each other, since \d+ s; Ctrl-C ends it",
+        capsys.readouterr().err,
+    )
 
 
-def test_the_kernels_left_are_summed_over_all_processes(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(processes, "_REPORT_S", 0.0)
-    plant, controller = (Child(role, processes.COMPILES, (30, 40)) for role in ("plant", "controller"))
+def test_the_kernels_left_are_summed_over_all_processes(tmp_path, capsys):
+    plant, controller = Child((30, 40)), Child((30, 40))
     start = beginning(tmp_path / "run.mcap", None, plant, controller)
     for plant.left, controller.left in (((30, 40), (30, 40)), ((0, 40), (20, 40)), ((0, 40), (0, 40))):
         start.look()
@@ -48,7 +49,7 @@ def test_nothing_is_reported_once_the_log_has_begun(tmp_path, monkeypatch, capsy
     monkeypatch.setattr(processes, "_REPORT_S", 0.0)
     log = tmp_path / "run.mcap"
     log.write_bytes(b"of the run before")
-    start = beginning(log, 0.001, Child("plant"))
+    start = beginning(log, 0.001, Child())
     time.sleep(0.01)
     log.write_bytes(b"of this run, which has begun")
     start.look()
@@ -56,25 +57,21 @@ def test_nothing_is_reported_once_the_log_has_begun(tmp_path, monkeypatch, capsy
 
 
 @pytest.mark.parametrize(
-    ("still", "words"),
-    [
-        (processes.COMPILES, "the plant and the controller still compile after"),
-        (processes.STARTS, "the plant and the controller still start after"),
-        (processes.READY, "have not connected to each other after"),
-    ],
+    ("left", "words"), [(3, "kernels are still compiled"), (0, "have not connected to each other")]
 )
-def test_after_the_longest_wait_the_fault_names_the_processes_that_are_not_ready(tmp_path, still, words):
-    start = beginning(tmp_path / "run.mcap", 0.001, Child("plant", still), Child("controller", still))
+def test_after_the_longest_wait_the_fault_gives_the_reason(tmp_path, left, words):
+    start = beginning(tmp_path / "run.mcap", 0.001, Child((left, 4)), Child())
     time.sleep(0.01)
-    with pytest.raises(Fault, match=rf"NO_PEER: .*{words} .*--wait S"):
+    with pytest.raises(Fault, match=rf"NO_PEER: .*{words} after .*--wait S"):
         start.look()
 
 
 def test_the_kernel_progress_of_a_child_is_read_and_reported(monkeypatch, capsys):
     progress = f"print('stickslip: {PROGRESS}3 of 4 left', file=sys.stderr, flush=True)"
     over = f"print('stickslip: {PROGRESS}0 of 4 left', file=sys.stderr, flush=True)"
-    more = f"print('other', file=sys.stderr); print('stickslip: {LOADED}', file=sys.stderr)"
-    code = f"import sys; sys.stdin.readline(); {progress}; sys.stdin.readline(); {over}; {more}"
+    code = (
+        f"import sys; sys.stdin.readline(); {progress}; sys.stdin.readline(); {over}; print('other', file=sys.stderr)"
+    )
     started = processes.subprocess.Popen
 
     def instead(_words: list[str], **how: Any) -> Any:
@@ -82,18 +79,15 @@ def test_the_kernel_progress_of_a_child_is_read_and_reported(monkeypatch, capsys
 
     monkeypatch.setattr(processes.subprocess, "Popen", instead)
     child = processes.Child("plant", [])
-    assert child.still == processes.STARTS
     child.process.stdin.write("\n")
     child.process.stdin.flush()
     until_s = time.monotonic() + PATIENCE_S
-    while child.still != processes.COMPILES and time.monotonic() < until_s:
+    while not child.left[0] and time.monotonic() < until_s:
         time.sleep(0.01)
-    assert child.still == processes.COMPILES
     assert child.left == (3, 4)
     child.process.stdin.write("\n")
     child.process.stdin.close()
     assert child.process.wait(PATIENCE_S) == 0
     child._reader.join(PATIENCE_S)
-    assert child.still == processes.READY
     assert child.left == (0, 4)
     assert capsys.readouterr().err == ""  # the parent shows the kernels left of all its children

@@ -8,10 +8,8 @@ from pathlib import Path
 import pytest
 
 from cockpit.fleet import work
-from cockpit.fleet.groups import Diagnosed, Failed, fleet_of
-from cockpit.fleet.kept import RESULTS, digest_of, keep, kept
-from cockpit.fleet.page import write_page
-from cockpit.fleet.work import FleetFolder, report_names, with_estimate
+from cockpit.fleet.groups import Failed, fleet_of
+from cockpit.fleet.work import RESULTS, FleetFolder, digest_of, keep, kept, report_names, write_page
 from diagnosis.diagnose_many import FolderFault, FolderResult, find_sources
 from diagnosis.result import Diagnosis, Share
 from tests import made_up
@@ -122,13 +120,13 @@ def test_where_mending_helps_most_comes_first():
     place = Share("breakaway level", "friction that goes with place", 0.73, (0.61, 0.92), 0.3)
     unexplained = TOLD._replace(verdict="unexplained", effects=())
     done = [
-        Diagnosed("fine", TOLD._replace(verdict="no-gap", effects=()), "fine.html"),
-        Diagnosed("p", named("drive-backlash", closes=1.2), "p.html"),
-        Diagnosed("q", named("coulomb-level", closes=0.5), "q.html"),
-        Diagnosed("r", named("coulomb-level", closes=0.8, verdict="partly"), "r.html"),
-        Diagnosed("s", unexplained._replace(shares=(place,)), "s.html"),
-        Diagnosed("t", unexplained._replace(shares=()), "t.html"),
-        Diagnosed("u", named("force-sensor-lag", closes=-0.4), "u.html"),
+        ("fine", TOLD._replace(verdict="no-gap", effects=()), "fine.html"),
+        ("p", named("drive-backlash", closes=1.2), "p.html"),
+        ("q", named("coulomb-level", closes=0.5), "q.html"),
+        ("r", named("coulomb-level", closes=0.8, verdict="partly"), "r.html"),
+        ("s", unexplained._replace(shares=(place,)), "s.html"),
+        ("t", unexplained._replace(shares=()), "t.html"),
+        ("u", named("force-sensor-lag", closes=-0.4), "u.html"),
     ]
     fleet = fleet_of(done, [Failed("v", "BAD_EVIDENCE", "too short")], ["w"])
     assert fleet.folders == 9
@@ -145,13 +143,13 @@ def test_where_mending_helps_most_comes_first():
 
 def test_without_a_fit_the_relations_give_the_share():
     diagnosed = TOLD._replace(verdict="partly", gap=TOLD.gap._replace(shrinkage=None, interval_90=None))
-    (group,) = fleet_of([Diagnosed("rig", diagnosed, "")], [], []).groups
+    (group,) = fleet_of([("rig", diagnosed, "")], [], []).groups
     assert (group.helps, group.rigs[0].interval_90) == (0.73, (0.61, 0.92))
     assert group.rigs[0].size.startswith("spring relation: drive-backlash 73 %")
 
 
 def test_the_page_has_every_rig_and_needs_no_network(tmp_path):
-    done = [Diagnosed("<b>rig 1", TOLD, "b#1.html"), Diagnosed("fine", TOLD._replace(verdict="no-gap", effects=()), "")]
+    done = [("<b>rig 1", TOLD, "b#1.html"), ("fine", TOLD._replace(verdict="no-gap", effects=()), "")]
     write_page(fleet_of(done, [Failed("bad", "BAD_EVIDENCE", "too short")], ["later"]), tmp_path / "index.html")
     text = (tmp_path / "index.html").read_text()
     assert '<a href="b%231.html">&lt;b&gt;rig 1</a>' in text
@@ -163,14 +161,6 @@ def test_a_report_never_takes_the_place_of_the_index():
     assert report_names(["index", "a", "A", "x/a"]) == {
         "index": "index-2.html", "a": "a.html", "A": "A-2.html", "x/a": "x_a.html",
     }  # fmt: skip
-
-
-def test_an_estimate_is_of_the_folders_that_are_left(tmp_path, monkeypatch):
-    clock_s = iter([0.0, 100.0, 400.0, 450.0])
-    monkeypatch.setattr(work.time, "monotonic", lambda: next(clock_s))
-    source = find_sources([made_up.evidence_folder(tmp_path / "a")])[0]
-    texts = [text for _, text in with_estimate(iter([FolderResult(source, None, None)] * 3), 3)]
-    assert texts == ["about 3 min left", "about 3 min left", ""]
 
 
 def test_the_index_as_json_is_the_same(tmp_path):

@@ -118,6 +118,7 @@ def test_with_a_file_the_words_stay_on_stdout(arguments: list[str]) -> None:
         ("run.mcap/x.json", "LOG_WRITE", "run.mcap/x.json: cannot be written"),
         ("folder.json", "CONFIG", "--json folder.json: must be a file, not a folder"),
         ("run.mcap", "CONFIG", "--json=run.mcap: must be - for stdout or end in .json"),
+        ("run.verdict.json", "CONFIG", "--json=run.verdict.json: is named like the verdict of a log"),
         ("", "CONFIG", "--json=.: must be - for stdout or end in .json"),
     ],
 )

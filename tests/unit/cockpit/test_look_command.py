@@ -320,7 +320,7 @@ LVM = (
         ("labels.lvm", LVM + "X_Value\tFriction\tComment\n", "\t{kN:.8f}\t\n", "line 4 holds units: kN"),
         ("asked.csv", "t [s],F_soll [N],F_ist [N]\n", "{t:.4f},{ms:.0f},{N:.6f}\n", "force = 'F_ist [N]' by its name"),
         ("datenum.csv", "time,F\n", "{day:.10f},{N:.6f}\n", "is a calendar time in steps of 86400 s"),
-        ("french.csv", "Temps [ms];Effort [N]\n", "{ms:.0f};{N:.6f}\n", "rises in even steps of a unit of time"),
+        ("french.csv", "Temps [ms];Effort [N]\n", "{ms:.0f};{N:.6f}\n", "rises evenly and has a unit of time"),
         ("traction.tsv", "Test Time (s)\tTraction Coeff (-)\n", "{t:.4f}\t{N:.6f}\n", "is a coefficient"),
     ],
 )

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from bridge.log.logfile import RunData, read_run
-from bridge.log.pause_events import CORE_PAUSE, NOT_WATCHED, PAUSE, WATCH, in_words
+from bridge.log.watches.event_watch import CORE_PAUSE, NOT_WATCHED, PAUSE, WATCH, in_words
 from bridge.results import strict_json
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import APPLIED
 from cockpit.judge.pauses import Pauses, computer_in_words, pauses_in_words
-from cockpit.run.progress import progress_line
+from cockpit.run.processes import progress_line
 from tests.logs import short_log, verdict_of
 
 BLOCKS, MS = 1000, 1_000_000
@@ -145,7 +145,7 @@ def test_the_verdict_reports_stalls_in_text_and_json(run: RunData, tmp_path: Pat
     assert pauses_in_words(verdict.pauses)[0].startswith("stalls   every core stalled 2 times (13.1 ms in total, ")
     assert strict_json(verdict)["pauses"]["number"] == 2
     assert pauses_in_words(pauses_of(run, applied)) == [
-        "stalls   none of every core; 2 commands later than 1 ms outside of them (0.20 %)"
+        "stalls   no stall of all cores at once; 2 commands later than 1 ms outside of them (0.20 %)"
     ]
     assert computer_in_words(verdict.computer, "") == (
         "computer stalled 2 times, longest 12.0 ms (every core, at 0.90 s)"

@@ -11,7 +11,7 @@ from bridge.wire.messages import APPLIED, GAP, LATE, STALE, TRACE
 from bridge.wire.stickslip_pb2 import EXCITE
 from cockpit.judge.ratio_watch import MOST_ABOVE_S, RatioVerdict, RatioWatch
 from cockpit.judge.setup import Setup
-from cockpit.judge.window import APPLIED_ROW, COMMAND_ROW, TRACE_ROW, JudgedBlocks, Window, rows_of
+from cockpit.judge.window import APPLIED_ROW, TRACE_ROW, JudgedBlocks, Window, rows_of
 from tests.logs import verdict_of
 
 GOLDEN = Path(__file__).parents[2] / "golden"
@@ -35,7 +35,7 @@ def watched(applied: Any, trace: Any, per_window: int = 2500) -> RatioVerdict:
     """Watch the ratio in windows of `per_window` blocks, each with its neighbouring blocks."""
     watch, count = RatioWatch(SETUP), len(trace)
     blocks = JudgedBlocks(*(np.asarray(trace["sequence"]), np.asarray(trace["t_ns"]), *[np.empty(0)] * 5))
-    rows = rows_of(trace, TRACE_ROW), rows_of(applied, APPLIED_ROW), np.empty(0, COMMAND_ROW)
+    rows = rows_of(trace, TRACE_ROW), rows_of(applied, APPLIED_ROW)
     for first in range(0, count, per_window):
         end = min(first + per_window, count)
         watch.add(Window(blocks, *rows, first, end, 0, False, 0, is_last=end == count))

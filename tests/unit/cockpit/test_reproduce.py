@@ -16,7 +16,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.nightly]
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
     path = tmp_path_factory.mktemp("reproduce") / "reproduce.html"
-    return reproduce(path, progress=False), path.read_text(encoding="utf-8")
+    return reproduce(path), path.read_text(encoding="utf-8")
 
 
 def test_every_check_holds(report):

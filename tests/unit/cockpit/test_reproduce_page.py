@@ -17,7 +17,7 @@ CLAIM = PaperRow("the slips fade", "5 N < 6 N", "smaller", True)
 @pytest.fixture
 def runs(monkeypatch: pytest.MonkeyPatch) -> dict[Any, Any]:
     """Two runs with the numbers that the text of the page has, and one picture in place of the seven."""
-    monkeypatch.setattr(plots, "figures", lambda _: [plots.PageFigure("Figure 2", "without vibration", "AAAA")])
+    monkeypatch.setattr(page, "figures", lambda _: [plots.PageFigure("Figure 2", "without vibration", "AAAA")])
     course = SimpleNamespace(t_s=np.array([9.0, 15.0]), drive_force_N=np.array([20.0, 13.5]))
     run = SimpleNamespace(course=course, mean=SimpleNamespace(period_s=2.0), scatter=SimpleNamespace(period_s=0.05))
     return {("C45-C45 @ 0.063", frequency_Hz): run for frequency_Hz in (1000, 5000)}

@@ -15,19 +15,12 @@ from cockpit.cli import app
 from cockpit.judge.judged import judge
 from cockpit.judge.phases import Phase
 from cockpit.judge.verdict_words import headline
-from cockpit.review.differences import parameters_of
+from cockpit.review.data import parameters_of
 from cockpit.review.page import write_review
 from tests.logs import Tables, doctored, short_log, tables_of, write
 from tests.unit.cockpit.test_figures import sawtooth_log
 
 MOST_BYTES = 5e6
-
-
-@pytest.fixture
-def log(tmp_path: Path) -> Path:
-    path = tmp_path / "run.mcap"
-    path.write_bytes(short_log())
-    return path
 
 
 def call(*arguments: str | Path):
@@ -139,7 +132,7 @@ def test_a_log_without_a_block_and_a_third_log(tmp_path: Path, log: Path) -> Non
 def test_a_verdict_is_not_listed_as_a_parameter(log: Path) -> None:
     run = read_run(log)
     run.headers["verdict"] = {"good": "true"}
-    assert not any(key.startswith("verdict") for key in parameters_of(run))
+    assert not any(row["key"].startswith("verdict") for row in parameters_of([run])["parameters"])
 
 
 def test_the_answer_explains_why_a_run_without_a_slip_is_not_good(tmp_path: Path) -> None:

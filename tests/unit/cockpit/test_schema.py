@@ -14,8 +14,7 @@ from typer.testing import CliRunner
 from bridge.results import in_json, strict_json
 from cockpit.cli import app
 from cockpit.commands import diagnose_output
-from cockpit.commands.as_json.schemas import FORMATS, JSON, TOML
-from cockpit.commands.as_json.types import schema_of
+from cockpit.commands.as_json.schemas import FORMATS, JSON, TOML, schema_of
 from cockpit.run.scenario_file import deploy_folder
 from diagnosis import diagnose_many as many
 from plant.effects.library import EFFECTS
@@ -151,6 +150,7 @@ def test_a_diagnosis_fits_and_one_more_key_does_not(tmp_path: Path) -> None:
         ("log-recover-result", ["log", "recover", "run.mcap"]),
         ("log-export-result", ["log", "export", "run.mcap", "--to", "x.csv"]),
         ("scenarios-result", ["scenarios"]),
+        ("scenarios-result", ["scenarios", "--copy", "stop-and-go"]),
         ("explain-result", ["explain"]),
         ("schema-result", ["schema"]),
         ("fault", ["log", "info", "no.mcap"]),

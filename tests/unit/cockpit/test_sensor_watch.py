@@ -15,11 +15,10 @@ from bridge.log.check.channel import channels_of
 from bridge.log.logfile import RunData, read_run
 from cockpit.judge import judged
 from cockpit.judge.judged import judge_log
-from cockpit.judge.relations import ChannelRelations
-from cockpit.judge.sensor_watch import SensorVerdict
+from cockpit.judge.sensor_watch import ChannelRelations, SensorVerdict
 from cockpit.judge.setup import described
 from cockpit.judge.verdict_words import in_words
-from cockpit.judge.window import APPLIED_ROW, COMMAND_ROW, TRACE_ROW, JudgedBlocks, Window
+from cockpit.judge.window import APPLIED_ROW, TRACE_ROW, JudgedBlocks, Window
 from plant.config import SensorsConfig
 from tests.channel_edits import edited, edits_of
 from tests.logs import verdict_of
@@ -237,9 +236,7 @@ def codes_of(step_m: float = 0.0, **columns: Any) -> list[str]:
         )
     rig = {"sensors": SensorsConfig(position_resolution_m=step_m).model_dump(), "drive": {"stiffness_N_per_m": 1.2e4}}
     relations = ChannelRelations(described({"rig": rig}, {}), 1e-3)
-    relations.add(
-        Window(blocks, np.zeros(0, TRACE_ROW), applied, np.zeros(0, COMMAND_ROW), 0, count, 0, False, 0, is_last=True)
-    )
+    relations.add(Window(blocks, np.zeros(0, TRACE_ROW), applied, 0, count, 0, False, 0, is_last=True))
     return [doubt.code for doubt in relations.doubts()]
 
 

@@ -23,7 +23,7 @@ from tests.logs import tables_of, write
 from tests.system.ports import free_endpoint
 
 
-def soaked(folder: Path, lost: int = 0, thin_out: bool = False) -> Soaked:
+def soaked(folder: Path, lost: int = 0, thin_out: bool = False, damaged: bool = False) -> Soaked:
     """Of a log of 1.2 s in several files, the last of which is judged at the end; its commands take 0.3 ms, each 100th 2 ms."""
     log = folder / "soak.mcap"
     whole = folder / "whole.mcap"
@@ -40,6 +40,10 @@ def soaked(folder: Path, lost: int = 0, thin_out: bool = False) -> Soaked:
     assert len(parts_of(log)) > 2
     watch = soak._Watch(BusConfig(endpoint=free_endpoint()), 20.0, log, thin_out, lambda _share: None)
     watch._period_s = 0.5
+    if damaged:
+        data = bytearray(parts_of(log)[1].read_bytes())
+        data[len(data) // 2] ^= 1
+        parts_of(log)[1].write_bytes(data)
     watch._judge_files(still_open=1)
     watch._memory["recorder"] = [(t_s, 100.0 + 2.0 * t_s / 3600.0) for t_s in range(20)]
     return watch.result("belt", interrupted=False)
@@ -68,6 +72,12 @@ def test_a_complete_soak_without_a_loss_is_good(tmp_path: Path) -> None:
     assert came.good
     assert not came._replace(interrupted=True).good
     assert [path.name for path in sorted(tmp_path.glob("soak*"))] == ["soak.mcap"]  # the others were judged and deleted
+
+
+def test_damage_of_a_file_before_the_last_is_in_the_verdict(tmp_path: Path) -> None:
+    came = soaked(tmp_path, damaged=True)
+    assert came.verdict.checksums.damaged == ["soak-0001.mcap"]
+    assert not came.good
 
 
 def test_a_soak_is_judged_as_its_log_is(tmp_path: Path) -> None:

@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 
 from controller.config import ControllerConfig
-from controller.loop_design import margins
 from controller.records import build
+from tests.unit.controller.loop_design import margins
 
 
 def shares(block_s: float) -> tuple[float, float, float]:

@@ -364,7 +364,7 @@ def test_a_jump_of_the_clock_is_reported() -> None:
     bus.leave()
     controller.loop(threading.Event(), "")
     assert bus.codes() == ["START", "CLOCK", "END"]
-    assert "sensors: block 10: t_ns is 3.6e+06 ms off the block number" in bus.events()[1].text
+    assert "sensors: block 10: t_ns is 3.6e+06 ms off the time that the block number gives" in bus.events()[1].text
 
 
 def test_a_flood_of_stops_is_applied_and_answered_sparsely() -> None:

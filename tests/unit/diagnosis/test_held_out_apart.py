@@ -32,12 +32,11 @@ def test_nothing_leaks_from_the_held_out_run(monkeypatch: pytest.MonkeyPatch) ->
         "trials": lambda _: [],
         "retuned_rig": retuned,
         "Contest": lambda *_: contest,
-        "_known": lambda _: None,
         "borne_out": borne_out,
     }.items():
         monkeypatch.setattr(diagnose, name, stand_in)
     evidence = SimpleNamespace(rig=None, runs=[], assumed=())
-    seen = SimpleNamespace(runs=runs, relations=None, decision=None)
+    seen = SimpleNamespace(runs=runs, relations=SimpleNamespace(answered=()), decision=SimpleNamespace(outside=()))
     with pytest.raises(EOFError):
         diagnose._by_fits(evidence, seen, lambda *_: None, 1, (0.0, 1.0))
     assert fitted == ["run-0", "run-1", "run-3"]

@@ -5,7 +5,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from diagnosis import diagnose
-from diagnosis.processes import each
+from diagnosis.processes import each, spread
 from tests.patience import PATIENCE_S
 
 
@@ -38,6 +38,16 @@ def test_so_have_its_workers(monkeypatch):
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         monkeypatch.setenv(name, "2")
     assert each(2, seen, None, [0, 0]) == [{1}, {1}]
+
+
+@pytest.mark.parametrize("jobs", [1, 3])
+def test_spread_work_keeps_the_order_of_its_items(jobs):
+    assert spread(jobs, _doubled, 2, range(7)) == [0, 2, 4, 6, 8, 10, 12]
+    assert spread(jobs, _doubled, 2, []) == []
+
+
+def _doubled(factor, items):
+    return [factor * item for item in items]
 
 
 @pytest.mark.timeout(PATIENCE_S)

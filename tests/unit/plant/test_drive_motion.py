@@ -23,7 +23,7 @@ from plant.drive_motion import (
     velocity_mps,
 )
 from plant.inputs import RigInputs
-from plant.simulate import drive_velocity_mps, simulate
+from plant.simulate import held_velocity, simulate
 
 BLOCK_S = 1e-3
 TWO_SIDED = ["rig.sensors.force_lowest_N=-50.0", "rig.sensors.position_lowest_m=-0.05"]
@@ -101,13 +101,13 @@ def test_the_reach_covers_every_moment(points: list[tuple[float, float]], until_
 def test_a_profile_that_comes_once_is_held_as_it_always_was() -> None:
     config = load_rig("paper-c45-c45", ["drive.profile=[[0.5, 0.0], [1.0, 0.002], [2.0, -0.001]]"])
     t_s = np.arange(3000) * BLOCK_S
-    assert np.array_equal(drive_velocity_mps(config, t_s), np.interp(t_s, [0.5, 1.0, 2.0], [0.0, 0.002, -0.001]))
+    assert np.array_equal(held_velocity(config)(t_s), np.interp(t_s, [0.5, 1.0, 2.0], [0.0, 0.002, -0.001]))
 
 
 def test_moves_are_held_so_that_the_places_at_the_ends_of_blocks_are_exact() -> None:
     config = load_rig("paper-c45-c45", [f"drive.moves=[{THERE}, {BACK}]", "drive.repeat_every_s=7.0"])
     motion = config.drive.motion()
-    held = drive_velocity_mps(config, np.arange(7000) * BLOCK_S)
+    held = held_velocity(config)(np.arange(7000) * BLOCK_S)
     ends_s = (np.arange(7000) + 1) * BLOCK_S
     assert np.cumsum(held) * BLOCK_S == pytest.approx(position_m(motion, ends_s), abs=1e-14)
     assert motion.drift_m == 0.0
@@ -120,8 +120,8 @@ def test_a_day_of_cycles_ends_where_it_began_and_costs_no_memory() -> None:
     config = load_rig("paper-c45-c45", [f"drive.moves=[{THERE}, {BACK}]", "drive.repeat_every_s=6.7001"])
     cycles = round(86_400 / 6.7001)
     at_s = cycles * 6.7001 + np.arange(6700) * BLOCK_S
-    first = drive_velocity_mps(config, np.arange(6700) * BLOCK_S)
-    assert drive_velocity_mps(config, at_s) == pytest.approx(first, abs=1e-9)
+    first = held_velocity(config)(np.arange(6700) * BLOCK_S)
+    assert held_velocity(config)(at_s) == pytest.approx(first, abs=1e-9)
     assert position_m(config.drive.motion(), np.array([cycles * 6.7001]))[0] == pytest.approx(0.0, abs=1e-12)
     inputs = RigInputs(config, 1)
     inputs._block = 86_400_000
@@ -131,7 +131,7 @@ def test_a_day_of_cycles_ends_where_it_began_and_costs_no_memory() -> None:
 def test_a_repeated_profile_restarts() -> None:
     stroke = "drive.profile=[[0.0, 0.0], [0.1, 0.002], [0.9, 0.002], [1.1, -0.002], [1.9, -0.002], [2.0, 0.0]]"
     config = load_rig("paper-c45-c45", [stroke, "drive.repeat_every_s=2.5"])
-    held = drive_velocity_mps(config, np.arange(7500) * BLOCK_S).reshape(3, 2500)
+    held = held_velocity(config)(np.arange(7500) * BLOCK_S).reshape(3, 2500)
     assert held[1] == pytest.approx(held[0], abs=1e-12)
     assert held[2] == pytest.approx(held[0], abs=1e-12)
     assert (np.abs(held[:, 2000:]) < 1e-12).all()

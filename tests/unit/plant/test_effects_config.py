@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from bridge.faults import Fault
-from plant.config import load_rig
-from plant.effects.library import EFFECTS, checked, first_form
+from cockpit.run.scenario import load_rig
+from plant.effects.library import EFFECTS, checked
 from plant.records import build
 from plant.simulate import simulate
 
@@ -28,7 +28,7 @@ CONTACT = '[contact]\npair = "C45-C45 @ 0.063"\n'
 def loaded(tmp_path: Path, text: str):
     path = tmp_path / "rig.toml"
     path.write_text(CONTACT + text)
-    return load_rig(path)
+    return load_rig(str(path), [])
 
 
 def test_every_name_is_there():
@@ -56,7 +56,7 @@ def test_every_name_is_there():
 )
 def test_effects_with_more_than_one_formula(name: str, forms: list[str]):
     assert list(EFFECTS[name].forms) == forms
-    assert first_form(name) == forms[0]
+    assert checked(name, {})["form"] == forms[0]
 
 
 @pytest.mark.parametrize("name", NAMES)

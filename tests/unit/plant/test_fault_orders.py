@@ -8,7 +8,6 @@ import pytest
 
 from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
-from plant.faults.orders import Orders
 from plant.faults.schedule import Faults
 from plant.records import PARAMS
 
@@ -27,9 +26,8 @@ OFF = {"kind": "off", "target": "drive_force_N", "for_s": 0.002}
 
 def test_an_order_acts_from_its_block_on_and_is_taken_once() -> None:
     made = faults()
-    orders = Orders(made)
     for _ in range(3):
-        orders.take(order(OFF, id="a"), 5)
+        made.take(order(OFF, id="a"), 5)
     reported: list[str] = []
     for block in range(4, 9):
         made.begin_block(block)
@@ -39,11 +37,10 @@ def test_an_order_acts_from_its_block_on_and_is_taken_once() -> None:
 
 def test_clear_ends_present_and_future_faults() -> None:
     made = faults()
-    orders = Orders(made)
-    orders.take(order(OFF | {"for_s": 0.0}, id="a"), 1)
-    orders.take(order(OFF | {"from_s": 1.0}, id="b"), 1)
+    made.take(order(OFF | {"for_s": 0.0}, id="a"), 1)
+    made.take(order(OFF | {"from_s": 1.0}, id="b"), 1)
     made.begin_block(1)
-    orders.take(wire.Inject(clear=True, id="c").SerializeToString(), 2)
+    made.take(wire.Inject(clear=True, id="c").SerializeToString(), 2)
     made.begin_block(2)
     assert [code for code, _ in made.news()] == ["INJECTED", "INJECTION_ENDED"]
     assert not made.busy
@@ -66,5 +63,5 @@ def test_clear_ends_present_and_future_faults() -> None:
 def test_an_invalid_order_is_refused(payload: bytes, line: str) -> None:
     made = faults()
     with pytest.raises(Fault, match=line):
-        Orders(made).take(payload, 1)
+        made.take(payload, 1)
     assert not made.busy

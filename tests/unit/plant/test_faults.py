@@ -13,7 +13,7 @@ from bridge.wire.channels import CHANNELS
 from bridge.wire.messages import sensor_block
 from plant.config import RigConfig
 from plant.faults.exciter import FIELDS
-from plant.faults.kinds import ALL, SENSORS
+from plant.faults.kinds import KINDS, SENSORS
 from plant.faults.line import Message
 from plant.faults.schedule import BEGAN, ENDED, Faults
 from plant.faults.table import FaultTable
@@ -259,7 +259,7 @@ def test_an_invalid_table_is_refused_with_the_reason(given: dict[str, Any], line
 
 
 def test_every_kind_of_a_sensor_is_made() -> None:
-    for kind in ALL:
+    for kind in KINDS.values():
         if kind.group == SENSORS:
             more = {"other": "mass_accel_mps2"} if kind.kind == "swapped" else {}
             value = {"value": 0.5} if kind.value else {}

@@ -347,11 +347,11 @@ def test_changed_answers_and_evidence_are_refused(done):
     table = json.loads(whole)
     table["cases"][name]["answer"]["group"] = ["drive-damping"]
     key.write_text(json.dumps(table))
-    refused("the answer is not the one that was sealed")
+    refused("the answer was changed after it was sealed")
     table = json.loads(whole)
     table["cases"][name]["nonce"] = "00" * 16
     key.write_text(json.dumps(table))
-    refused("the answer is not the one that was sealed")
+    refused("the answer was changed after it was sealed")
     table = json.loads(whole)
     del table["cases"][name]
     key.write_text(json.dumps(table))
@@ -359,7 +359,7 @@ def test_changed_answers_and_evidence_are_refused(done):
     key.write_text(whole)
     with (done / "set" / name / "run-01.csv").open("a") as file:
         file.write("1.0,15.0\n")
-    refused("the evidence is not the one that was sealed")
+    refused("the evidence was changed after it was sealed")
 
 
 @pytest.mark.slow

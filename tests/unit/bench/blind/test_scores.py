@@ -96,7 +96,7 @@ def test_scores_by_hand():
     assert "coulomb-level -> drive-backlash" in text
     marked = [line.split("  ")[0] for line in text.splitlines() if "missed" in line]
     assert "top-1, 2 limits or more" in marked
-    assert "mean group size, same" not in marked
+    assert "group size, 2 limits or more" not in marked
     assert strict_json({"diagnosis": scores})["diagnosis"]["visible"]["top_1"]["n"] == 4
 
 

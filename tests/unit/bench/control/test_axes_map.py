@@ -51,10 +51,10 @@ def test_each_run_is_drawn_in_the_panel_of_its_noise() -> None:
             run("no-drop-stiff"),  # never sticks: no point
         ],
     )
-    assert [(point.name, point.panel, point.came) for point in drawn_points] == [
+    assert [(point.name, point.panel, point.outcome) for point in drawn_points] == [
         ("pair-c45-0.5", 0, "clean"),
         ("noise-both", 1, "slips or surges"),
-        ("blind-screw", 2, "says BLIND"),
+        ("blind-screw", 2, "reports BLIND"),
     ]
     assert drawn_points[0].slowest_mps == drawn_points[0].fastest_mps == 5e-4
     assert drawn_points[0].stiffness_per_m == pytest.approx(11700.0 / 2.89, rel=2e-3)

@@ -33,10 +33,10 @@ def test_in_words_it_gives_the_counts() -> None:
     words = Oracle(LIMIT, 3, 3, math.inf).in_words(4)
     assert (
         words
-        == f"{LIMIT} (4 here, 3 for an oracle vibrating at once, 3 if it knows v_d early; best at the whole stroke)"
+        == f"{LIMIT} (controller: 4, oracle vibrating at once: 3, 3 if it knows v_d early; best at the whole stroke)"
     )
     assert (
-        Oracle(MISSED, 0, 0, 1.2).in_words(1).endswith("(1 here, 0 for an oracle vibrating at once; best at 1.2 v_d)")
+        Oracle(MISSED, 0, 0, 1.2).in_words(1).endswith("(controller: 1, oracle vibrating at once: 0; best at 1.2 v_d)")
     )
 
 

@@ -93,22 +93,24 @@ def test_hours_come_in_stretches_and_every_seed_gives_its_own_run() -> None:
 
 def test_figures_count_from_when_the_exciter_can_have_come() -> None:
     late = NAMED["late-3.2"]
-    none = figures(late, "none", run(late, rules.NONE), ours=False)
+    none = figures(late, "none", run(late, rules.NONE), is_controller=False)
     assert none.slips == none.slips_from_enabling == 16
-    moving = figures(late, "moving", run(late, rules.MOVING), ours=False)
+    moving = figures(late, "moving", run(late, rules.MOVING), is_controller=False)
     assert (moving.slips, moving.surges) == (0, 0)
     assert moving.energy_ratio == pytest.approx(1.44, rel=0.03)
 
 
 def test_who_leaves_an_axis_alone_without_a_word_is_found() -> None:
     screw = NAMED["stiff-20"]
-    assert any(line.startswith(SILENT) for line in figures(screw, "none", run(screw, rules.NONE), ours=True).failures)
-    assert figures(screw, "moving", run(screw, rules.MOVING), ours=True).failures == []
+    assert any(
+        line.startswith(SILENT) for line in figures(screw, "none", run(screw, rules.NONE), is_controller=True).failures
+    )
+    assert figures(screw, "moving", run(screw, rules.MOVING), is_controller=True).failures == []
     # one slip at the end is not that
     late = run(NAMED["late-3.2"], rules.MOVING)
     one = np.array([[record.SLIPPED, 19.0, 19.04, 40.0, 0.0, 0.0, 0.02]])
     lines = figures(
-        NAMED["late-3.2"], "made", late._replace(events=np.concatenate([late.events, one])), ours=True
+        NAMED["late-3.2"], "made", late._replace(events=np.concatenate([late.events, one])), is_controller=True
     ).failures
     assert lines[0].startswith("1 slips")
     assert not any(line.startswith(SILENT) for line in lines)
@@ -117,7 +119,11 @@ def test_who_leaves_an_axis_alone_without_a_word_is_found() -> None:
 def test_a_blind_controller_reports_it_or_vibrates_while_it_moves() -> None:
     def lines(name: str, rule: int) -> list[str]:
         scenario = NAMED[name]
-        return [line for line in figures(scenario, "made", run(scenario, rule), ours=True).failures if "BLIND" in line]
+        return [
+            line
+            for line in figures(scenario, "made", run(scenario, rule), is_controller=True).failures
+            if "BLIND" in line
+        ]
 
     assert lines("blind-heavy", rules.NONE) == ["BLIND never reported; within 1.00 s"]
     assert lines("blind-heavy", rules.CONSTANT) == []

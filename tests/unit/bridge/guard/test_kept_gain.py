@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.guard.kept_gain import KeptGain
+from bridge.guard.kept import KeptGain
 
 TONES_HZ = [1000.0, 2000.0]
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.guard.latch import StopLatch
+from bridge.guard.kept import StopLatch
 
 
 @pytest.fixture(autouse=True)

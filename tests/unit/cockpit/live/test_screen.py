@@ -2,7 +2,6 @@
 
 import collections
 
-import pytest
 from rich.console import Console
 
 from bridge.wire import stickslip_pb2 as wire
@@ -17,11 +16,6 @@ def shown(view: View, events: collections.deque[EventRow]) -> str:
     with console.capture() as caught:
         console.print(screen_of(view.now(), events, console.height))
     return caught.get()
-
-
-@pytest.fixture
-def rig() -> Rig:
-    return Rig()
 
 
 def test_a_live_rig_is_described_in_words(rig: Rig) -> None:

@@ -13,12 +13,11 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from bridge.faults import Fault
 from bridge.wire.bus_config import BusConfig
-from cockpit.live import operator_link, server, viewers
-from cockpit.live.gate import refusal
+from cockpit.live import operator_link, server
 from cockpit.live.operator import CommandOutcome
-from cockpit.live.page import Page
+from cockpit.live.operator_link import kept_token
+from cockpit.live.page import Page, refusal
 from cockpit.live.server import Server, listening
-from cockpit.live.token import kept_token
 from tests.patience import PATIENCE_S
 from tests.system.ports import free_endpoint
 from tests.unit.cockpit.live.made import table_of_frame
@@ -160,7 +159,7 @@ def test_a_thirteenth_page_sees_nothing_and_may_stop(port: int, monkeypatch: pyt
     monkeypatch.setattr(operator_link, "send_command", apply_order)
 
     async def look() -> None:
-        pages = [await page_of(port) for _ in range(viewers.MOST_VIEWERS)]
+        pages = [await page_of(port) for _ in range(server.MOST_VIEWERS)]
         async with page_of(port) as late:
             assert "close one" in (await next_of(late, "full"))["line"]
             await late.send('{"word": "STOP"}')
@@ -289,7 +288,7 @@ def test_a_slow_reader_is_dropped_and_the_others_go_on(monkeypatch: pytest.Monke
             self.got += 1
 
     async def look() -> None:
-        all_of_them = viewers.Viewers()
+        all_of_them = server.Viewers()
         slow, quick = Socket("slow", False), Socket("quick", True)
         async with all_of_them.added(slow, [b""]), all_of_them.added(quick, [b""]):  # type: ignore[arg-type]
             for _ in range(200):

@@ -10,16 +10,6 @@ from tests.unit.cockpit.live.made import SAMPLES, Rig
 BLOCKS = round((BEFORE_S + AFTER_S) * 1e3)
 
 
-@pytest.fixture
-def rig() -> Rig:
-    return Rig()
-
-
-@pytest.fixture
-def view(rig: Rig) -> View:
-    return View(rig, "tcp/127.0.0.1:7447", rig.clock)
-
-
 def go_on(rig: Rig, view: View, blocks: range, slips_from: dict[int, int], force=lambda number: 1.0 * number):
     """Blocks in steps of 50, as a server takes them; every capture on the way."""
     slips_caught, slips = [], 0

@@ -10,19 +10,9 @@ from bridge.wire.messages import APPLIED, TRACE, sensor_block
 from bridge.wire.topics import SENSORS
 from cockpit.figures.signals import PANELS
 from cockpit.live.buckets import COLUMNS
-from cockpit.live.frames import frame
+from cockpit.live.server import frame
 from cockpit.live.view import View
 from tests.unit.cockpit.live.made import BLOCK_NS, GONE, Rig, column, table_of_frame
-
-
-@pytest.fixture
-def rig() -> Rig:
-    return Rig()
-
-
-@pytest.fixture
-def view(rig: Rig) -> View:
-    return View(rig, "tcp/127.0.0.1:7447", rig.clock)
 
 
 def test_a_bucket_has_the_smallest_mean_and_largest_sample(rig: Rig, view: View) -> None:
@@ -195,7 +185,7 @@ def test_latency_is_counted_in_bars(rig: Rig, view: View) -> None:
     assert latency is not None
     assert sum(latency["counts"]) == 100
     assert len(latency["edges_us"]) == len(latency["counts"]) + 1
-    assert view.run.tally.percentile_us(0.5) == pytest.approx(100.0, rel=0.005)
+    assert view.run.tally.latency_us.quantile(0.5) == pytest.approx(100.0, rel=0.005)
     assert view.now()["lost"]["late"] == 1
 
 

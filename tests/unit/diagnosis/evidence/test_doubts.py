@@ -13,10 +13,10 @@ import pytest
 
 from bridge.faults import Fault
 from diagnosis.evidence.folder import load_evidence, read_columns
-from diagnosis.synthetic.folder import Case
 from tests.evidence_folder import MANIFEST, Columns, columns, folder, kinds
 from tests.logs import short_log
 from tests.made_evidence import made_evidence
+from tests.made_protocols import case_of
 
 
 def spike_of_nan(data: Columns) -> None:
@@ -307,7 +307,7 @@ def test_a_mapped_column_that_one_run_lacks_is_reported_and_one_that_all_lack_is
 
 @pytest.fixture(scope="module")
 def measured() -> Path:
-    return made_evidence(Case("short", {}), 1)
+    return made_evidence(case_of("short"), 1)
 
 
 @pytest.mark.parametrize(

@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 
 from diagnosis.experiments.candidate_runs import plans
-from diagnosis.experiments.checks_by_hand import advice
-from diagnosis.experiments.proposal import next_experiment
+from diagnosis.experiments.proposal import advice, next_experiment
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.fits.gauss_newton import Fitter
-from diagnosis.gap.floor import floor_of, replicates
+from diagnosis.gap.measure import floor_of, replicates
 from diagnosis.gap.problem import Problem
+from diagnosis.hypotheses.catalogue import trials
 from diagnosis.hypotheses.nuisances import Nuisances
-from diagnosis.hypotheses.trials import trials
 from diagnosis.model.rig import Roughness
 from plant.effects.library import EFFECTS
 from tests.prepared import prepared

@@ -10,12 +10,11 @@ from diagnosis.fits.batch import together
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.fits.screening import screened
 from diagnosis.fits.search import refitted
-from diagnosis.gap.floor import Floor, floor_of, replicates
-from diagnosis.gap.measure import differences, gap
+from diagnosis.gap.measure import Floor, differences, floor_of, gap, replicates
 from diagnosis.gap.prepare import prepare
 from diagnosis.gap.problem import Problem
+from diagnosis.hypotheses.catalogue import trials
 from diagnosis.hypotheses.nuisances import Nuisances
-from diagnosis.hypotheses.trials import trials
 from diagnosis.model.rig import Roughness
 from tests.real.evidences import AXIS, MISSING, axis
 

@@ -11,17 +11,15 @@ import pytest
 
 from bridge.faults import Fault
 from diagnosis.evidence.folder import load_evidence
-from diagnosis.gap.floor import floor_of, replicates
-from diagnosis.gap.measure import differences, gap
+from diagnosis.gap.measure import differences, floor_of, gap, replicates
 from diagnosis.gap.prepare import Prepared, prepare
 from diagnosis.gap.problem import Point, Problem
-from diagnosis.hypotheses.axis_waves import axis_waves
 from diagnosis.hypotheses.nuisances import Nuisances
+from diagnosis.hypotheses.waves import axis_waves
 from diagnosis.model.rig import Effects, Roughness
-from diagnosis.model.sensor_chain import SensorChain, sensed
-from diagnosis.model.true_force import relative, true_commands
-from diagnosis.synthetic.folder import Case
+from diagnosis.model.sensor_chain import SensorChain, relative, sensed, true_commands
 from tests.made_evidence import made_evidence
+from tests.made_protocols import case_of
 
 ROUGH = Roughness(0.003, 2e-4, 0)
 WAVE: Effects = {"position-dependent-friction": {"form": "wave", "ratio": 0.05, "wavelength_m": 0.02, "phase_rad": 1.0}}
@@ -30,7 +28,7 @@ GAIN: Effects = {"force-sensor-gain": {"form": "", "ratio": 0.05}}
 
 def made(effects: Effects) -> tuple[Problem, list[Prepared], Point]:
     """The fitted runs of an axis with the described parameters and these effects."""
-    evidence = load_evidence(made_evidence(Case("force", effects=effects, drawn=False), seed=5))
+    evidence = load_evidence(made_evidence(case_of("force", effects, drawn=False), seed=5))
     runs = [run for run in prepare(evidence) if not run.holdout]
     nuisances = Nuisances(evidence.rig)
     return Problem(evidence.rig, runs), runs, nuisances.point(np.zeros(len(nuisances)), {})
@@ -96,7 +94,7 @@ def test_the_true_force_yields_the_measured_force_through_the_sensor(
 
 def test_an_axis_that_barely_moves_is_refused(plain: tuple[Problem, list[Prepared], Point], tmp_path: Path) -> None:
     """It rests for all but the last 0.3 s."""
-    shutil.copytree(made_evidence(Case("force", drawn=False), seed=5), tmp_path / "rests")
+    shutil.copytree(made_evidence(case_of("force", drawn=False), seed=5), tmp_path / "rests")
     file = tmp_path / "rests" / "run-01.parquet"
     table = pq.read_table(file)
     position_m = table["mass_position_m"].to_numpy().copy()

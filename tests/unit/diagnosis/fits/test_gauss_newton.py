@@ -9,11 +9,11 @@ import pytest
 from diagnosis.fits.batch import together
 from diagnosis.fits.fit import step_within
 from diagnosis.fits.gauss_newton import FAR_KNEE, Fitter
-from diagnosis.gap.floor import KNEE, floor_of, replicates
+from diagnosis.gap.measure import KNEE, floor_of, replicates
 from diagnosis.gap.problem import OutOfTimeError, Problem
+from diagnosis.hypotheses.catalogue import trials
 from diagnosis.hypotheses.hypothesis import NOTHING
 from diagnosis.hypotheses.nuisances import Nuisances
-from diagnosis.hypotheses.trials import trials
 from diagnosis.model.rig import Roughness
 from tests.prepared import fitter_of, prepared
 

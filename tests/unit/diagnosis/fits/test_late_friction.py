@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from diagnosis.fits.late_friction import late_starts
-from diagnosis.hypotheses.trials import trials
+from diagnosis.hypotheses.catalogue import trials
 from tests.prepared import fitter_of, prepared
 
 pytestmark = pytest.mark.slow

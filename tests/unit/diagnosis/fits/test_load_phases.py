@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from diagnosis.fits.load_phases import starts_by_run
+from diagnosis.hypotheses.catalogue import trials
 from diagnosis.hypotheses.hypothesis import NOTHING
-from diagnosis.hypotheses.trials import trials
 from diagnosis.model.per_run import is_phase
 from tests.prepared import fitter_of, prepared
 

@@ -10,7 +10,7 @@ from diagnosis.evidence.folder import load_evidence
 from diagnosis.fits import random_friction
 from diagnosis.fits.random_friction import RANDOM_EFFECTS, RandomFriction, in_bursts
 from diagnosis.fits.retuning import retuned_rig
-from diagnosis.gap.floor import replicates
+from diagnosis.gap.measure import replicates
 from diagnosis.gap.prepare import prepare
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.hypothesis import NOTHING

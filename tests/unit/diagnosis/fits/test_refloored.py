@@ -6,8 +6,8 @@ import pytest
 from diagnosis.fits.refits import refits
 from diagnosis.fits.refloored import on_floor_of
 from diagnosis.fits.retuning import ROUGHNESS, Retuned, expected_chi2
+from diagnosis.hypotheses.catalogue import trials
 from diagnosis.hypotheses.hypothesis import NOTHING
-from diagnosis.hypotheses.trials import trials
 from tests.prepared import fitter_of, prepared
 
 # nightly: 30 s; that a large effect is named at all is in the small set and in tests/system/test_diagnose.py

@@ -6,9 +6,9 @@ import pytest
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.screening import Column, Directions, Screening, best_pairs, screened
 from diagnosis.fits.search import pairs_of_effects, refitted
+from diagnosis.hypotheses.catalogue import trials
 from diagnosis.hypotheses.hypothesis import NOTHING, Coordinate, Hypothesis
 from diagnosis.hypotheses.starts import Trial
-from diagnosis.hypotheses.trials import trials
 from tests.prepared import fitter_of, prepared
 
 

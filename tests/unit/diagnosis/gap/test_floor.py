@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.gap.floor import floor_of
+from diagnosis.gap.measure import floor_of
 
 
 def test_a_floor_that_compares_nothing_warns_of_nothing() -> None:

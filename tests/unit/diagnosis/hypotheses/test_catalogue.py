@@ -3,8 +3,8 @@
 import pytest
 
 from diagnosis.hypotheses.catalogue import CATALOGUE
-from diagnosis.hypotheses.scales import Sizes
-from diagnosis.pictures.axes import TITLES, X
+from diagnosis.hypotheses.hypothesis import Sizes
+from diagnosis.pictures.choice import SHOWN, X
 from plant.effects.library import EFFECTS
 
 NO_PREDICTION_FOLLOWS = "random"
@@ -34,7 +34,7 @@ def test_a_row_names_existing_relations_and_effects(name):
     assert row.words
     assert row.shown_by
     for residual, variable in row.shown_by:
-        assert residual in TITLES
+        assert residual in SHOWN
         assert variable in X
     assert row.check_against.keys() <= EFFECTS.keys() - {name}
     for other in row.check_against:

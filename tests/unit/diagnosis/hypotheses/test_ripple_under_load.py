@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from diagnosis.hypotheses.trials import trials
-from diagnosis.synthetic.protocols import PROTOCOLS, RunPlan
+from diagnosis.hypotheses.catalogue import trials
+from diagnosis.synthetic.runs import RunPlan
+from tests.made_protocols import PROTOCOLS
 from tests.prepared import fitter_of, prepared
 
 EFFECT, RATIO, WAVELENGTH_M = "drive-speed-ripple", 0.2, 1.1e-3

@@ -10,7 +10,8 @@ from diagnosis.latent.answer import LatentSignal, latent_of, signal_of
 from diagnosis.latent.components import DIRECTION, FORCE_PLACE, PLACE, SCATTER
 from diagnosis.latent.rows import BREAKAWAY, MOST_ROWS, SLIDING, ExcessRows
 from diagnosis.latent.shares import LatentShare
-from diagnosis.report.latent_block import latent_line, latent_rows
+from diagnosis.report.relations_block import latent_rows
+from diagnosis.report.words import latent_line
 from diagnosis.verdict.by_latent import named_by, with_latent
 from diagnosis.verdict.judge import Verdict
 from tests.unit.diagnosis.relations.kinematic import rig, runs

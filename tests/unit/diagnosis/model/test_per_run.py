@@ -5,15 +5,16 @@ import math
 import numpy as np
 import pytest
 
+from diagnosis.fits.batch import together
 from diagnosis.fits.gauss_newton import Fitter
-from diagnosis.gap.floor import floor_of, replicates
+from diagnosis.gap.measure import floor_of, replicates
 from diagnosis.gap.problem import Problem
+from diagnosis.hypotheses.catalogue import trials
 from diagnosis.hypotheses.hypothesis import Coordinate
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.hypotheses.starts import wave_trial
-from diagnosis.hypotheses.trials import trials
 from diagnosis.hypotheses.waves import Wave
-from diagnosis.model.per_run import as_in_rig_file, has_own_phases, in_run, is_phase, phase_of
+from diagnosis.model.per_run import PHASE, as_in_rig_file, has_own_phases, in_run, is_phase, of_run
 from diagnosis.model.rig import Roughness
 from diagnosis.report.assemble import estimate_of
 from diagnosis.report.words import estimate_in_words
@@ -43,7 +44,7 @@ def apart(problem):
 
 
 def test_runs_apart_show_the_wave_with_a_phase_for_each(problem):
-    name = phase_of(problem.runs[1].file)
+    name = of_run(PHASE, problem.runs[1].file)
     best = min(map(table_of, apart(problem)), key=lambda table: abs(float(table["frequency_Hz"]) - 0.9))
     assert best["frequency_Hz"] == pytest.approx(0.9, rel=0.1)
     assert best["ratio"] == pytest.approx(0.06, rel=0.3)
@@ -59,18 +60,19 @@ def test_a_refit_finds_both_phases(problem):
     fitter = Fitter(
         problem, floor_of(problem, point, replicates(problem, point, Roughness(0.003, 1.5e-4, 0), 16, 1)), nuisances
     )
-    near = Wave(1.0 / 0.91, 0.05, 0.6, spread=0.06, phases_of={phase_of(problem.runs[1].file): 2.5})
+    near = Wave(1.0 / 0.91, 0.05, 0.6, spread=0.06, phases_of={of_run(PHASE, problem.runs[1].file): 2.5})
     trial = wave_trial("normal-load-fluctuation", "sine", near, 0.1)
-    fit = fitter.further(fitter.refit(trial.hypothesis, described, trial.w))
+    going = fitter.going_further(fitter.refit(trial.hypothesis, described, trial.w))
+    fit = together(fitter.predicted_many, [going])[0]
     table = fit.effects["normal-load-fluctuation"]
     assert table["ratio"] == pytest.approx(0.06, rel=0.1)
-    later = float(table[phase_of(problem.runs[1].file)]) - float(table["phase_rad"])
+    later = float(table[of_run(PHASE, problem.runs[1].file)]) - float(table["phase_rad"])
     assert math.remainder(later - LATER, 2.0 * math.pi) == pytest.approx(0.0, abs=0.25)
     one_phase = fitter.predicted(fit.deviations, {"normal-load-fluctuation": as_in_rig_file(table)})
     assert np.sum(fitter.whitened(one_phase)[0] ** 2) > 3.0 * fit.chi2
 
 
-TABLE = LOAD | {"phase_rad": 0.4, phase_of("run-02.csv"): 2.8}
+TABLE = LOAD | {"phase_rad": 0.4, of_run(PHASE, "run-02.csv"): 2.8}
 
 
 def test_every_fitted_run_has_its_phase_and_a_held_out_run_a_random_one():
@@ -86,11 +88,11 @@ def test_every_fitted_run_has_its_phase_and_a_held_out_run_a_random_one():
 
 def test_a_rig_file_has_the_phase_of_the_first_run():
     assert as_in_rig_file(TABLE) == LOAD | {"phase_rad": 0.4}
-    assert [is_phase(name) for name in ("phase_rad", phase_of("a.csv"), "frequency_Hz")] == [True, True, False]
+    assert [is_phase(name) for name in ("phase_rad", of_run(PHASE, "a.csv"), "frequency_Hz")] == [True, True, False]
 
 
 def test_a_phase_is_named_with_its_run():
-    assert estimate_in_words("normal-load-fluctuation", phase_of("run-02.csv"), Estimate(1.234, (1.13, 1.33))) == (
+    assert estimate_in_words("normal-load-fluctuation", of_run(PHASE, "run-02.csv"), Estimate(1.234, (1.13, 1.33))) == (
         "phase in run-02.csv 1.23 rad (90 %: 1.13 to 1.33)"
     )
 

@@ -7,8 +7,8 @@ from diagnosis.features.feature import scales_of
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.features.segments import CommandedRun, Segment
 from diagnosis.gap.problem import Problem
+from diagnosis.hypotheses.catalogue import trials
 from diagnosis.hypotheses.nuisances import Nuisances
-from diagnosis.hypotheses.trials import trials
 from diagnosis.model.per_run import is_of_run, of_run
 from diagnosis.model.segment_starts import entries_of
 from tests.prepared import prepared

@@ -6,9 +6,16 @@ import numpy as np
 import pytest
 
 from diagnosis.gap.problem import Problem
-from diagnosis.hypotheses.ringing import ringing_Hz
 from diagnosis.hypotheses.starts import wave_trial
-from diagnosis.hypotheses.waves import Wave, drive_waves, friction_series, friction_waves_beside, two_friction_waves
+from diagnosis.hypotheses.waves import (
+    Wave,
+    drive_series,
+    friction_series,
+    ringing_Hz,
+    strongest_waves,
+    two_waves,
+    waves_beside,
+)
 from diagnosis.model.predict import predict
 from diagnosis.model.rig import rig_config
 from tests.prepared import prepared
@@ -31,7 +38,10 @@ def screw():
 
 def test_a_wave_of_the_drive_is_found_with_its_second_harmonic(screw):
     _, runs = screw
-    wave = max(drive_waves(runs, "position", 4), key=lambda wave: wave.ratio * (abs(wave.period - PITCH_M) < 3e-5))
+    wave = max(
+        strongest_waves(drive_series(runs, "position"), 4, 2),
+        key=lambda wave: wave.ratio * (abs(wave.period - PITCH_M) < 3e-5),
+    )
     assert wave.period == pytest.approx(PITCH_M, rel=0.01)
     assert wave.ratio == pytest.approx(0.08, rel=0.1)
     assert (wave.second_sin**2 + wave.second_cos**2) ** 0.5 == pytest.approx(0.5, rel=0.15)
@@ -59,7 +69,7 @@ def test_two_waves_along_the_track_are_found_together():
     track = {"form": "two-waves", "ratio": 0.06, "wavelength_m": 4e-3, "phase_rad": 0.7, **other}
     evidence, runs = prepared("ladder", {"position-dependent-friction": track})
     problem = Problem(evidence.rig, runs)
-    pairs = two_friction_waves(runs, problem.scales, 4)
+    pairs = two_waves(friction_series(runs, problem.scales, "position"), 4)
     assert any(
         first.period == pytest.approx(4e-3, rel=0.1) and other.period == pytest.approx(9e-4, rel=0.03)
         for first, other in pairs
@@ -74,7 +84,7 @@ def test_waves_of_neighbouring_periods_keep_the_phase_at_the_slide():
     evidence, runs = prepared("ladder", {"position-dependent-friction": bumps})
     scales = Problem(evidence.rig, runs).scales
     middle = Wave(3e-3, 0.05, 0.0, spread=0.04)
-    shorter, same, longer = friction_waves_beside(runs, scales, [middle], (-0.25, 0.0, 0.25))
+    shorter, same, longer = waves_beside(friction_series(runs, scales, "position"), [middle], (-0.25, 0.0, 0.25))
     assert [wave.period for wave in (shorter, same, longer)] == pytest.approx([2.97e-3, 3e-3, 3.03e-3])
     at_m = np.concatenate([series.at for series in friction_series(runs, scales, "position")]).mean()
     turns = [at_m / wave.period + wave.phase_rad / (2.0 * math.pi) for wave in (shorter, same, longer)]

@@ -10,8 +10,7 @@ from bridge import units
 from bridge.log.finding import Finding
 from bridge.results import strict_json
 from cockpit.commands import diagnose_output
-from diagnosis.evidence.exciter_harmonics import DISTORTED
-from diagnosis.evidence.force_pickup import PICK_UP
+from diagnosis.evidence.foreign_vibration import DISTORTED, PICK_UP
 from diagnosis.report import words as in_words
 from diagnosis.report.page import report_page, rig_row, where_map, write_report
 from diagnosis.report.summary import summary

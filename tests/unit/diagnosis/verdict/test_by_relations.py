@@ -9,7 +9,7 @@ from diagnosis.fits.fit import Fit
 from diagnosis.hypotheses.hypothesis import Hypothesis
 from diagnosis.relations.decide import Decided, Decision, Outside
 from diagnosis.relations.shares import RelationShare
-from diagnosis.verdict.by_relations import ClosedByRelations, with_relations_verdict
+from diagnosis.verdict.by_relations import with_relations_verdict
 from diagnosis.verdict.judge import Verdict
 
 
@@ -72,7 +72,7 @@ DRIFT = fit("force-sensor-drift")
     ],
 )
 def test_decisions_of_relations_correct_the_verdict(before, decision, kind, names):
-    after = with_relations_verdict(before, decision, [DRIFT], ClosedByRelations(None, None))
+    after = with_relations_verdict(before, decision, [DRIFT], None, None)
     assert (after.kind, after.names) == (kind, names)
     assert next(iter(after.probabilities)) == ("unexplained" if kind == "unexplained" else (*names, "none")[0])
     assert sum(after.probabilities.values()) == pytest.approx(sum(before.probabilities.values()))
@@ -81,6 +81,6 @@ def test_decisions_of_relations_correct_the_verdict(before, decision, kind, name
 @pytest.mark.parametrize(("share", "kind"), [(0.8, "partly"), (0.3, "unexplained"), (None, "unexplained")])
 def test_two_effects_that_close_most_of_the_held_out_gap_stay_named_as_partly(share, kind):
     pair = fit("friction-drift", "drive-damping")
-    after = with_relations_verdict(verdict("unexplained"), Decision((), ()), [], ClosedByRelations(pair, share))
+    after = with_relations_verdict(verdict("unexplained"), Decision((), ()), [], pair, share)
     assert after.kind == kind
     assert after.names == (pair.hypothesis.effects if kind == "partly" else ())

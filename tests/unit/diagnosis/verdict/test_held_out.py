@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis.gap.floor import Floor
+from diagnosis.gap.measure import Floor
 from diagnosis.hypotheses.hypothesis import Coordinate, Hypothesis
 from diagnosis.verdict import held_out as heldout
 from diagnosis.verdict.held_out import HeldOut, foretells

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from diagnosis.diagnose import with_vibration_findings
-from diagnosis.evidence.exciter_harmonics import Distortion
 from diagnosis.evidence.folder import MeasuredRun
-from diagnosis.evidence.force_pickup import PickUp
+from diagnosis.evidence.foreign_vibration import DISTORTED, PICK_UP, ForeignVibration
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.random_friction import Scattered, is_random
 from diagnosis.hypotheses.hypothesis import NOTHING, Coordinate, Hypothesis
@@ -61,8 +60,8 @@ def test_an_outside_finding_withdraws_the_name_of_an_effect_that_imitates_it():
 
 def test_harmonics_withdraw_a_piezo_effect_and_a_pick_up_withdraws_none():
     plain = MeasuredRun("run-01.csv", np.zeros(2), {}, {}, None, False)
-    picked_up = plain._replace(pick_up=PickUp(2500.0, 0.3, 1e-5, 0.1))
-    distorted = plain._replace(distortion=Distortion(2500.0, 2.0, 0.1))
+    picked_up = plain._replace(foreign=(ForeignVibration(3.0, PICK_UP, "drive_force_N", 2500.0, ""),))
+    distorted = plain._replace(foreign=(ForeignVibration(2.0, DISTORTED, "base_accel_mps2", 5000.0, ""),))
     effect = judge(fit(400.0), [fit(50.0, "piezo-resonance")], [], EXPECTED)
     assert with_vibration_findings(effect, [plain, picked_up]).kind == "effect"
     assert with_vibration_findings(effect, [plain, distorted]).kind == "unexplained"

@@ -1,0 +1,70 @@
+"""A run in simulated time with the true motion of its rig, block by block."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.topics import OPERATOR, Outgoing
+from cockpit.run.in_process import TimedAction
+from cockpit.run.scenario import Scenario
+from cockpit.run.simulated.run import SimulatedRun
+from plant.node import PlantNode
+from plant.records import TRUTH
+
+_POSITION, _VELOCITY = TRUTH.index("true_drive_position_m"), TRUTH.index("true_velocity_mps")
+
+
+class Truth(NamedTuple):
+    """True motion of the rig, [blocks] each."""
+
+    t_s: npt.NDArray[np.float64]  # simulated time at the end of each block
+    vibration_mps: npt.NDArray[np.float64]  # v_a of the base
+    drive_mps: npt.NDArray[np.float64]  # v_d, mean of the block
+    slide_mps: npt.NDArray[np.float64]  # slide velocity of largest magnitude in the block, negative backwards
+
+
+class _TruthNode(PlantNode):
+    """A rig that appends the truth of each block to a list."""
+
+    def __init__(self, truths: list[tuple[float, float, float, float]], now_ns: Callable[[], int], **rest: Any) -> None:
+        PlantNode.__init__(self, **rest)
+        self._truths, self._now_ns = truths, now_ns
+        self._drive_m = 0.0
+
+    def advance(
+        self, commands: list[bytes], commands_late: int = 0, round_trip_ns: int = 0, late_ns: int = 0
+    ) -> tuple[Outgoing, Outgoing]:
+        """Advance one block."""
+        sent = PlantNode.advance(self, commands, commands_late, round_trip_ns, late_ns)
+        drive_m, speeds = float(self.truth[_POSITION, -1]), self.truth[_VELOCITY]
+        drive_mps = (drive_m - self._drive_m) / (self.block_ns * 1e-9)
+        self._drive_m = drive_m
+        fastest_mps = float(speeds[np.abs(speeds).argmax()])
+        self._truths.append((self._now_ns() * 1e-9, self.vibration_mps, drive_mps, fastest_mps))
+        return sent
+
+
+class TruthRun(SimulatedRun):
+    """A simulated run with operator commands `words`, which keeps the truth of its rig."""
+
+    def __init__(self, scenario: Scenario, words: Sequence[TimedAction]) -> None:
+        SimulatedRun.__init__(self, scenario)
+        self._truths: list[tuple[float, float, float, float]] = []
+        for order in words:
+            self._stage.cue(order.t_ns, lambda order=order: self._send(order))
+
+    def _send(self, order: TimedAction) -> None:
+        command = wire.Operator(action=cast(Any, order.action), who="the operator")
+        self._hub.put("cockpit", OPERATOR, command.SerializeToString())
+
+    def plant_node(self, **settings: Any) -> PlantNode:
+        """The rig, which appends the truth of each block."""
+        return _TruthNode(self._truths, lambda: self._stage.now_ns, **settings)
+
+    @property
+    def truth(self) -> Truth:
+        """The truth of all blocks so far."""
+        return Truth(*np.array(self._truths).reshape(-1, 4).T)
