@@ -1,5 +1,7 @@
 """The controller process: blocks in, commands out. The command leaves first; all other messages follow."""
 
+import collections
+import math
 import threading
 from collections.abc import Callable
 
@@ -32,6 +34,10 @@ from controller.node import ControllerNode
 from controller.rig_header import RigAgain, refuse_another_rig
 
 _PLANT_LOST_S = 1.0  # silence after which a plant that has left the bus counts as lost
+_RECORDER_S = (
+    1.0  # longest wait for the recorder, which dials every second, after a cut of the link; without it events are lost
+)
+_MOST_WAITING = 1000  # most events that wait during a cut
 _GIVEN_UP_S = 30.0  # time without a rig after which this process ends; equals the wait for a rig at the start
 _HEADER_S = 1.0  # longest wait for the header of the rig; a rig without a header delays the start by all of it
 _TOKEN_WAIT_S = 1.0  # longest wait for the plant's liveliness token; a rig without one delays the start by all of it
@@ -137,6 +143,9 @@ class ControllerProcess:
         self._rig_again = RigAgain(self._rig_header, config)
         self._rig_came = 0
         self._rig_lost = ""  # the reason, from RIG_LOST until blocks arrive
+        self._rig_back_s = -math.inf  # time of the last RIG_BACK
+        self._is_cut = False  # from RIG_LOST without a link until the recorder is back: events wait
+        self._waiting = collections.deque[bytes](maxlen=_MOST_WAITING)
         self._blocks = Freshness(config.block_s, config.limits.stale_after_s)
         self._unreadable = False  # whether NOT_FINITE was published, and no FRESH since
         self._unreadable_reported_s = -1.0
@@ -158,9 +167,15 @@ class ControllerProcess:
         """Publish an event with a code and a text."""
         event = wire.Event(sequence=self._events, t_ns=self._node.t_ns, source="controller", code=code, text=text)
         self._events += 1
-        self._send[CONTROLLER_EVENT.name](event.SerializeToString())
+        self._waiting.append(event.SerializeToString())
+        if not self._is_cut:
+            self._send_events()
         if is_listed(code):
             self._report(code, text)
+
+    def _send_events(self) -> None:
+        while self._waiting:
+            self._send[CONTROLLER_EVENT.name](self._waiting.popleft())
 
     def loop(self, stop: threading.Event, granted: str) -> None:
         """Take blocks in order and answer each block; the plant applies the newest answer.
@@ -174,6 +189,7 @@ class ControllerProcess:
             self._publish(self._blocks.paused())
             self._doubts.complaints.report_when_due(all_of_it=True)
         node = self._node
+        self._is_cut = False
         self.event("END", f"steps={node.steps} duplicates={node.duplicates} dropped={self._inbox.dropped}")
 
     @property
@@ -279,7 +295,10 @@ class ControllerProcess:
         if self._rig_lost:  # the event repeats the reason, as RIG_LOST may not have passed the broken link
             self._report("joined", "the rig again")
             self.event("RIG_BACK", f"blocks arrive again, from block {node.last_block} on; {self._rig_lost}")
-            self._rig_lost = ""
+            self._rig_lost, self._rig_back_s = "", time.monotonic()
+        if self._is_cut and (self._bus.alive("recorder") or time.monotonic() > self._rig_back_s + _RECORDER_S):
+            self._is_cut = False
+            self._send_events()
         if self._end_sent_s is not None and time.monotonic() - self._end_sent_s > _PLANT_LOST_S:
             self._end_sent_s = None
             self._doubts.complaints.note(FOREIGN, PLANT_EVENT.name, "END, but the rig still runs: ignored")
@@ -340,6 +359,6 @@ class ControllerProcess:
         if self._lockstep or silent_s > _GIVEN_UP_S:
             raise Fault("PEER_DIED", f"{text}, {silent_s:.1f} s ago")
         if not self._rig_lost:
-            self._rig_lost = f"{text} then"
+            self._rig_lost, self._is_cut = f"{text} then", not self._bus.linked()
             self._report("waiting", f"for the rig, at most {_GIVEN_UP_S:g} s: {text}")
             self.event("RIG_LOST", f"{text}; waiting for it for {_GIVEN_UP_S:g} s")

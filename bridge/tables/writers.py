@@ -112,7 +112,7 @@ class ArrowTable(_Batches):
             self._new.discard()
 
 
-class _Part(io.FileIO):
+class _HdfFile(io.FileIO):
     """A file for HDF5, which ends the process at a failed write: the failure is kept for the owner of the file."""
 
     failed: OSError | None = None
@@ -144,7 +144,7 @@ class MatFile:
         self.path = path
         self._ending = contextlib.ExitStack()
         self._part = self._ending.enter_context(
-            _Part(self._ending.enter_context(folder_beside(path)) / "table.mat", "w+")
+            _HdfFile(self._ending.enter_context(folder_beside(path)) / "table.mat", "w+")
         )
         self._file: Any = None
 

@@ -33,7 +33,7 @@ class FakeBus:
     def __init__(self) -> None:
         self.receive: dict[str, Callable[[Received], None]] = {}
         self.sent: dict[str, list[bytes]] = {}
-        self.rig_left = False
+        self.rig_left = self.link_cut = False
         self.times_came = 1
         self.rig_header: wire.Header | None = None
         self.asked = threading.Event()
@@ -51,7 +51,7 @@ class FakeBus:
         return self.times_came
 
     def linked(self) -> bool:
-        return True
+        return not self.link_cut
 
     def headers(self, roles: list[str], _timeout_s: float, _stop: threading.Event) -> dict[str, wire.Header]:
         self.asked.set()
@@ -307,8 +307,11 @@ def test_an_end_does_not_end_the_controller_while_the_rig_stays() -> None:
     assert not thread.is_alive()
 
 
-def test_a_rig_that_leaves_without_an_end_is_reported_and_waited_for() -> None:
+@pytest.mark.parametrize("link_cut", [False, True])
+def test_a_rig_that_leaves_without_an_end_is_reported_and_waited_for(link_cut: bool) -> None:
+    """Events of a cut link would be lost, so they wait until the recorder is back."""
     controller, bus = process()
+    bus.link_cut = link_cut
     stop = threading.Event()
     thread = threading.Thread(target=controller.loop, args=(stop, ""), daemon=True)
     for number in range(1000, 1003):
@@ -316,11 +319,14 @@ def test_a_rig_that_leaves_without_an_end_is_reported_and_waited_for() -> None:
     thread.start()
     wait_for(lambda: len(bus.sent[COMMAND.name]) > 2)
     bus.rig_left = True
-    wait_for(lambda: "RIG_LOST" in bus.codes())
-    lost = next(event for event in bus.events() if event.code == "RIG_LOST")
-    assert lost.text == "the rig left the bus; last block at 1.003 s; waiting for it for 30 s"
+    wait_for(lambda: bool(controller._rig_lost))
+    wait_for(lambda: link_cut or "RIG_LOST" in bus.codes())
+    assert ("RIG_LOST" in bus.codes()) != link_cut
     bus.rig_left, bus.times_came = False, 2
     publish_blocks_until(bus, "FRESH", 0)
+    lost = next(event for event in bus.events() if event.code == "RIG_LOST")
+    why = "the link to the rig is down" if link_cut else "the rig left the bus"
+    assert lost.text == f"{why}; last block at 1.003 s; waiting for it for 30 s"
     stop.set()
     thread.join(JOIN_S)
     codes = bus.codes()
