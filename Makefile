@@ -17,13 +17,13 @@ demo: $(SMALL)
 # linear algebra with one thread a process: there are as many processes as cores. An import of the whole project without kept
 # bytecode takes 5.3 s of CPU, with it 2.8 s, and some tests start ten processes.
 PARALLEL = OMP_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(NICE) $(BIN)/pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
-EACH_CPU_S := 5 # of a test that is not marked slow
+EACH_CPU_S := 3 # of a test that is not marked slow; 0.5 on a quiet computer
 # CPU of all tests of `make quick` and of `make test`: may only fall, but for the 40 s that an issue may add to the second
-QUICK_CPU_S := 110
+QUICK_CPU_S := 90
 TEST_CPU_S := 950 # 625 on a quiet computer; a busy one takes half as much again
 
-quick: warm ## under a minute once kernels are compiled; what every edit is tried with
-	@$(PARALLEL) -x -m "not slow and not realtime and not nightly" --cpu-each $(EACH_CPU_S) --cpu-all $(QUICK_CPU_S)
+quick: warm ## the unit tests, under a minute once kernels are compiled; what every edit is tried with
+	@$(PARALLEL) tests/unit -x -m "not slow and not realtime and not nightly" --cpu-each $(EACH_CPU_S) --cpu-all $(QUICK_CPU_S)
 
 test: $(READY) ## all tests that need no clock
 	@$(MAKE) --no-print-directory -j2 check warm

@@ -130,8 +130,8 @@ def test_the_first_screen_has_a_whole_curve(
 
 def test_the_headline_names_the_age_of_old_data(reports: dict[str, dict[str, Any]]) -> None:
     shown = reports["screen"]
-    assert shown["fresh"][0].startswith("no slip in the last")
-    assert shown["old"][0].startswith("2 s old: no slip in the last")
+    assert shown["fresh"][0].startswith("EXCITE: vibrating")
+    assert shown["old"][0] == f"2 s old: {shown['fresh'][0]}"
     assert shown["late"][0].startswith("no data for 6 s: this browser or its connection is too slow")
     assert "s: no connection to `stickslip serve`" in shown["lost"][0]
 

@@ -13,6 +13,7 @@ def first_slip() -> Case:
     return unvibrated(duration_s=3.1)
 
 
+@pytest.mark.slow
 def test_truth_slips_once(first_slip: Case) -> None:
     # "at about t = 3 s" in the paper's numbers
     assert first_slip.slips_s == pytest.approx([2.978], abs=1e-3)

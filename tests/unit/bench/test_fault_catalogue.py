@@ -25,6 +25,7 @@ def quiet(_share: float, _line: str) -> None:
     return
 
 
+@pytest.mark.slow
 def test_every_entry_is_a_scenario_with_its_faults() -> None:
     for case in load_catalogue():
         made = load_scenario(case.entry.scenario, case.settings)
@@ -33,6 +34,7 @@ def test_every_entry_is_a_scenario_with_its_faults() -> None:
         assert case.told or case.entry.told == [], case.entry.name
 
 
+@pytest.mark.slow
 def test_a_dead_controller_is_safe_and_reported_on_the_page() -> None:
     result = bench([short("controller-killed", watch_s=2.0)], 1, quiet)
     (outcome,) = result.outcomes
@@ -47,6 +49,7 @@ def test_a_dead_controller_is_safe_and_reported_on_the_page() -> None:
     assert strict_json(result)["counts"] == {SAFE: 1, SILENT: 0, UNSAFE: 0}
 
 
+@pytest.mark.slow
 def test_a_fault_without_its_expected_event_is_silent_and_worse_than_the_catalogue() -> None:
     one = short("controller-killed")
     outcome = judge(one.model_copy(update={"told": ["NO_SUCH_WORD"]}))
@@ -57,6 +60,7 @@ def test_a_fault_without_its_expected_event_is_silent_and_worse_than_the_catalog
     assert FaultBench([outcome]).worse == [outcome]
 
 
+@pytest.mark.slow
 def test_a_vibration_that_is_due_to_end_and_does_not_is_unsafe() -> None:
     assert judge(short("controller-killed", fault=[], zero_s=0.3)).verdict == UNSAFE
 

@@ -12,6 +12,7 @@ from bench.schemas import FOLDER, FORMATS
 FAMILIES = sorted((FOLDER.parent / "control" / "scenarios").glob("*.toml"))
 
 
+@pytest.mark.slow
 def test_the_kept_schemas_match_the_code() -> None:
     """After a change of a format: `make schemas`."""
     kept = {path.stem: json.loads(path.read_text()) for path in FOLDER.iterdir()}
@@ -21,6 +22,7 @@ def test_the_kept_schemas_match_the_code() -> None:
 
 
 @pytest.mark.parametrize("path", FAMILIES, ids=lambda path: path.stem)
+@pytest.mark.slow
 def test_a_family_of_the_bank_names_its_schema_and_fits_it(path: Path) -> None:
     word, _, place = path.read_text().partition("\n")[0].partition(" ")
     assert word == "#:schema"

@@ -48,6 +48,7 @@ def columns_of(suffix: str, to: Path, topic: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("suffix", [".parquet", ".csv", ".mat"])
+@pytest.mark.slow
 def test_every_value_comes_back(log: Path, tmp_path: Path, suffix: str) -> None:
     to = tmp_path / f"out{suffix}"
     shares: list[float] = []

@@ -7,7 +7,9 @@ import tomllib
 from pathlib import Path
 
 import numba
+import pytest
 
+pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[3]
 # the inner kernel is too long to become a part of the outer one: that finds it by its symbol
 STEPS = "\n    ".join(f"total = 0.5 * total + math.sin(total + {k}.0)" for k in range(60))

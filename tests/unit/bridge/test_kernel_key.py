@@ -75,6 +75,7 @@ def test_two_copies_of_the_project_have_separate_marks(project: Path) -> None:
     assert own.rpartition("-")[2] == other.rpartition("-")[2]  # of the same sources
 
 
+@pytest.mark.slow
 def test_one_process_compiles_and_the_others_wait_and_report_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -41,6 +41,7 @@ def bomb(path: Path, chunks: int, messages: int) -> None:
     ("chunks", "messages", "message"),
     [(1, 800_000, "holds a chunk of "), (60, 60_000, "would unpack to more than ")],
 )
+@pytest.mark.slow
 def test_a_log_that_is_made_to_fill_the_memory_is_refused(
     tmp_path: Path, chunks: int, messages: int, message: str
 ) -> None:

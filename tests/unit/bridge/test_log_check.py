@@ -110,6 +110,7 @@ def begins_late(tables: Tables) -> None:
         (late, "late", "/applied: 10.0 % of the messages were later than 1 ms"),
     ],
 )
+@pytest.mark.slow
 def test_each_change_is_found(tmp_path: Path, change: Callable[[Tables], None], kind: str, text: str) -> None:
     path = doctored(tmp_path, change)
     assert text in kinds(path)[kind]

@@ -84,6 +84,7 @@ FORMS = [
 
 
 @pytest.mark.parametrize(("compression", "chunks", "index", "crcs"), FORMS)
+@pytest.mark.slow
 def test_every_form_is_read_and_recovered_unchanged(
     tmp_path: Path, compression: CompressionType, chunks: bool, index: str, crcs: bool
 ) -> None:
@@ -118,6 +119,7 @@ def test_every_form_is_read_and_recovered_unchanged(
 
 
 @pytest.mark.parametrize("chunks", [True, False])
+@pytest.mark.slow
 def test_channels_of_one_topic_that_alternate_are_one_topic(tmp_path: Path, chunks: bool) -> None:
     path = written_anew(tmp_path / "anew.mcap", use_chunking=chunks, each=2)
     run = read_run(path)
@@ -168,6 +170,7 @@ def test_topics_of_other_programs_are_counted_and_reported_once(tmp_path: Path) 
 @pytest.mark.parametrize("compression", CompressionType)
 @pytest.mark.parametrize("chunks", [True, False])
 @pytest.mark.parametrize("share", [0.35, 0.6])
+@pytest.mark.slow
 def test_a_cut_one_is_read_up_to_the_cut(
     tmp_path: Path, compression: CompressionType, chunks: bool, share: float
 ) -> None:

@@ -43,6 +43,7 @@ def test_there_is_one_style_sheet() -> None:
     assert colours == {"bridge/page.css", "cockpit/review/vendor/uPlot.min.css"}
 
 
+@pytest.mark.slow
 def test_every_kind_of_page_has_the_style_sheet_once_and_one_main(tmp_path: Path) -> None:
     (tmp_path / "run.mcap").write_bytes(short_log())
     write_review([tmp_path / "run.mcap"], tmp_path / "review.html")

@@ -45,6 +45,7 @@ def test_names_are_text_that_every_format_can_hold() -> None:
     assert shown_name(os.fsdecode(b"m\xe4rz\x1b[2J.mcap")) == "m\\xe4rz\\x1b[2J.mcap"
 
 
+@pytest.mark.slow
 def test_a_report_has_the_hashes_of_its_evidence_and_no_markup_of_a_name(file: Path, tmp_path: Path) -> None:
     odd = file.with_name("<i>.csv")
     file.rename(odd)
@@ -55,6 +56,7 @@ def test_a_report_has_the_hashes_of_its_evidence_and_no_markup_of_a_name(file: P
     assert "<i>.csv" not in page
 
 
+@pytest.mark.slow
 def test_a_log_of_any_name_is_drawn_and_has_a_page(tmp_path: Path) -> None:
     log = tmp_path / os.fsdecode(b"m\xe4rz $x_{$ \x1b.mcap")
     log.write_bytes(short_log())

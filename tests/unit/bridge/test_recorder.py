@@ -4,6 +4,8 @@ import threading
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from bridge.log.recorder import _record
 from bridge.log.runlog import RunLog
 from bridge.wire import stickslip_pb2 as wire
@@ -22,6 +24,7 @@ class NoPeer:
         return True
 
 
+@pytest.mark.slow
 def test_messages_that_did_not_fit_are_an_event_of_the_log(tmp_path: Path) -> None:
     events: list[wire.Event] = []
     log = RunLog(tmp_path / "run.mcap", lockstep=False, on_event=events.append)

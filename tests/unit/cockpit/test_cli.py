@@ -90,6 +90,7 @@ def test_an_output_of_the_wrong_suffix_is_refused_before_the_work(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_a_picture_without_a_name_is_written_next_to_its_log(log: Path) -> None:
     result = call("plot", str(log))
     assert result.exit_code == 0, result.output
@@ -272,6 +273,7 @@ def test_messages_out_of_order_are_not_lost(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("arguments", [["log", "check", "bad.mcap"], ["explain"], ["explain", "CONFIG"], ["scenarios"]])
+@pytest.mark.slow
 def test_a_closed_pipe_is_not_a_success(tmp_path: Path, arguments: list[str]) -> None:
     """`stickslip ... | head` with a reader that has closed the pipe before the first output."""
     (tmp_path / "bad.mcap").write_bytes(short_log()[:-2000])

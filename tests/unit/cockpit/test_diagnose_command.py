@@ -194,6 +194,7 @@ def test_bad_evidence_as_json_on_stdout(tmp_path):
     assert json.loads(result.stdout)["fault"] == "BAD_EVIDENCE"
 
 
+@pytest.mark.slow
 def test_a_folder_of_folders_gives_every_result_in_order(tmp_path):
     folders(tmp_path / "all", "c", "a", "refused", "b-broken")
     (tmp_path / "all" / "no evidence").mkdir()
@@ -222,6 +223,7 @@ def test_a_broken_program_is_not_reported_as_bad_evidence(tmp_path):
     assert diagnose(tmp_path, "--jobs", 1).exit_code == FAULTS["DIAGNOSIS_BROKE"].exit_status
 
 
+@pytest.mark.slow
 def test_folders_of_the_same_name_keep_apart(tmp_path):
     folders(tmp_path, "one/rig", "two/rig", "two/other")
     sources = many.find_sources([tmp_path / "one", tmp_path / "two", tmp_path / "two" / "rig"])
@@ -258,6 +260,7 @@ def test_an_output_that_cannot_be_written_is_reported_before_the_work(options, c
     assert f"stickslip: {code}: {options[-2] if len(options) > 1 else options[0]}" in result.stderr
 
 
+@pytest.mark.slow
 def test_a_cluster_address_of_another_form_is_one_line(tmp_path):
     result = diagnose(folders(tmp_path, "rig") / "rig", "--cluster", "foo")
     assert result.exit_code == 2
@@ -283,6 +286,7 @@ def test_interrupted_is_130_and_writes_nothing(tmp_path, monkeypatch):
     assert not (tmp_path / "a.json").exists()
 
 
+@pytest.mark.slow
 def test_an_interrupted_fleet_reports_how_to_continue(tmp_path, monkeypatch):
     def interrupted(sources, *_):
         yield many.FolderResult(sources[0], made_up.diagnosis(), None)
@@ -328,6 +332,7 @@ def test_a_link_stays_one_and_a_device_is_written_into(tmp_path):
     assert (tmp_path / "pipe").is_fifo()
 
 
+@pytest.mark.slow
 def test_a_folder_whose_name_is_not_utf_8_is_reported_and_the_others_go_on(tmp_path):
     """Old archives of Windows hold such names; neither the reader of CSV nor a report accepts them."""
     odd = tmp_path / os.fsdecode(b"m\xe4rz")
@@ -349,6 +354,7 @@ def test_one_folder_given_twice_is_one(tmp_path):
     assert (tmp_path / "found.toml").is_file()
 
 
+@pytest.mark.slow
 def test_a_report_that_cannot_be_written_ends_no_other(tmp_path):
     """A folder at the place of one report: the others, the JSON and the text are written; the exit status is a fault."""
     folders(tmp_path / "all", "a", "b", "c")
@@ -375,6 +381,7 @@ def test_json_on_stdout_stays_one_whatever_else_cannot_be_written(tmp_path, monk
     assert "LOG_WRITE" in result.stderr
 
 
+@pytest.mark.slow
 def test_every_report_has_a_unique_name_that_a_disk_accepts(tmp_path):
     long = "ä" * 120
     folders(tmp_path, "a_b/rig", "a/b/rig", f"c/{long}", f"d/{long}")

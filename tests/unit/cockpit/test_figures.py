@@ -55,6 +55,7 @@ def test_bins_hold_the_least_the_mean_and_the_largest_sample() -> None:
     np.testing.assert_array_equal(made.most, [5.0, 6.0, nan, nan])
 
 
+@pytest.mark.slow
 def test_a_figure_names_its_source_and_is_reproducible(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
     out = log.with_name("x.svg")
@@ -79,6 +80,7 @@ def test_a_paper_has_its_width_and_its_metadata(log: Path) -> None:
 
 
 @pytest.mark.parametrize(("to", "named"), [("0.1s", False), ("0.4s", True)])
+@pytest.mark.slow
 def test_a_legend_names_only_drawn_curves(tmp_path: Path, to: str, named: bool) -> None:
     path, out = tmp_path / "run.mcap", tmp_path / "x.svg"
     scenario = load_scenario("paper-c45-c45", ["duration_s=0.4", "controller.policy.enabled_from_s=0.2"])
@@ -88,6 +90,7 @@ def test_a_legend_names_only_drawn_curves(tmp_path: Path, to: str, named: bool) 
         assert (f"<!-- {words} -->" in out.read_text()) == named, words
 
 
+@pytest.mark.slow
 def test_the_numbers_of_the_curves_match_the_log(log: Path) -> None:
     out, data = log.with_name("x.pdf"), log.with_name("x.csv")
     for signals in ("drive_force_N", "drive_force_N,drive_position_m"):  # its own table it replaces

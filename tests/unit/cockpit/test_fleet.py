@@ -66,6 +66,7 @@ def test_a_kept_result_is_read_back_and_a_partial_result_is_not(tmp_path):
     assert kept(tmp_path, "d") is None
 
 
+@pytest.mark.slow
 def test_only_changed_or_failed_folders_are_diagnosed_again(tmp_path):
     folders = [made_up.evidence_folder(tmp_path / "all" / name) for name in ("a", "b", "c")]
     sources = find_sources(folders)
@@ -85,6 +86,7 @@ def test_only_changed_or_failed_folders_are_diagnosed_again(tmp_path):
     assert FleetFolder(tmp_path / "out", sources, 30.0).kept() == []
 
 
+@pytest.mark.slow
 def test_a_process_killed_while_writing_keeps_finished_results(tmp_path, monkeypatch):
     """A child writes one result and is killed during the next: its report is written, its result is partial."""
     sources = find_sources([made_up.evidence_folder(tmp_path / name) for name in ("a", "b")])
@@ -107,6 +109,7 @@ def test_a_process_killed_while_writing_keeps_finished_results(tmp_path, monkeyp
     assert [result.source.name for result in FleetFolder(tmp_path / "out", sources, None).kept()] == ["a"]
 
 
+@pytest.mark.slow
 def test_an_evidence_that_changed_under_way_is_not_kept(tmp_path):
     sources = find_sources([made_up.evidence_folder(tmp_path / "a")])
     fleet = FleetFolder(tmp_path / "out", sources, None)
@@ -163,6 +166,7 @@ def test_a_report_never_takes_the_place_of_the_index():
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_index_as_json_is_the_same(tmp_path):
     sources = find_sources([made_up.evidence_folder(tmp_path / "a")])
     fleet = FleetFolder(tmp_path / "out", sources, None)

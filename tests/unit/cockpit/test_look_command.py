@@ -25,6 +25,7 @@ def tribometer(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_file_at_a_glance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")
     source = tribometer(tmp_path)
@@ -98,6 +99,7 @@ def test_an_import_without_a_map_writes_the_one_it_assumed(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("name", ["evidence", "run.mcap", ""])
+@pytest.mark.slow
 def test_a_map_that_was_corrected_stays(tmp_path: Path, name: str) -> None:
     source, out = tribometer(tmp_path), tmp_path / name
     kept = {"evidence": out / "Prüfung.map.toml", "run.mcap": tmp_path / "run.map.toml"}.get(
@@ -162,6 +164,7 @@ def test_a_position_that_rests_during_the_sticks_belongs_to_the_slide(tmp_path: 
 
 @pytest.mark.parametrize("force_first", [True, False])
 @pytest.mark.parametrize("heads", [("Time (ms),{}", "Time (ms),{}"), ("t1 (ms),{}", "t2 (ms),{}")])
+@pytest.mark.slow
 def test_channels_with_separate_times_are_merged_by_time(
     tmp_path: Path, force_first: bool, heads: tuple[str, str]
 ) -> None:
@@ -237,6 +240,7 @@ def test_slow_logging_widens_the_interval_of_the_static_force(tmp_path: Path) ->
     assert low < 16.0 < high
 
 
+@pytest.mark.slow
 def test_outliers_are_left_out_and_reported(tmp_path: Path) -> None:
     t_s, force_N, _ = saw_teeth()
     for value in (1e308, -9999.0, 999.0, -1e6):
@@ -324,6 +328,7 @@ LVM = (
         ("traction.tsv", "Test Time (s)\tTraction Coeff (-)\n", "{t:.4f}\t{N:.6f}\n", "is a coefficient"),
     ],
 )
+@pytest.mark.slow
 def test_column_names_of_machines_are_understood(tmp_path: Path, file: str, head: str, row: str, message: str) -> None:
     t_s, force_N, _ = saw_teeth()
     rows = (

@@ -34,6 +34,7 @@ def test_an_unknown_unit_in_a_name_is_reported_with_a_map_too(tmp_path: Path) ->
         ("furlong", 98.0665, "taken as N; add"),
     ],
 )
+@pytest.mark.slow
 def test_a_load_in_grams_is_a_weight(tmp_path: Path, unit: str, load: float, message: str) -> None:
     t_s, force_N, _ = saw_teeth()
     seen = seen_in(table_of(tmp_path / "a.csv", f"t [s],Ff [N],Load [{unit}]", t_s, force_N, np.full(len(t_s), load)))

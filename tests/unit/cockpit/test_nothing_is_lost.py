@@ -120,18 +120,21 @@ def test_a_run_without_an_end_leaves_room_on_the_disk_of_its_log(tmp_path, monke
 
 @pytest.mark.parametrize(("where", "why"), [(">/dev/full", "No space left on device"), (">&-", "Bad file descriptor")])
 @pytest.mark.parametrize("words", ["scenarios", "explain --json", "--version", "log --help"])
+@pytest.mark.slow
 def test_a_stdout_that_takes_nothing_is_one_line(words, where, why):
     done = _in_a_shell(f"-m cockpit {words} {where}")
     assert done.returncode == FAULTS["LOG_WRITE"].exit_status
     assert done.stderr == f"stickslip: LOG_WRITE: stdout: cannot be written: {why}; free space or write elsewhere\n"
 
 
+@pytest.mark.slow
 def test_stdout_escapes_characters_that_it_cannot_encode(tmp_path):
     (tmp_path / "ü.toml").write_bytes(b"")
     done = _in_a_shell(f"-m cockpit schema --out {tmp_path}/ü/ rig", PYTHONIOENCODING="ascii")
     assert (done.returncode, done.stdout) == (0, f"written  {tmp_path}/\\xfc/rig.json\n")
 
 
+@pytest.mark.slow
 def test_a_name_that_is_not_utf_8_is_written(files):
     folder = files["run.mcap"].parent
     done = _in_a_shell(
@@ -154,6 +157,7 @@ def test_a_table_that_is_there_is_not_replaced_unasked(files, monkeypatch):
     assert Path("mine.csv").read_text().startswith('"t_s"')
 
 
+@pytest.mark.slow
 def test_a_picture_is_made_whatever_backend_the_environment_names(files):
     picture = files["run.mcap"].with_name("run.png")
     done = _in_a_shell(f"-m cockpit plot {files['run.mcap']}", MPLBACKEND="foo")

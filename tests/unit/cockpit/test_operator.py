@@ -83,6 +83,7 @@ def test_a_word_that_the_rig_took_and_did_is_done(say: Callable[[Rig, str], oper
     assert (obeyed.done, obeyed.taken, obeyed.state, len(rig.words)) == (True, True, "ARMED", 1)
 
 
+@pytest.mark.slow
 def test_the_last_message_of_a_silent_rig_confirms_nothing(
     say: Callable[[Rig, str], operator.CommandOutcome],
 ) -> None:
@@ -94,6 +95,7 @@ def test_the_last_message_of_a_silent_rig_confirms_nothing(
     assert raised.value.kind is FAULTS["NO_PEER"]
 
 
+@pytest.mark.slow
 def test_an_answer_to_another_command_does_not_confirm_this_command(
     say: Callable[[Rig, str], operator.CommandOutcome],
 ) -> None:
@@ -104,6 +106,7 @@ def test_an_answer_to_another_command_does_not_confirm_this_command(
     assert raised.value.kind is FAULTS["NO_PEER"]
 
 
+@pytest.mark.slow
 def test_a_check_that_takes_longer_than_an_answer_is_waited_for(
     say: Callable[[Rig, str], operator.CommandOutcome],
 ) -> None:
@@ -160,6 +163,7 @@ def test_two_words_of_one_process_are_two(say: Callable[[Rig, str], operator.Com
         (applied(FAULT, wire.STOP_BY_PERSON, 1e-9), "FAULT with a vibration of 1 nm after a stop"),
     ],
 )
+@pytest.mark.slow
 def test_a_stop_that_does_not_stop_is_a_fault(
     say: Callable[[Rig, str], operator.CommandOutcome], answer: wire.Applied, line: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -177,6 +181,7 @@ def test_a_rig_at_rest_after_a_stop_is_stopped_whoever_sent_it(
 @pytest.mark.parametrize(
     ("word", "advice"), [("STOP", "by hand"), ("DISARM", "by hand"), ("ARM", "start one"), ("RESET", "start one")]
 )
+@pytest.mark.slow
 def test_without_a_rig_the_advice_depends_on_the_command(
     monkeypatch: pytest.MonkeyPatch, word: str, advice: str
 ) -> None:
@@ -189,6 +194,7 @@ def test_without_a_rig_the_advice_depends_on_the_command(
     )
 
 
+@pytest.mark.slow
 def test_where_no_rig_answers_a_certificate_the_authority_is_asked_about(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -217,6 +223,7 @@ def test_the_help_of_a_mode_does_not_name_a_reason_that_is_not_there() -> None:
     assert "the rig is not armed" in disabled.help
 
 
+@pytest.mark.slow
 def test_a_process_that_listens_and_does_not_read_is_frozen(monkeypatch: pytest.MonkeyPatch) -> None:
     config = BusConfig(endpoint=free_endpoint())
     assert not is_frozen(config)

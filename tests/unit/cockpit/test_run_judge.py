@@ -125,6 +125,7 @@ def gap(first: int, count: int, seen: bool) -> Any:
     ],
     ids=["log", "controller", "too-many", "before"],
 )
+@pytest.mark.slow
 def test_missing_blocks_change_the_status_only_where_they_decide(
     run: RunData, tmp_path: Path, change: Any, control: str, data: str
 ) -> None:
@@ -228,6 +229,7 @@ def slip(run: RunData, tables: Tables, block: int) -> None:
     tables["sensors"]["mass_position_m"][block:] -= np.float32(3.0 / stiffness_N_per_m)
 
 
+@pytest.mark.slow
 def test_a_slip_with_missing_blocks_in_it_may_be_none(run: RunData, tmp_path: Path) -> None:
     def fall(tables: Tables) -> None:
         slip(run, tables, 5000)
@@ -249,6 +251,7 @@ def test_a_slip_with_missing_blocks_in_it_may_be_none(run: RunData, tmp_path: Pa
 @pytest.mark.parametrize(
     ("table", "field", "value"), [("applied", "fallback", 1), ("trace", "events", STALE)], ids=["rig", "controller"]
 )
+@pytest.mark.slow
 def test_a_slip_in_a_stall_is_counted_apart(run: RunData, tmp_path: Path, table: str, field: str, value: int) -> None:
     """Of the rig, which ramped to zero without a fresh command, and of the controller, which did without a fresh block."""
 
@@ -308,6 +311,7 @@ def test_equal_warnings_are_one_line_with_a_count(run: RunData) -> None:
     assert len(words) <= 9
 
 
+@pytest.mark.slow
 def test_log_info_has_the_findings_of_log_check(run: RunData, tmp_path: Path) -> None:
     def dead(tables: Tables) -> None:
         tables["sensors"]["base_accel_mps2"][:] = 0.25
@@ -342,6 +346,7 @@ def test_a_run_that_a_fault_ends_is_judged_on_its_recorded_part(
         ("[[0.0, 0.0005], [5.0, 0.0005], [5.1, 0.0]]", "between two slips before"),
     ],
 )
+@pytest.mark.slow
 def test_a_drive_that_rests_while_the_controller_is_in_charge_shows_nothing(
     tmp_path: Path, profile: str, why: str
 ) -> None:

@@ -51,6 +51,7 @@ def check(name: str, value: Any) -> None:
 
 
 @pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.slow
 def test_every_schema_is_one_and_is_printed(name: str) -> None:
     result = call("schema", name)
     assert result.exit_code == 0, result.output
@@ -70,6 +71,7 @@ def test_no_other_schema_is_shipped() -> None:
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: f"{path.parent.name}/{path.name}")
+@pytest.mark.slow
 def test_a_shipped_file_names_its_schema_and_fits_it(path: Path) -> None:
     word, _, place = path.read_text().partition("\n")[0].partition(" ")
     assert word == "#:schema"
@@ -144,7 +146,7 @@ def test_a_diagnosis_fits_and_one_more_key_does_not(tmp_path: Path) -> None:
         ("closed-loop-result", ["replay", "run.mcap", "--closed-loop"]),
         ("plot-result", ["plot", "run.mcap"]),
         ("review-result", ["review", "run.mcap"]),
-        ("map-result", ["map"]),
+        pytest.param("map-result", ["map"], marks=pytest.mark.slow),
         ("log-info-result", ["log", "info", "run.mcap"]),
         ("log-check-result", ["log", "check", "run.mcap"]),
         ("log-recover-result", ["log", "recover", "run.mcap"]),

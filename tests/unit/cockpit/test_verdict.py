@@ -67,6 +67,7 @@ def test_unmeasured_blocks_give_no_velocity_ratio(tmp_path: Path) -> None:
     assert (verdict.velocity_ratio_min, verdict.velocity_ratio_max) == (pytest.approx(1.2), pytest.approx(1.2))
 
 
+@pytest.mark.slow
 def test_a_slip_of_a_heavy_slide_is_slow_and_counts(tmp_path: Path) -> None:
     log = tmp_path / "heavy.mcap"
     settings = ["duration_s=12.0", "rig.slide.mass_kg=60.0", "controller.policy.enabled_from_s=100.0"]
@@ -88,6 +89,7 @@ def test_a_stall_or_a_gap_in_the_log_is_a_warning_and_changes_no_status(tmp_path
     assert f"warning  {code}: for 24 ms" in in_words(verdict, verbose=True)
 
 
+@pytest.mark.slow
 def test_a_drive_beyond_the_end_of_its_transducer_is_not_ok(tmp_path: Path) -> None:
     """Here by a transducer that ends after 2 mm; 16 s at 0.5 mm/s are 8 mm."""
     log = tmp_path / "short-range.mcap"

@@ -93,6 +93,7 @@ def test_a_slide_on_a_resting_drive_is_at_a_standstill_and_does_not_slip() -> No
 
 
 @pytest.mark.parametrize(("stiffness", "fall_s", "drop_N"), [(168.0, 0.042, 0.019), (2254.0, 0.0116, 0.022)])
+@pytest.mark.slow
 def test_slips_are_counted_where_they_last_longer_than_a_stick_and_nothing_shows_the_slide(
     stiffness: float, fall_s: float, drop_N: float
 ) -> None:

@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -25,6 +26,7 @@ def _start() -> tuple[Any, Any]:
 
 
 @given(st.lists(st.tuples(EVENTS, ANYTHING, ANYTHING), min_size=1, max_size=60))
+@pytest.mark.slow
 def test_every_command_is_inside_the_limits(wants: list[tuple[int, float, float]]) -> None:
     p, s = _start()
     last_m = 0.0

@@ -88,6 +88,7 @@ def test_the_ratio_falls_to_the_least_once_the_spring_is_wound_up() -> None:
     assert s.ratio[0] == p.least_ratio == 1.07
 
 
+@pytest.mark.slow
 def test_the_ratio_never_falls_onto_the_edge_until_that_is_forgotten() -> None:
     p, s = _start()
     s.ratio[0], s.even_s = 1.1, 0.2
@@ -102,6 +103,7 @@ def test_the_ratio_never_falls_onto_the_edge_until_that_is_forgotten() -> None:
 
 
 @pytest.mark.parametrize("swing", [0.05, 0.1, 0.2])
+@pytest.mark.slow
 def test_the_ratio_rises_until_it_holds_a_swing_of_friction_and_stays(swing: float) -> None:
     """Friction that falls by the swing is still held: (1 - swing) is more than the mean friction, over that at v_a = v_s."""
     p, s = _start()
@@ -112,6 +114,7 @@ def test_the_ratio_rises_until_it_holds_a_swing_of_friction_and_stays(swing: flo
     assert 1.0 / relative.mean() < 1.0 - swing
 
 
+@pytest.mark.slow
 def test_the_ratio_is_bounded_and_changes_no_faster_than_the_spring_follows() -> None:
     p, s = _start()
     s.swing = 0.9
@@ -144,6 +147,7 @@ def test_an_unknown_direction_starts_from_the_ratio_of_the_known_direction() -> 
     assert is_needless(s, 1e-3)
 
 
+@pytest.mark.slow
 def test_the_distance_from_the_edge_doubles_with_every_failure() -> None:
     p, s = _start()
     distances: list[float] = []

@@ -174,6 +174,7 @@ def test_without_blocks_the_command_ramps_at_the_slew_limit() -> None:
     assert faded_ns < 60_000_000  # 30 nm at 1e-6 m/s are 30 ms
 
 
+@pytest.mark.slow
 def test_a_stop_is_taken_however_full_the_inbox_is() -> None:
     controller, bus = process()
     for number in range(WAITING + 44):
@@ -294,6 +295,7 @@ def test_blocks_of_foreign_senders_are_dropped_and_reported() -> None:
     assert {"FOREIGN", "REPEATED", "END"} <= set(codes)
 
 
+@pytest.mark.slow
 def test_an_end_does_not_end_the_controller_while_the_rig_stays() -> None:
     controller, bus = process()
     thread = threading.Thread(target=controller.loop, args=(threading.Event(), ""), daemon=True)
@@ -308,6 +310,7 @@ def test_an_end_does_not_end_the_controller_while_the_rig_stays() -> None:
 
 
 @pytest.mark.parametrize("link_cut", [False, True])
+@pytest.mark.slow
 def test_a_rig_that_leaves_without_an_end_is_reported_and_waited_for(link_cut: bool) -> None:
     """Events of a cut link would be lost, so they wait until the recorder is back."""
     controller, bus = process()

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from bridge.log.logfile import read_run
 from bridge.wire import stickslip_pb2 as wire
@@ -52,6 +53,7 @@ def test_an_exciter_that_is_too_weak_is_an_event_of_the_log(tmp_path: Path) -> N
     assert codes == ["PIEZO_WEAK", "STROKE_MAX", "END"]
 
 
+@pytest.mark.slow
 def test_a_drive_outside_of_its_travel_is_not_vibrated() -> None:
     came = suffer(lambda _block, _at, _memory: None, 3.7, controller={"limits": {"travel_m": [0.0, 1.25e-3]}})
     assert came.reasons["TRAVEL_END"] < 0.6

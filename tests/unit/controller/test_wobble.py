@@ -62,6 +62,7 @@ def test_a_slide_that_follows_by_more_than_its_share_shows_a_fall_of_friction(
 
 
 @pytest.mark.parametrize(("follows", "at_last"), [(1.013, EVEN), (1.03, FALLS)])
+@pytest.mark.slow
 def test_an_answer_between_both_limits_is_probed_further_and_then_judged(follows: float, at_last: int) -> None:
     assert answer(_ask(follows)) == UNSURE
     assert answer(_ask(follows, rounds=4)) == at_last

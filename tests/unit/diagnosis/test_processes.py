@@ -8,6 +8,8 @@ from diagnosis import diagnose
 from diagnosis.processes import each, spread
 from tests.patience import PATIENCE_S
 
+pytestmark = pytest.mark.slow
+
 
 class _SeenError(Exception):
     pass

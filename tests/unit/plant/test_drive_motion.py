@@ -60,6 +60,7 @@ moves = st.builds(
 
 @settings(max_examples=200, deadline=None)
 @given(move=moves)
+@pytest.mark.slow
 def test_a_move_keeps_its_limits_and_ends_at_rest_where_it_should(move: Move) -> None:
     motion = of_moves([move])
     end_s = float(motion.start_s[-1])
@@ -85,6 +86,7 @@ profiles = st.lists(st.tuples(st.floats(0.01, 2.0), st.floats(-0.1, 0.1)), min_s
 
 @settings(max_examples=100, deadline=None)
 @given(points=profiles, until_s=st.floats(0.0, 40.0), cycle=st.booleans())
+@pytest.mark.slow
 def test_the_reach_covers_every_moment(points: list[tuple[float, float]], until_s: float, cycle: bool) -> None:
     motion = of_profile(points)
     if cycle:

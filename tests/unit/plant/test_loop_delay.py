@@ -97,6 +97,7 @@ def test_a_rig_that_lets_go_drops_commands_in_transit() -> None:
         assert applied.fallback == 1
 
 
+@pytest.mark.slow
 def test_the_delay_line_holds_the_longest_delay() -> None:
     longest = rig(
         "loop.delay_s=0.2", "loop.jitter_s=0.1", "solver.block_s=0.00025", "solver.samples_per_block=5",

@@ -82,10 +82,12 @@ def test_one_opened_set_makes_all_development_data(tmp_path):
     assert "DEVELOPMENT DATA" in pool(*files).stdout
 
 
+@pytest.mark.slow
 def test_a_score_that_one_set_lacks_is_left_out_of_the_pool(tmp_path):
     assert "oracle" not in scored(pooled([kept(tmp_path, 1), kept(tmp_path, 2, oracle=None, trees=None)]))
 
 
+@pytest.mark.slow
 def test_files_that_cannot_be_pooled_are_refused(tmp_path):
     one = kept(tmp_path, 1)
 
@@ -113,6 +115,7 @@ def test_files_that_cannot_be_pooled_are_refused(tmp_path):
     assert f"{bad}: cases: 'answer' is missing" in refused(bad)
 
 
+@pytest.mark.slow
 def test_an_input_file_is_not_overwritten(tmp_path):
     one = kept(tmp_path, 1)
     before = one.read_bytes()

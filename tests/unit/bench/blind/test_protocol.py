@@ -68,6 +68,7 @@ def score(folder: Path, *options):
     return blind("score", folder / "set", "--key", folder / "key.json", *options)
 
 
+@pytest.mark.slow
 def test_nothing_in_the_set_reveals_the_answers(made):
     files = sorted(path for path in (made / "set").rglob("*") if path.is_file())
     key = json.loads((made / "key.json").read_text())["cases"]
@@ -310,6 +311,7 @@ def test_a_set_is_scored_once(done):
     assert json.loads((done / "set" / "opened.json").read_text()) == opened
 
 
+@pytest.mark.slow
 def test_a_damaged_result_is_reported_before_opening(done):
     name = sorted(answers(done))[3]
     path = done / "set" / "results" / f"{name}.json"
@@ -333,6 +335,7 @@ def test_missing_results_stay_sealed(done):
     assert "DEVELOPMENT DATA" in score(done).stdout
 
 
+@pytest.mark.slow
 def test_changed_answers_and_evidence_are_refused(done):
     key, name = done / "key.json", sorted(answers(done))[0]
     whole = key.read_text()

@@ -79,6 +79,7 @@ def test_without_a_velocity_level_the_stroke_alone_bounds_the_velocity() -> None
 
 
 @pytest.mark.parametrize("gain", [1.0, 0.5])
+@pytest.mark.slow
 def test_a_checked_gain_bounds_the_ratio_of_vibration_to_drive_velocity(gain: float) -> None:
     rig = Rig(GuardConfig(loud_ratio=FREE))
     rig.s.verified, rig.s.gain[:] = 1, gain
@@ -137,6 +138,7 @@ def test_the_edges_of_the_bands_are_allowed(frequency_Hz: float) -> None:
     assert (rig.s.state, rig.s.limit) == (ACTIVE, NO_CAUSE)
 
 
+@pytest.mark.slow
 def test_warmth_follows_its_model_and_trips() -> None:
     heat = HeatConfig(time_s=0.1, rise_max_K=5e-3)
     rig = Rig(GuardConfig(heat=heat, loud_ratio=FREE))

@@ -136,6 +136,7 @@ def after_a_check(rig: Rig, gain: float, word: int = ARM) -> tuple[int, int]:
     return int(rig.s.state), int(rig.s.cause)
 
 
+@pytest.mark.slow
 def test_a_check_that_finds_a_changed_gain_asks_the_operator() -> None:
     rig = Rig(arm=False)
     assert after_a_check(rig, 1.0) == (ARMED, FIRST_CHECK)

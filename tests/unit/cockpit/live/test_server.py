@@ -172,6 +172,7 @@ def test_a_thirteenth_page_sees_nothing_and_may_stop(port: int, monkeypatch: pyt
     assert words == ["STOP"]
 
 
+@pytest.mark.slow
 def test_silent_connections_keep_no_page_out(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
     monkeypatch.setattr(server, "_OPEN_S", 2.0 * PATIENCE_S)  # none of them is closed before the page has come
     port = request.getfixturevalue("port")
@@ -200,6 +201,7 @@ def test_where_all_connections_are_pages_the_next_is_closed_at_once(port: int, m
     asyncio.run(look())
 
 
+@pytest.mark.slow
 def test_arming_needs_the_token_and_stop_does_not_wait_for_a_command_in_progress(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

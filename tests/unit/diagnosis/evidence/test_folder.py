@@ -235,6 +235,7 @@ def test_channels_are_mapped_and_scaled(tmp_path: Path) -> None:
         load_evidence(folder(tmp_path, data, MANIFEST.replace("[[run]]", channels)))
 
 
+@pytest.mark.slow
 def test_every_format_gives_the_same(tmp_path: Path) -> None:
     data = columns()
     manifest = MANIFEST
@@ -270,6 +271,7 @@ def test_the_command_in_force_is_the_applied_command(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["run-01.parquet", "run.csv", "run.mat", "run.mcap"])
+@pytest.mark.slow
 def test_a_file_whose_content_does_not_fit_its_suffix_is_refused(tmp_path: Path, name: str) -> None:
     (tmp_path / "manifest.toml").write_text(MANIFEST.replace("run-01.parquet", name))
     (tmp_path / name).write_bytes(b"\x00\x01nothing of the kind\xff" * 20)

@@ -34,6 +34,7 @@ def channel_map(folder: Path, **columns: str) -> Path:
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.file)
+@pytest.mark.slow
 def test_a_foreign_table_comes_in(tmp_path: Path, kind: Kind) -> None:
     source = write(kind, tmp_path)
     time, force, position = kind.columns

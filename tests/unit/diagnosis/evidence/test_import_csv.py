@@ -87,6 +87,7 @@ def test_a_csv_file_in_utf_16_without_a_byte_order_mark_is_read(tmp_path: Path) 
     assert len(read_table(tmp_path / "a.csv", Dialect(";", ",", encoding="utf-16-le")).column("F")) == 4000
 
 
+@pytest.mark.slow
 def test_no_signal_is_lost_while_a_csv_file_is_read(tmp_path):
     write_raw(tmp_path / "run.csv", raw())
     got, sent = threading.Event(), 0

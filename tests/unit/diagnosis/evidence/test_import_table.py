@@ -25,6 +25,7 @@ from tests.unit.diagnosis.evidence.measured_tables import MAP, ROWS, raw, setup,
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet", ".mat", ".tdms"])
+@pytest.mark.slow
 def test_a_file_becomes_evidence(tmp_path: Path, suffix: str) -> None:
     source, channel_map = setup(tmp_path, suffix)
     done = import_file(source, channel_map, tmp_path / "evidence")
@@ -64,6 +65,7 @@ def test_a_drive_speed_in_mm_per_s_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "evidence").exists()
 
 
+@pytest.mark.slow
 def test_a_second_run_is_added_to_its_rig_only(tmp_path: Path) -> None:
     source, channel_map = setup(tmp_path, ".csv")
     out = tmp_path / "evidence"
@@ -206,6 +208,7 @@ def test_a_bad_map_is_one_clear_line_and_leaves_nothing(tmp_path: Path, old: str
         ),
     ],
 )
+@pytest.mark.slow
 def test_one_wrong_number_of_the_rig_makes_one_line(tmp_path: Path, old: str, new: str, expected: str) -> None:
     source, channel_map = setup(tmp_path, ".csv", MAP.replace(old, new, 1))
     with pytest.raises(Fault) as caught:
@@ -279,6 +282,7 @@ def test_a_time_of_any_clock_is_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("byte", "value", "expected"), [(145, 11, "its reader was ended by signal"), (144, 0, "it is damaged")]
 )
+@pytest.mark.slow
 def test_a_damaged_file_of_matlab_is_refused(tmp_path: Path, byte: int, value: int, expected: str) -> None:
     """The first damage marks a real column as complex, so SciPy reads beyond the end of the file."""
     scipy.io.savemat(tmp_path / "run.mat", raw())
@@ -289,6 +293,7 @@ def test_a_damaged_file_of_matlab_is_refused(tmp_path: Path, byte: int, value: i
         read_table(tmp_path / "run.mat")
 
 
+@pytest.mark.slow
 def test_a_damaged_compressed_file_of_matlab_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "run.mat"
     scipy.io.savemat(path, {"force": np.random.default_rng(1).normal(size=4000)}, do_compression=True)
@@ -299,6 +304,7 @@ def test_a_damaged_compressed_file_of_matlab_is_refused(tmp_path: Path) -> None:
         read_table(path).column("force")
 
 
+@pytest.mark.slow
 def test_the_command(tmp_path: Path) -> None:
     source, channel_map = setup(tmp_path, ".mat")
     arguments = ["import", str(source), "--map", str(channel_map), "--out", str(tmp_path / "evidence"), "--json"]

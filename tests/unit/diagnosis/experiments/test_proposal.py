@@ -64,6 +64,7 @@ def test_effects_with_equal_predictions_get_a_check_by_hand(one_speed):
     assert "no run separates them by more than 0.0 standard deviations: this is a check by hand" in proposal.why
 
 
+@pytest.mark.slow
 def test_one_explanation_needs_no_comparison(one_speed):
     problem, nuisances, fits = one_speed
     assert next_experiment(problem, nuisances, [fits["static-level"]]).gain is None

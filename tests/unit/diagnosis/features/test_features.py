@@ -23,6 +23,7 @@ LATE = {"frictional-lag": {"form": "dead-time", "delay_s": 1e-3, "share": 1.0}}
 
 
 @pytest.mark.parametrize("clock_s", [40_000.0, -3.0])
+@pytest.mark.slow
 def test_time_counts_from_the_first_sample(ladder, clock_s):
     """Seconds of the day, and a trigger in the middle of the run."""
     evidence, _ = ladder

@@ -44,6 +44,7 @@ def plain() -> tuple[Problem, list[Prepared], Point]:
     return made({})
 
 
+@pytest.mark.slow
 def test_a_described_axis_has_no_gap_and_is_followed(plain: tuple[Problem, list[Prepared], Point]) -> None:
     problem, runs, point = plain
     assert 0.4 < gap_of(problem, point, {}) < 1.6
@@ -78,6 +79,7 @@ def test_an_effect_opens_a_gap_that_only_it_closes(effects: Effects) -> None:
     ],
     ids=lambda effects: next(iter(effects)),
 )
+@pytest.mark.slow
 def test_the_true_force_yields_the_measured_force_through_the_sensor(
     plain: tuple[Problem, list[Prepared], Point], effects: Effects
 ) -> None:

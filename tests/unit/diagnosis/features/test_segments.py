@@ -38,6 +38,7 @@ def read(rig, moved_mps: np.ndarray, stated_mps: float | None = None):
 
 
 @pytest.mark.parametrize("ramp_s", [0.0, 0.05, 0.3, 1.0])
+@pytest.mark.slow
 def test_segments_are_even_and_the_way_between_is_as_measured(rig, ramp_s):
     true_mps = velocity_mps(ramp_s)
     commands_read = read(rig, true_mps)

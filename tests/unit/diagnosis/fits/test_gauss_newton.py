@@ -35,6 +35,7 @@ def start_of(fitter, name):
     return next(trial for trial in trials(fitter.problem) if trial.hypothesis.effects == (name,))
 
 
+@pytest.mark.slow
 def test_an_effect_on_a_level_takes_over_the_deviation_of_its_number(fitter):
     """Start at the rig retuned without the effect: the number is at its bound, the effect 0."""
     retuned = together(fitter.predicted_many, [fitter.retuning(np.zeros(len(fitter.nuisances)))])[0]
@@ -47,6 +48,7 @@ def test_an_effect_on_a_level_takes_over_the_deviation_of_its_number(fitter):
     assert abs(fit.deviations[static]) < 0.2
 
 
+@pytest.mark.slow
 def test_a_prediction_that_would_end_too_late_is_not_begun(fitter):
     problem, (point,) = fitter.problem, [fitter.nuisances.point(np.full(len(fitter.nuisances), 0.1), {})]
     assert 0.0 < problem.pace < 60.0
@@ -58,6 +60,7 @@ def test_a_prediction_that_would_end_too_late_is_not_begun(fitter):
     assert np.isfinite(problem.predicted(point)).any()
 
 
+@pytest.mark.slow
 def test_a_rig_that_cannot_be_is_further_off_than_any_other(fitter):
     described = np.zeros(len(fitter.nuisances))
     yielding, sliding = start_of(fitter, "base-compliance"), start_of(fitter, "coulomb-level")

@@ -49,6 +49,7 @@ def test_evidence_without_a_gap_leaves_about_the_expected_chi2(straight):
     assert 0.5 * expected_chi2 < fit.chi2 < 2.0 * expected_chi2
 
 
+@pytest.mark.slow
 def test_the_reported_numbers_equal_the_numbers_of_the_model(evidence_and_runs):
     """Where the friction levels cross, the static force is raised to the Coulomb force."""
     evidence, _ = evidence_and_runs

@@ -35,6 +35,7 @@ def fitted(request):
     return request.param, fits
 
 
+@pytest.mark.slow
 def test_the_form_that_is_there_fits_best(fitted):
     present, fits = fitted
     other = "screw" if present == "load" else "load"

@@ -77,6 +77,7 @@ def test_a_share_is_a_cause_only_where_its_whole_interval_exceeds_chance():
     assert latent_line([signal._replace(shares=(within,))]) == ""
 
 
+@pytest.mark.slow
 def test_a_force_that_depends_on_position_is_not_named_as_friction():
     signal = signal_of(to_and_fro(0.0, 0.3))
     assert of(signal, FORCE_PLACE).share > 0.7
@@ -84,6 +85,7 @@ def test_a_force_that_depends_on_position_is_not_named_as_friction():
     assert signal.revisited
 
 
+@pytest.mark.slow
 def test_a_push_is_a_matter_of_direction():
     signal = signal_of(to_and_fro(0.4, 0.0))
     assert of(signal, DIRECTION).share == pytest.approx(0.16 / 0.17, abs=0.1)
@@ -102,12 +104,14 @@ def test_unexplained_becomes_partly_by_a_named_share_and_other_verdicts_stay():
 
 
 @pytest.mark.parametrize(("left", "kind"), [(1.6, "no-gap"), (20.5, "partly")])
+@pytest.mark.slow
 def test_no_gap_becomes_partly_where_the_held_out_runs_show_one(left: float, kind: str):
     verdict = Verdict("no-gap", None, dict.fromkeys((PLACE, "none", "unexplained"), 1.0 / 3.0), None, (), 1.0)
     held_out: Any = SimpleNamespace(retuned=left)
     assert with_latent(verdict, [signal_of(one_pass(0.3))], held_out).kind == kind
 
 
+@pytest.mark.slow
 def test_every_slip_of_a_run_is_a_row_at_its_place():
     signals = {signal.signal: signal for signal in latent_of(rig(), [_quiet(run) for run in runs()])}
     assert set(signals) == {BREAKAWAY, SLIDING}

@@ -32,6 +32,7 @@ def saw(stiffness: float, fall_s: float, drop: float, speed_mps: float = 1.1e-3)
         (11700.0, 0.036, 5.8),
     ],
 )
+@pytest.mark.slow
 def test_slips_that_last_longer_than_their_sticks_are_counted(
     noise: float, stiffness: float, fall_s: float, drop: float
 ):
@@ -48,6 +49,7 @@ def test_slips_that_last_longer_than_their_sticks_are_counted(
     assert numbers["stiffness_N_per_m"].value == pytest.approx(stiffness, rel=0.01)
 
 
+@pytest.mark.slow
 def test_noise_does_not_lengthen_the_times_of_slips_and_sticks():
     held = []
     for fall_s in (0.01, 0.02, 0.05):
@@ -76,6 +78,7 @@ def test_a_slip_between_two_samples_may_be_as_short_as_nothing(fall_s: float):
 
 @pytest.mark.parametrize("pair", ["C45-C45 @ 0.063", "C45-GGG40 @ 0.063"])
 @pytest.mark.parametrize(("every", "noise_N"), [(10, 0.0), (20, 0.02), (20, 0.2)])
+@pytest.mark.slow
 def test_the_numbers_of_a_tribometer_are_within_a_percent(pair: str, every: int, noise_N: float) -> None:
     rig = RigConfig.model_validate({"contact": {"pair": pair}})
     made = simulate(rig, 12.0)
@@ -102,6 +105,7 @@ def test_the_numbers_of_a_tribometer_are_within_a_percent(pair: str, every: int,
         )
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth_nine_times_in_ten() -> None:
     """Friction scatters from slip to slip; the interval is an interval of the mean of all slips."""
     random = np.random.default_rng(7)
@@ -210,6 +214,7 @@ def test_a_triangle_and_a_reversal_do_not_count_as_slips() -> None:
     assert turning.slips == 0
 
 
+@pytest.mark.slow
 def test_a_drift_and_several_speeds_are_reported_and_an_even_record_shows_neither() -> None:
     def limits_text(tops: list[float], speeds_mps: list[float]) -> str:
         pieces: list[np.ndarray] = []

@@ -43,6 +43,7 @@ def apart(problem):
     return [trial for trial in loads if has_own_phases(table_of(trial))]
 
 
+@pytest.mark.slow
 def test_runs_apart_show_the_wave_with_a_phase_for_each(problem):
     name = of_run(PHASE, problem.runs[1].file)
     best = min(map(table_of, apart(problem)), key=lambda table: abs(float(table["frequency_Hz"]) - 0.9))

@@ -23,6 +23,7 @@ def shaken_run(runs):
     return next(run for run in runs if run.commands.frequency_Hz.any())
 
 
+@pytest.mark.slow
 def test_entries_are_sticks_and_even_sliding(ladder):
     _, runs = ladder
     run = shaken_run(runs)
@@ -38,6 +39,7 @@ def test_entries_are_sticks_and_even_sliding(ladder):
             assert 0.0 < entry.age_s < 2.0
 
 
+@pytest.mark.slow
 def test_a_contact_that_no_slip_has_renewed_keeps_its_age(ladder):
     evidence, runs = ladder
     begun = [entry for run in runs for entry in run.entries if entry.from_before]

@@ -36,6 +36,7 @@ def screw():
     return prepared("ladder", {"drive-speed-ripple": ripple})
 
 
+@pytest.mark.slow
 def test_a_wave_of_the_drive_is_found_with_its_second_harmonic(screw):
     _, runs = screw
     wave = max(

@@ -27,6 +27,7 @@ def of(aged, effect):
     return pictures(problem, plain, plain, nuisances.point(np.zeros(len(nuisances)), table), (effect,))
 
 
+@pytest.mark.slow
 def test_every_run_has_its_cycle_and_the_effect_its_residual(aged):
     drawn = of(aged, "static-friction-ageing")
     cycles = [picture for picture in drawn if picture.kind == "cycle"]
@@ -60,6 +61,7 @@ def test_any_verdict_can_be_drawn(aged, effect):
 @pytest.mark.parametrize(
     ("protocol", "has"), [("force", ("drive_force_N", "mass_position_m")), ("slow", ("drive_force_N",))]
 )
+@pytest.mark.slow
 def test_other_drives_and_fewer_channels(protocol, has):
     evidence, runs = prepared(protocol)
     runs = [run._replace(signals={name: run.signals[name] for name in has}) for run in runs]

@@ -33,6 +33,7 @@ def clean():
     return prepared("ladder")
 
 
+@pytest.mark.slow
 def test_a_clean_rig_has_small_residuals(clean):
     evidence, _ = clean
     seen, rig = sizes(*clean), evidence.rig

@@ -7,6 +7,7 @@ from diagnosis.relations.answer import Relations, relations_of
 from diagnosis.relations.decide import Decision, decision_of, ruled_out
 from tests.unit.diagnosis.relations.kinematic import BLOCK_S, STIFFNESS_N_PER_M, Signals, rig, runs
 
+pytestmark = pytest.mark.slow
 T_S = (np.arange(8000) + 0.5) * BLOCK_S
 
 

@@ -32,6 +32,7 @@ def text_of(page: str) -> str:
     return re.sub(r"\s+", " ", body)
 
 
+@pytest.mark.slow
 def test_the_answer_comes_first_and_everything_is_there_in_order(tmp_path):
     text = text_of(page_of(made_up.diagnosis(), tmp_path))
     assert text.index("drive-backlash, probability 93 %") < 150
@@ -154,6 +155,7 @@ def test_numbers_that_are_not_finite_are_shown_as_unknown(tmp_path):
     assert "width: nan" not in page
 
 
+@pytest.mark.slow
 def test_without_a_held_out_run_the_report_gives_advice_in_place_of_the_chart(tmp_path):
     made = made_up.diagnosis()
     alone = made.gap._replace(files=(), nominal=NAN, retuned=NAN, with_effect=NAN, floor=NAN, compared=())
@@ -295,6 +297,7 @@ def test_a_number_known_exactly_has_not_moved():
     assert tail.shift_sd == pytest.approx(-0.3)
 
 
+@pytest.mark.slow
 def test_the_summary_warns_where_the_held_out_runs_do_not_test_the_name(tmp_path):
     made = made_up.diagnosis()
     untested = made._replace(gap=made.gap._replace(retuned=1.0, with_effect=1.0, shrinkage=None, interval_90=None))
@@ -307,6 +310,7 @@ def test_the_summary_warns_where_the_held_out_runs_do_not_test_the_name(tmp_path
     assert "Nothing is named" not in page
 
 
+@pytest.mark.slow
 def test_the_text_closes_at_most_the_whole_gap_and_the_json_has_the_number():
     made = made_up.diagnosis()
     compared = tuple(fit._replace(shrinkage=1.06, interval_90=(0.43, 1.76)) for fit in made.gap.compared)

@@ -71,6 +71,7 @@ def diagnosed(evidence, tmp_path):
 SHORT = ("--set", "duration_s=9.0", "--set", "controller.policy.enabled_from_s=4.0")
 
 
+@pytest.mark.slow
 def test_the_loop_holds_on_the_corrected_rig(diagnosed, tmp_path):
     result = run("--rig", diagnosed, *SHORT, "--log", tmp_path / "run.mcap", "--json")
     table = json.loads(result.stdout)
@@ -81,6 +82,7 @@ def test_the_loop_holds_on_the_corrected_rig(diagnosed, tmp_path):
     assert table["velocity_ratio_min"] > 1.0
 
 
+@pytest.mark.slow
 def test_a_piezo_that_is_too_weak_is_reported(diagnosed, tmp_path):
     weak = ("--set", "rig.effects.piezo-roll-off.corner_Hz=300.0")
     result = run("--rig", diagnosed, *weak, *SHORT, "--verbose", "--log", tmp_path / "run.mcap")

@@ -57,6 +57,7 @@ def test_the_folder_does_not_reveal_the_effect():
             assert plain[name] != data
 
 
+@pytest.mark.slow
 def test_a_rig_as_described_has_its_period_and_its_forces():
     run = load_evidence(made_evidence(case_of("constant", drawn=False), 3)).runs[0]
     cycles = find_cycles(run.t_s, run.columns["drive_force_N"])
@@ -65,6 +66,7 @@ def test_a_rig_as_described_has_its_period_and_its_forces():
     assert cycles.period_s == pytest.approx(1.03, rel=0.04)
 
 
+@pytest.mark.slow
 def test_the_true_parameters_are_drawn_within_the_tolerances():
     case = case_of("constant", tolerances={"static_force_N": 0.1})
     described = making.paper_rig()
@@ -83,6 +85,7 @@ def test_the_true_parameters_are_drawn_within_the_tolerances():
     assert find_cycles(run.t_s, run.columns["drive_force_N"]).force_max_N == pytest.approx(true_N, rel=0.01)
 
 
+@pytest.mark.slow
 def test_the_ladder_holds_both_directions_and_the_vibration():
     runs = load_evidence(made_evidence(Case(), 1)).runs
     assert [run.drive_velocity_mps for run in runs] == [0.0005, None, 0.0005, None]
