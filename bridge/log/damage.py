@@ -9,6 +9,8 @@ from bridge.units import counted
 _COUNTS = ("cut_bytes", "bad_chunks", "bad_records", "nameless", "missing")
 _MOST_TOPICS = 4  # topics of other programs that the message names
 
+CHANGED = "its bytes were changed after writing"  # in Damage.before
+
 
 class Damage(NamedTuple):
     """The parts of a log that could not be read."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from bridge.faults import Fault
 from bridge.files import LOG, Replacement, check_file, refuse_to_replace
 from bridge.log.chunk_messages import Messages
-from bridge.log.damage import Damage, also_before, lost_in_words, of_all_files
+from bridge.log.damage import CHANGED, Damage, also_before, lost_in_words, of_all_files
 from bridge.log.library import LIBRARY
 from bridge.log.log_reader import LogReader
 from bridge.log.mcap_chunks import ChunkWriter
@@ -34,9 +34,7 @@ class _Copy:
         self.reader = reader
         self.messages = 0
         self.nameless = 0
-        self._changed = [
-            f"{name}: its bytes were changed after writing" for name in checksums_of(reader.path, not merged).damaged
-        ]
+        self._changed = [f"{name}: {CHANGED}" for name in checksums_of(reader.path, not merged).damaged]
         writer.add_metadata(RECOVERED, {"from": reader.path.name})
         if not merged and (place := part_of(reader.path)) is not None:
             writer.add_metadata(PART, place.as_texts())

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from bridge.arrays import Floats, Records
 from bridge.log.check.channel import not_finite
 from bridge.log.check.log_check import LogWatch
-from bridge.log.damage import Damage, damage_findings, foreign_in_words
+from bridge.log.damage import CHANGED, Damage, damage_findings, foreign_in_words
 from bridge.log.in_charge import InCharge
 from bridge.log.metadata import Metadata, configuration_of
 from bridge.log.storage.checksums import Checksums, checksum_findings
@@ -299,7 +299,7 @@ class RunJudge:
             if share > MISSING_SHARE:
                 most = f"more than {100 * MISSING_SHARE:g} %"
                 doubts.append(f"{100 * share:.1f} % of the judged blocks are missing, {most}")
-        if checksums.changed:
+        if checksums.changed or any(CHANGED in line for line in damaged):
             doubts.append("bytes of the log were changed after it was written or judged")
         if not (losses.blocks_known or losses.planned_s):
             doubts.append(f"the number of missing blocks is unknown; {'; '.join(damaged)}")

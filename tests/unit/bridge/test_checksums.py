@@ -68,6 +68,8 @@ def test_a_changed_configuration_is_a_finding_and_no_good_run(tmp_path: Path) ->
     assert [finding.where for finding in findings] == ["edited.mcap"]
     assert "it was damaged or changed after writing; do not trust it" in findings[0].text
     assert any(fault.startswith("changed: does not fit") for fault in judge(path).faults)
+    recover(path, tmp_path / "recovered.mcap")
+    assert "bytes of the log were changed after it was written or judged" in judge(tmp_path / "recovered.mcap").doubts
 
 
 def test_a_chunk_that_was_taken_out_is_found(tmp_path: Path) -> None:
