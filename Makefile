@@ -17,7 +17,7 @@ demo: $(SMALL)
 # linear algebra with one thread a process: there are as many processes as cores. An import of the whole project without kept
 # bytecode takes 5.3 s of CPU, with it 2.8 s, and some tests start ten processes.
 PARALLEL = OMP_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(NICE) $(BIN)/pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
-EACH_CPU_S := 3 # of a test that is not marked slow; 0.5 on a quiet computer
+EACH_CPU_S := 5 # of a test that is not marked slow; 0.3 on a quiet computer
 # CPU of all tests of `make quick` and of `make test`: may only fall, but for the 40 s that an issue may add to the second
 QUICK_CPU_S := 90
 TEST_CPU_S := 950 # 625 on a quiet computer; a busy one takes half as much again
