@@ -39,7 +39,7 @@ def softmax(scores: dict[str, float]) -> dict[str, float]:
 
 
 def swapped(probabilities: dict[str, float], first: str, second: str) -> dict[str, float]:
-    """The probabilities with those of two explanations exchanged, the largest first."""
+    """The probabilities after an exchange between two explanations, the largest first."""
     exchanged = {first: probabilities.get(second, 0.0), second: probabilities[first]}
     return dict(sorted((probabilities | exchanged).items(), key=lambda item: -item[1]))
 
