@@ -4,6 +4,7 @@ import typer
 
 from bench.blind.command import blind_app
 from bench.control.command import control
+from bench.control.trust.command import trust
 from bench.faults.command import faults
 from cockpit.commands.as_json.option import JsonGroup
 
@@ -15,5 +16,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.command("control")(control)
+app.command("trust")(trust)
 app.command("faults")(faults)
 app.add_typer(blind_app, name="blind")

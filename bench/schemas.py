@@ -43,6 +43,7 @@ FORMATS = {
             "bench.blind.pooling:BlindScores",
         ),
         Format("bench-control-result", "`python -m bench control --json`.", "bench.control.result:BankResult"),
+        Format("bench-trust-result", "`python -m bench trust --json`.", "bench.control.trust.result:TrustResult"),
         Format("bench-faults-result", "`python -m bench faults --json`.", "bench.faults.run:FaultBench"),
         Format("blind-run-result", "`python -m bench blind run --json`.", "bench.blind.command:SetDone"),
     )

@@ -7,96 +7,97 @@ class ControllerParams:
     accel_bandwidth_Hz:float; accel_range_mps2:float; amplitude_max_m:float; band_Hz:npt.NDArray[Any]; bands:int;
     bin_s:float; bin_samples:int; bins_per_tick:int; block_s:float; broken_steps:int; candidate_Hz:npt.NDArray[Any];
     candidates:int; confirm_level:int; drive_stiffness_N_per_m:float; enabled_from_ns:int; filter_share:float;
-    first_probe_s:float; first_steps:int; follow_share:float; frequency_max_Hz:float; frequency_min_Hz:float;
-    frozen_steps:int; gain_band:float; grown_steps:int; high_steps:int; known_steps:int; learn_share:float;
+    first_steps:int; follow_share:float; frequency_max_Hz:float; frequency_min_Hz:float; frozen_steps:int;
+    gain_band:float; gain_floor:float; grown_steps:int; high_steps:int; known_steps:int; learn_share:float;
     least_feed_mps:float; least_ratio:float; levels:int; loud_steps:int; low_steps:int; mode:int; most_ratio:float;
-    passed_steps:int; probe_every_max_s:float; probe_every_s:float; probe_fade_s:float; probe_hold_s:float;
-    sample_s:float; samples_per_block:int; settle_s:float; settle_steps:int; silence_steps:int; slew_m_per_step:float;
-    slot_steps:int; slots:int; spike_bends:float; spring_level:int; start_s:float; ticks_per_block:int; told_gain:float;
-    travel_high_m:float; travel_low_m:float; use_force:int; use_slide_position:int; v_ratio:float;
+    passed_steps:int; sample_s:float; samples_per_block:int; settle_steps:int; silence_steps:int; slew_m_per_step:float;
+    slot_steps:int; slots:int; spike_bends:float; spring_level:int; ticks_per_block:int; told_gain:float;
+    travel_high_m:float; travel_low_m:float; trial_every_s:float; use_force:int; use_slide_position:int; v_ratio:float;
     velocity_max_mps:float; window_s:npt.NDArray[Any]
 
 class ControllerMemory:
-    agreed_mps:npt.NDArray[Any]; agreements:npt.NDArray[Any]; allowed_Hz:float; allowed_m:float; announced_count:int;
-    announced_from_ns:npt.NDArray[Any]; announced_mps:npt.NDArray[Any]; apart_by:int; apart_s:float; at_limit:int;
-    banded:int; bend_m:float; bends:npt.NDArray[Any]; bent:int; bins:npt.NDArray[Any]; blind:int; block:int;
-    breakaway_N:npt.NDArray[Any]; broken_drive:int; broken_slide:int; broken_steps:int; calm_s:float; candidate:int;
-    checked_blocks:int; confirmed:float; contact:int; cut_steps:int; demodulated_Hz:float; differences:npt.NDArray[Any];
-    direction:int; doubted:int; dragged:npt.NDArray[Any]; drive_velocity_mps:float; drive_velocity_sigma_mps:float;
-    dropped:int; drops:float; edge_held_s:npt.NDArray[Any]; edge_ratio:npt.NDArray[Any]; even_s:float; even_steps:int;
-    expected_mps:float; expected_stick_s:float; fade:float; fade_from_N:float; fade_per_s:float; failed:int;
-    failed_left_s:float; fast_mps:float; fine_mps:float; fine_sigma_mps:float; first_sample:npt.NDArray[Any];
-    first_seen:int; followed:int; followed_gain:float; force_rate:float; free_steps:int; fresh:npt.NDArray[Any];
-    gain_known:npt.NDArray[Any]; gain_other_s:float; grown_steps:int; growth:float; guard_state:int;
-    harmful:npt.NDArray[Any]; heard_steps:int; held_mps:float; helpless:int; high_steps:int; in_phase_mps2:float;
-    jumped_s:float; jumps:float; kept_N_per_m:float; kept_mps:npt.NDArray[Any]; known_gain:npt.NDArray[Any];
-    known_steps:npt.NDArray[Any]; late_mps:float; law_mps:npt.NDArray[Any]; lead:float; least_sent_mps:npt.NDArray[Any];
-    level:int; limit:int; listening:int; lively:npt.NDArray[Any]; log_gain:npt.NDArray[Any]; longest_m:float;
-    looked:int; looks:npt.NDArray[Any]; loop_delay_steps:int; loud_steps:int; low_steps:int; measured:int;
-    missing_blocks:int; mode:int; mode_s:float; most_bend:npt.NDArray[Any]; most_sent_mps:npt.NDArray[Any];
-    most_wanted_mps:npt.NDArray[Any]; moved_s:float; moving:int; needed_to_mps:npt.NDArray[Any];
-    needless_from_mps:npt.NDArray[Any]; noise:npt.NDArray[Any]; noise_mps:float; noise_steps:int; noise_told_s:float;
-    off_left_s:npt.NDArray[Any]; off_s:npt.NDArray[Any]; onset_steps:int; outside:int; peak_N:float; phase_rad:float;
-    probe_s:npt.NDArray[Any]; pushed:npt.NDArray[Any]; quadrature_mps2:float; quiet_s:float; ratio:npt.NDArray[Any];
-    ratio_now:float; reason:int; relaxed_m:float; resolution:npt.NDArray[Any]; rest_mps2_2:float; rest_steps:int;
-    rested:int; rising_mps:float; rough_with:npt.NDArray[Any]; roughness:float; roughness_s:float; run:int;
-    same_steps:npt.NDArray[Any]; score:float; seen_block:int; sent_m:npt.NDArray[Any]; settle_left_s:float;
-    settle_mps:float; shaken_s:float; shortest_m:float; sigma:npt.NDArray[Any]; silent_steps:int; since_stick_s:float;
-    slid_N:npt.NDArray[Any]; slid_s:float; slide_accel_unread:int; sliding_N:npt.NDArray[Any]; sliding_mps:float;
-    slip_began:int; slip_count:float; slip_from_N:float; slipping:int; slips:int; slips_wound:float;
-    slope:npt.NDArray[Any]; slope_before:npt.NDArray[Any]; smooth_s:float; spike:npt.NDArray[Any];
-    spike_at:npt.NDArray[Any]; spike_step:npt.NDArray[Any]; spiked:int; spring_level:int; stale:int; stalling_s:float;
-    steady_mps:float; steady_s:float; steps:int; stick_began:int; stick_s:float; stiffest_N_per_m:float;
-    stiffness_N_per_m:float; stiffness_learnt:int; stiffness_sigma:float; stood_s:float; stopped:int; stretched:int;
-    surges:int; swing:float; swing_N:npt.NDArray[Any]; swing_level:int; swung:float; swung_least:float;
-    tail:npt.NDArray[Any]; taught:float; taught_ratio:float; taught_square:float; time_to_slip_s:float;
-    tone_Hz:npt.NDArray[Any]; tone_gain:npt.NDArray[Any]; top:float; trip:int; tuned:int; unasked_s:float;
-    unbelieved_s:float; unseen_s:float; vibration_velocity_mps:float; waiting_s:float; wanted_Hz:float; wanted_m:float;
-    wanted_speed_mps:float; wanted_velocity_mps:float; weak_s:float; went_m:npt.NDArray[Any]; window_s:float;
-    wobble_a:npt.NDArray[Any]; wobble_level:int; wobble_period_s:float; wobble_s:float; wobble_v:npt.NDArray[Any];
-    wobbles:int; wound:int
+    accepted_gain:npt.NDArray[Any]; agreed_mps:npt.NDArray[Any]; agreements:npt.NDArray[Any]; allowed_Hz:float;
+    allowed_m:float; announced_count:int; announced_from_ns:npt.NDArray[Any]; announced_mps:npt.NDArray[Any];
+    apart_by:int; apart_s:float; at_limit:int; banded:int; bend_m:float; bends:npt.NDArray[Any]; bent:int;
+    bins:npt.NDArray[Any]; blind:int; block:int; breakaway_N:npt.NDArray[Any]; broken_drive:int; broken_slide:int;
+    broken_steps:int; calm_s:float; candidate:int; checked_blocks:int; compares:int; compliance_m_per_N:float;
+    compliance_sigma:float; confirmed:float; contact:int; crest_N:float; crest_before_N:float;
+    crest_with_N:npt.NDArray[Any]; cut_steps:int; demodulated_Hz:float; differences:npt.NDArray[Any]; direction:int;
+    doubted:int; dragged:npt.NDArray[Any]; drive_velocity_mps:float; drive_velocity_sigma_mps:float; dropped:int;
+    drops:float; edge_held_s:npt.NDArray[Any]; edge_ratio:npt.NDArray[Any]; even_s:float; even_steps:int;
+    expected_mps:float; expected_stick_s:float; fade:float; fade_per_s:float; failed:int; failed_left_s:float;
+    fall_N:float; fall_s:float; fall_with_N:npt.NDArray[Any]; fall_without_N:float; fast_mps:float; fine_mps:float;
+    fine_sigma_mps:float; first_sample:npt.NDArray[Any]; first_seen:int; followed:int; followed_gain:float;
+    force_rate:float; free_steps:int; fresh:npt.NDArray[Any]; gain_known:npt.NDArray[Any]; gain_other_s:float;
+    grown_steps:int; growth:float; guard_state:int; heard_steps:int; held_mps:float; high_steps:int;
+    in_phase_mps2:float; jumped_s:float; jumps:float; kept_m_per_N:float; kept_mps:npt.NDArray[Any];
+    known_gain:npt.NDArray[Any]; known_steps:npt.NDArray[Any]; late_mps:float; law_mps:npt.NDArray[Any]; lead:float;
+    least_sent_mps:npt.NDArray[Any]; level:int; limit:int; listening:int; lively:npt.NDArray[Any];
+    log_gain:npt.NDArray[Any]; longest_m:float; looked:int; looks:npt.NDArray[Any]; loop_delay_steps:int;
+    loud_steps:int; low_steps:int; measured:int; missing_blocks:int; mode:int; mode_s:float; most_bend:npt.NDArray[Any];
+    most_sent_mps:npt.NDArray[Any]; most_wanted_mps:npt.NDArray[Any]; moved_s:float; moving:int;
+    needed_to_mps:npt.NDArray[Any]; needless_from_mps:npt.NDArray[Any]; noise:npt.NDArray[Any]; noise_mps:float;
+    noise_steps:int; noise_told_s:float; off_left_s:npt.NDArray[Any]; off_s:npt.NDArray[Any]; onset_steps:int;
+    outside:int; overruled:int; peak_N:float; phase_rad:float; proven:npt.NDArray[Any]; pushed:npt.NDArray[Any];
+    quadrature_mps2:float; quiet_s:float; random:int; ratio:npt.NDArray[Any]; ratio_now:float; relaxed_m:float;
+    resolution:npt.NDArray[Any]; rest_mps2_2:float; rest_steps:int; rested:int; rising_mps:float; run:int;
+    same_steps:npt.NDArray[Any]; seen_block:int; sent_m:npt.NDArray[Any]; settled_s:float; shaken_s:float;
+    shortest_m:float; shown:float; shown_c:float; shown_square:float; shown_windows:float; sigma:npt.NDArray[Any];
+    silent_steps:int; since_stick_s:float; slid_N:npt.NDArray[Any]; slide_accel_unread:int; sliding_N:npt.NDArray[Any];
+    sliding_mps:float; slip_began:int; slip_count:float; slip_from_N:float; slip_window_s:float; slipped_s:float;
+    slipping:int; slips:int; slips_wound:float; slope:npt.NDArray[Any]; slope_before:npt.NDArray[Any]; smooth_s:float;
+    spike:npt.NDArray[Any]; spike_at:npt.NDArray[Any]; spike_step:npt.NDArray[Any]; spiked:int; spring_level:int;
+    stale:int; stalling_s:float; steady_mps:float; steady_s:float; steps:int; stick_began:int; stick_s:float;
+    stiffest_m_per_N:float; stiffness_learnt:int; stood_s:float; stopped:int; stretched:int; surges:int; swing:float;
+    swing_N:npt.NDArray[Any]; swing_level:int; tail:npt.NDArray[Any]; time_to_slip_s:float; tone_Hz:npt.NDArray[Any];
+    tone_gain:npt.NDArray[Any]; top:float; tried_s:npt.NDArray[Any]; trip:int; tuned:int; unbelieved_s:float;
+    unseen_s:float; untried_s:npt.NDArray[Any]; vibration_velocity_mps:float; waiting_s:float; wanted_Hz:float;
+    wanted_m:float; wanted_speed_mps:float; wanted_velocity_mps:float; weak_s:float; went_m:npt.NDArray[Any]; why:int;
+    window_s:float; wound:int
 
 class GuardParams:
-    abort:npt.NDArray[Any]; alarm:npt.NDArray[Any]; band_Hz:npt.NDArray[Any]; bands:int; block_s:float; check_m:float;
-    duty_share:float; frequency_max_Hz:float; frequency_min_Hz:float; gain_change:float; heat_per_Hz_m2:float;
-    heat_share:float; hold_blocks:npt.NDArray[Any]; lost_blocks:int; loud_share:float; memory_keep:float; run:int;
-    sample_s:float; slew_m_per_block:float; timeout_blocks:int; tone_Hz:npt.NDArray[Any]; tones:int; window_blocks:int
+    abort:npt.NDArray[Any]; alarm:npt.NDArray[Any]; announced_keep:float; band_Hz:npt.NDArray[Any]; bands:int;
+    block_s:float; check_m:float; duty_share:float; exciter_gain:float; frequency_max_Hz:float; frequency_min_Hz:float;
+    gain_change:float; heat_per_Hz_m2:float; heat_share:float; hold_blocks:npt.NDArray[Any]; lost_blocks:int;
+    loud_share:float; memory_keep:float; run:int; sample_s:float; slew_m_per_block:float; timeout_blocks:int;
+    tone_Hz:npt.NDArray[Any]; tones:int; window_blocks:int
 
 class GuardMemory:
-    accepted:npt.NDArray[Any]; amplitude_m:float; block:int; cause:int; check_blocks:int; drive_m:npt.NDArray[Any];
-    drive_mps:float; duty:float; fastest_mps:float; frequency_Hz:float; fresh:int; frozen_channel:int;
-    gain:npt.NDArray[Any]; heard:int; heat:float; highest:npt.NDArray[Any]; last_sequence:int; limit:int;
-    lost_blocks:int; loud_blocks:int; lowest:npt.NDArray[Any]; over_blocks:npt.NDArray[Any]; quiet_mps2:float;
-    ratio_blocks:int; refused:int; seen_blocks:int; square_mps2:float; state:int; tone_mps2:float; verified:int;
+    accepted:npt.NDArray[Any]; amplitude_m:float; announced_mps:float; block:int; cause:int; check_blocks:int;
+    drive_m:npt.NDArray[Any]; drive_mps:float; duty:float; enable:int; fastest_mps:float; frequency_Hz:float; fresh:int;
+    frozen_channel:int; gain:npt.NDArray[Any]; heard:int; heat:float; highest:npt.NDArray[Any]; last_sequence:int;
+    limit:int; lost_blocks:int; loud_blocks:int; lowest:npt.NDArray[Any]; newest_mps:float;
+    over_blocks:npt.NDArray[Any]; quiet_mps2:float; ratio_blocks:int; refused:int; seen_blocks:int;
+    slide_m:npt.NDArray[Any]; square_mps2:float; state:int; toggle:int; tone_mps2:float; verified:int;
     vibration_mps:float
 
 class PlantParams:
     F_c:float; F_s:float; accel_bandwidth_Hz:float; accel_highpass_keep:float; accel_highpass_keep_stick:float;
     accel_keep:float; accel_keep_stick:float; accel_lowest_Hz:float; accel_noise_mps2:float; accel_range_mps2:float;
     accel_resolution_mps2:float; age_exponent:float; age_growth_N:float; age_length_m:float; age_rested_N:float;
-    age_scale_s:float; age_settling_s:float; amplitude_max_m:float; amplitude_slew_m_per_s:float; backward_ratio:float;
-    base_Hz:float; base_accel_ratio:float; base_damping_ratio:float; base_m_per_N:float; block_ns:int;
-    command_timeout_s:float; delivered_ratio:float; disturbed:int; drift_before_s:float; drift_rate_per_s:float;
-    drift_ratio:float; drift_settling_s:float; dt_s:float; elastic_ratio:float; elasto_plastic:int;
-    force_bandwidth_Hz:float; force_bias_N:float; force_delay_s:float; force_drift_N:float; force_driven:int;
-    force_gain:float; force_keep:float; force_keep_stick:float; force_lag_order:float; force_lag_s:float;
-    force_lowest_N:float; force_noise_N:float; force_range_N:float; force_rate_N_per_s:float; force_ratio:float;
-    force_resolution_N:float; force_settling_s:float; forward_ratio:float; frame_Hz:float; frame_damping_ratio:float;
-    frame_m_per_N:float; frequency_max_Hz:float; frequency_min_Hz:float; gap_m:float; h_d:float; h_t:float; h_v:float;
-    hardening_per_m2:float; k_d:float; k_t:float; kinetic_backward_ratio:float; knee_m:float; knee_ratio:float;
-    lag_dead_s:float; lag_distance_m:float; lag_s:float; late_share:float; load_frequency_Hz:float;
-    load_phase_rad:float; load_ratio:float; load_second_cos:float; load_second_sin:float; load_seed:float; m:float;
-    mass_accel_ratio:float; mode_ratio:float; mount_damping_ratio:float; mount_resonance_Hz:float;
-    position_bandwidth_Hz:float; position_keep:float; position_keep_stick:float; position_linearity:float;
-    position_lowest_m:float; position_noise_m:float; position_other_phase_rad:float; position_other_share:float;
-    position_other_wavelength_m:float; position_phase_rad:float; position_range_m:float; position_ratio:float;
-    position_resolution_m:float; position_second_cos:float; position_second_sin:float; position_seed:float;
-    position_wavelength_m:float; position_width:float; quadratic_Ns2_per_m2:float; relaxation_s:float;
-    relaxing_Ns_per_m:float; ripple_frequency_Hz:float; ripple_per_N:float; ripple_phase_rad:float; ripple_ratio:float;
-    ripple_second_cos:float; ripple_second_sin:float; ripple_wavelength_m:float; rolloff_Hz:float; rolloff_order:float;
-    roughness_length_m:float; roughness_ratio:float; roughness_seed:float; sag_ratio:float; sag_settling_s:float;
-    samples_per_block:int; steps_per_sample:int; steps_per_stick_sample:int; stick_dt_s:float; stribeck_tail:float;
-    v_s:float
+    age_scale_s:float; age_settling_s:float; always_on:float; amplitude_max_m:float; amplitude_slew_m_per_s:float;
+    backward_ratio:float; base_Hz:float; base_accel_ratio:float; base_damping_ratio:float; base_m_per_N:float;
+    block_ns:int; command_timeout_s:float; delivered_ratio:float; disturbed:int; drift_before_s:float;
+    drift_rate_per_s:float; drift_ratio:float; drift_settling_s:float; dt_s:float; elastic_ratio:float;
+    elasto_plastic:int; force_bandwidth_Hz:float; force_bias_N:float; force_delay_s:float; force_drift_N:float;
+    force_driven:int; force_gain:float; force_keep:float; force_keep_stick:float; force_lag_order:float;
+    force_lag_s:float; force_lowest_N:float; force_noise_N:float; force_range_N:float; force_rate_N_per_s:float;
+    force_ratio:float; force_resolution_N:float; force_settling_s:float; forward_ratio:float; frame_Hz:float;
+    frame_damping_ratio:float; frame_m_per_N:float; frequency_max_Hz:float; frequency_min_Hz:float; gap_m:float;
+    h_d:float; h_t:float; h_v:float; hardening_per_m2:float; k_d:float; k_t:float; kinetic_backward_ratio:float;
+    knee_m:float; knee_ratio:float; lag_dead_s:float; lag_distance_m:float; lag_s:float; late_share:float;
+    load_frequency_Hz:float; load_phase_rad:float; load_ratio:float; load_second_cos:float; load_second_sin:float;
+    load_seed:float; m:float; mass_accel_ratio:float; mode_ratio:float; mount_damping_ratio:float;
+    mount_resonance_Hz:float; position_bandwidth_Hz:float; position_keep:float; position_keep_stick:float;
+    position_linearity:float; position_lowest_m:float; position_noise_m:float; position_other_phase_rad:float;
+    position_other_share:float; position_other_wavelength_m:float; position_phase_rad:float; position_range_m:float;
+    position_ratio:float; position_resolution_m:float; position_second_cos:float; position_second_sin:float;
+    position_seed:float; position_wavelength_m:float; position_width:float; quadratic_Ns2_per_m2:float;
+    relaxation_s:float; relaxing_Ns_per_m:float; ripple_frequency_Hz:float; ripple_per_N:float; ripple_phase_rad:float;
+    ripple_ratio:float; ripple_second_cos:float; ripple_second_sin:float; ripple_wavelength_m:float; rolloff_Hz:float;
+    rolloff_order:float; roughness_length_m:float; roughness_ratio:float; roughness_seed:float; sag_ratio:float;
+    sag_settling_s:float; samples_per_block:int; steps_per_sample:int; steps_per_stick_sample:int; stick_dt_s:float;
+    stribeck_tail:float; v_s:float
 
 class PlantMemory:
     age_s:float; amplitude_m:float; arm_N:float; base_accel_f:float; base_accel_slow_f:float; base_m:float;
@@ -109,14 +110,15 @@ class PlantMemory:
     vibrating_s:float; x:float; z:float
 
 class SensorRow:
-    base_accel_mps2:npt.NDArray[Any]; check_Hz:float; check_gain:float; checksum:int; drive_force_N:npt.NDArray[Any];
-    drive_position_m:npt.NDArray[Any]; guard_state:int; mass_accel_mps2:npt.NDArray[Any];
-    mass_position_m:npt.NDArray[Any]; run:int; sequence:int; t_ns:int
+    applied_Hz:float; applied_block:int; applied_m:float; base_accel_mps2:npt.NDArray[Any]; check_Hz:float;
+    check_gain:float; checksum:int; drive_force_N:npt.NDArray[Any]; drive_position_m:npt.NDArray[Any]; fallback:int;
+    guard_limit:int; guard_state:int; mass_accel_mps2:npt.NDArray[Any]; mass_position_m:npt.NDArray[Any]; run:int;
+    sequence:int; t_ns:int
 
 class AppliedRow:
     amplitude_m:float; cause:int; command_block:int; commands:int; commands_late:int; commands_refused:int;
     fallback:int; frequency_Hz:float; guard_limit:int; guard_state:int; heat_share:float; late_ns:int;
-    round_trip_ns:int; sequence:int; t_ns:int
+    round_trip_ns:int; sequence:int; t_ns:int; toggle:int
 
 class CommandRow:
     amplitude_m:float; block:int; frequency_Hz:float; limit:int; mode:int; reason:int; run:int; sequence:int; t_ns:int

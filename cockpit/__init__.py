@@ -10,4 +10,5 @@ faults/     catalogue of faults
 live/       a running rig, live
 look/       `stickslip look`
 entry       entry point of the `stickslip` command
+first_stop  the stop by file, before all else
 """

@@ -1,18 +1,24 @@
-"""Entry point of the `stickslip` command."""
+"""Entry point of the `stickslip` command. A stop by file is set before anything slow is imported."""
 
 import atexit
 import logging
 import os
 import sys
+from typing import TYPE_CHECKING
 
-import typer
+from cockpit.first_stop import stop_by_file
 
-from cockpit.cli import app as stickslip
-from cockpit.run.child_process import exit_status_of, prepare_stdout
+if TYPE_CHECKING:
+    import typer
 
 
-def main(app: typer.Typer = stickslip) -> None:
-    """Run the command line of `app` and end the process; `python -m bench` passes another app."""
+def main(app: "typer.Typer | None" = None) -> None:
+    """Run the command line of `stickslip`, or of another `app`, and end the process."""
+    if app is None:
+        stop_by_file(sys.argv[1:])
+        from cockpit.cli import app
+    from cockpit.run.child_process import exit_status_of, prepare_stdout
+
     # joblib starts its workers with `python -m`, which would import a plant.py or numpy.py from the current folder first
     os.environ["PYTHONSAFEPATH"] = "1"
     # pictures are only written to files; matplotlib fails at import if the variable holds an unknown name
@@ -37,7 +43,7 @@ def main(app: typer.Typer = stickslip) -> None:
     sys.exit(status)
 
 
-def _status(app: typer.Typer) -> int:
+def _status(app: "typer.Typer") -> int:
     """Exit status of the command line; help and version end here too, so that a closed stdout is handled for them as well."""
     try:
         app()

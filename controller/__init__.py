@@ -3,21 +3,21 @@
 config         the controller file, checked
 records        the derived numbers (`PARAMS`) and all memory (`STATE`)
 announced      the announced v_d
-estimate/      windows, motion, contact, learning: the motion of drive and slide
+estimate/      the motion of drive and slide, and the compliance of the drive, with their errors
 vibration      the measured v_a
-frequency      the cheapest allowed frequency
-modes          changes of the mode
-needs/         at which speeds vibration is needed, how much, whether it is needed at all, and when it does not help
-policy         the wanted v_a
+policy/        when to vibrate, at which frequency, and the wanted v_a; the reported reason
 amplitude      the wanted amplitude, by the learnt gain and delay of the exciter
 trips/         faults of sensors and exciter, and the response to them
 limits         the allowed vibration
+in_force       time in which the rig vibrates as commanded; without it nothing is learnt or doubted, and no ratio changes
 core           one step of the controller
 telemetry      the state for plots and the memory for replay
 node, app      the controller as a participant of the bus; the process
 freshness      whether blocks come in time; stalls of the controller itself
 replay         the controller on the frames of a log; replay_steps: comparison of its steps with the log
 message_faults faults of received messages; rig_header: whether the controller can control the rig
+
+`docs/explain/the-controller.md` has its rules on a page.
 
     v_d  drive velocity [m/s]          s    1 - v_s / v_d, the force rate (dF_d/dt) / (k_d v_d) [-]
     v_s  velocity of the slide [m/s]   k_d  stiffness of the drive [N/m]

@@ -10,14 +10,13 @@ import math
 
 from bridge.kernel import Record, kernel
 from bridge.layouts import ControllerMemory, ControllerParams
-from bridge.wire.stickslip_pb2 import CHECKING, HELD, PIEZO_WEAK
+from bridge.wire.stickslip_pb2 import CHECKING
+from controller.in_force import REMEMBERED, is_judged
 from controller.trips.band import banded, is_known, note_known
 from controller.trips.delivered import is_even, note_command
 from controller.trips.doubts import ACCELEROMETER
-from controller.trips.stall import is_judged
 
 TWO_PI = 2.0 * math.pi
-REMEMBERED = 512  # number of stored commands, one a step: 0.1 s of blocks of 0.25 ms
 FIRST_SHARE = 0.1  # first stroke over the stroke of the rigid mount, for a gain that was never measured
 _GROWTH = 1.25  # factor by which the stroke grows in each loop delay, while the gain is not known
 _UNKNOWN_DELAY_S = 0.05  # loop delay until it is measured: the longest that the loop is designed for
@@ -37,7 +36,6 @@ _LOUDER, _MUCH_LOUDER = 1.3, 2.0  # measured over wanted v_a above which the com
 LOUD_S = 0.003  # time for which v_a must exceed _LOUDER times the wanted v_a until it is corrected
 SILENCE_S = 0.1  # duration of zero commands until the base counts as at rest
 _LARGEST_LOG_GAIN = 4.6  # largest logarithm of the gain, either sign: a factor of 100
-_WEAK_S = 0.05  # time at the limit until a piezo counts as weak, and time without until it no longer does
 _ALARM_RATIO = 1.05  # v_a / v_d below which a vibration at the exciter's limit is too weak
 
 
@@ -203,8 +201,4 @@ def _judge_piezo(p: ControllerParams, s: ControllerMemory, weak: bool) -> None:
     if not is_judged(s):
         s.weak_s = 0.0
         return
-    s.weak_s = max(s.weak_s, 0.0) + p.block_s if weak else min(s.weak_s, 0.0) - p.block_s
-    if s.weak_s > _WEAK_S:
-        s.reason = PIEZO_WEAK
-    elif s.weak_s < -_WEAK_S and s.reason == PIEZO_WEAK:
-        s.reason = HELD
+    s.weak_s = s.weak_s + p.block_s if weak else 0.0

@@ -11,7 +11,7 @@ Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 MOST_BANDS = 8  # most forbidden bands of frequency
 _FEWEST_SILENT_BLOCKS = 2  # fewest block periods in `stale_after_s`; with one, every block would be too late
-Mode = Literal["on-demand", "moving", "start-only", "settle"]
+Mode = Literal["on-demand", "moving"]
 MODES: tuple[Mode, ...] = get_args(Mode)
 
 
@@ -33,34 +33,29 @@ class PolicyConfig(Strict):
         "gentle_ratio": "least_ratio is the least v_a / v_d",
         "gentle_from": "a vibration begins as soon as a stick is seen",
         "too_late_from": "a vibration begins as soon as a stick is seen",
+        **dict.fromkeys(
+            ("first_probe_s", "probe_every_s", "probe_every_max_s", "probe_fade_s", "probe_hold_s"),
+            "trial_every_s is the time between trials without vibration",
+        ),
+        **dict.fromkeys(("start_s", "settle_s"), "the modes start-only and settle ended"),
     }
 
     mode: Mode = Field(
         default="on-demand",
-        description="When to vibrate. on-demand: once the slide sticks, while needed; moving: while the drive moves; "
-        "start-only: for start_s after each start; settle: on-demand, and fading out over settle_s after each move.",
+        description="When to vibrate. on-demand: once the slide sticks, while needed; moving: while the drive moves.",
     )
     enabled_from_s: NotNegative = Field(
         default=0.0, le=1e9, description="Time of the run from which vibration is allowed."
     )
-    first_probe_s: Positive = Field(
-        default=0.5,
-        description="Time from the first vibration at a speed to its first probe: a trial without vibration.",
+    trial_every_s: Positive = Field(
+        default=600.0,
+        description="Vibrated time of motion between trials without vibration, where the vibration is known to be needed.",
     )
-    probe_every_s: Positive = Field(
-        default=10.0,
-        description="Time between probes; doubles when a probe finds the vibration still needed, up to probe_every_max_s.",
-    )
-    probe_every_max_s: Positive = 600.0
-    probe_fade_s: Positive = Field(default=0.5, description="Shortest time in which a probe fades the vibration out.")
-    probe_hold_s: Positive = Field(default=0.5, description="Shortest trial without vibration to show it needless.")
     # on the paper's rig 1.00 fails, 1.02 works at some frequencies, 1.05 at all with even friction; 1.07 adds a margin
     least_ratio: Annotated[float, Field(ge=1.02, le=1.5)] = Field(default=1.07, description="Least v_a / v_d to hold.")
     most_ratio: Annotated[float, Field(ge=1.2, le=3.0)] = Field(
         default=2.4, description="Largest v_a / v_d, after slips in spite of the vibration."
     )
-    start_s: Positive = Field(default=0.3, description="Duration of the vibration in mode start-only.")
-    settle_s: Positive = Field(default=0.3, description="Duration of the fading vibration in mode settle.")
 
 
 class AmplitudeConfig(Strict):
@@ -71,8 +66,12 @@ class AmplitudeConfig(Strict):
     filter_s: Positive = Field(default=0.005, description="Time constant of the measured v_a.")
     gain_band: Annotated[float, Field(ge=1.1, le=3.0)] = Field(
         default=1.4,
-        description="Factor by which the exciter's gain may change either way. It also limits the stroke, relative to the stroke "
-        "at the known gain; beyond it the accelerometer is doubted.",
+        description="Factor by which the exciter's gain may change at once, either way. It also limits the stroke, relative to "
+        "the stroke at the known gain; beyond it the accelerometer is doubted.",
+    )
+    gain_floor: Annotated[float, Field(gt=0, le=1)] = Field(
+        default=0.25,
+        description="Share of the exciter's gain to which a warm exciter is followed; beyond it, it is at its end.",
     )
     known_gain: Positive | None = Field(
         default=None,
@@ -117,7 +116,9 @@ class ControllerConfig(Strict):
     gone = {"onset": "the windows follow from the measured noise; see estimator"}
     block_s: Annotated[float, Field(ge=2.5e-4, le=0.02)] = 1e-3
     samples_per_block: Annotated[int, Field(ge=4, le=400)] = 20
-    drive_stiffness_N_per_m: Positive = 11700.0
+    drive_stiffness_N_per_m: Positive | None = Field(
+        default=None, description="k_d of the drive; it is measured. Not given: unknown until then."
+    )
     contact_resonance_Hz: NotNegative = Field(
         default=1144.0,
         description="sqrt(k_t / m) / 2 pi of the contact; the vibration stays above 2.2 times this frequency.",
@@ -168,6 +169,11 @@ class ControllerConfig(Strict):
         if not (self.estimator.use_force or self.estimator.use_slide_position):
             raise ValueError(
                 "estimator.use_force = false: use_slide_position is false as well, so no channel shows a stick; set one to true"
+            )
+        if not self.estimator.use_slide_position and self.drive_stiffness_N_per_m is None:
+            raise ValueError(
+                "drive_stiffness_N_per_m: not given, and use_slide_position = false: the force alone shows sticks only by k_d; "
+                "give drive_stiffness_N_per_m"
             )
         return self
 

@@ -7,18 +7,22 @@ from bridge.kernel import kernel, shared_kernel
 from bridge.layouts import CommandRow, ControllerMemory, ControllerParams, SensorRow, TraceRow
 from bridge.wire.messages import BLOCK, LATE
 from controller.amplitude import FIRST_SHARE, amplitude, listen, note_sent
+from controller.estimate.compliance import begin_spring, learn_compliance, spring_force
 from controller.estimate.contact import contact
-from controller.estimate.learning import begin, forces, spring, stiffness
+from controller.estimate.friction import forces
 from controller.estimate.motion import drive_velocity
 from controller.estimate.spikes import find_spikes, learn_bends, sum_without
 from controller.estimate.windows import BINS, DRIVE, FORCE, MOST_FRESH, SLIDE, clear_windows, note_steps, push
+from controller.in_force import is_judged, note_in_force
 from controller.limits import allow
-from controller.needs.need import way_of
-from controller.policy import decide
+from controller.policy.decide import decide
+from controller.policy.fall import note_fall
+from controller.policy.need import way_of
+from controller.policy.reason import reason_of
+from controller.policy.trial import FIRST_RANDOM
 from controller.trips.band import begin_known, note_check
 from controller.trips.doubts import end_trips
-from controller.trips.stall import is_judged, note_stall
-from controller.trips.watch import reported_reason, restrain, watch
+from controller.trips.watch import restrain, watch
 from controller.vibration import measure, skip
 
 _STEPS_LOOK = 16  # steps between two measurements of resolution and noise of the samples
@@ -52,7 +56,7 @@ def step(
     if s.steps == 0:
         _begin(p, s)
     end_trips(p, s, events)
-    note_stall(p, s, events, gap_blocks)
+    note_in_force(p, s, events, gap_blocks, sensors[0])
     force_N = 0.0
     usable = True
     if events & BLOCK:
@@ -71,7 +75,7 @@ def step(
             listen(p, s, events & LATE != 0)
             force_N = _look(p, s, block)
             if not is_judged(s):
-                s.even_steps = 0  # soon after a stall v_a does not follow the commands
+                s.even_steps = 0  # soon after an interruption v_a does not follow the commands
             watch(p, s, block)
             decide(p, s, t_ns, force_N, p.block_s)
             restrain(p, s)
@@ -87,7 +91,7 @@ def step(
     c.amplitude_m = s.allowed_m
     c.mode = s.mode
     c.limit = s.limit
-    c.reason = reported_reason(s)
+    c.reason = reason_of(s)
     c.run = s.run
 
     t: TraceRow = trace[0]
@@ -101,9 +105,9 @@ def step(
     t.reason = c.reason
     t.limit = s.limit
     t.slips = s.slips
-    t.score = s.score
+    t.score = 0.0
     t.force_rate = s.force_rate
-    t.drive_force_N = force_N
+    t.drive_force_N = force_N if p.use_force == 1 or s.compliance_m_per_N > 0.0 else 0.0
     t.burst_mps2 = 0.0
     t.drive_velocity_mps = s.drive_velocity_mps
     t.vibration_velocity_mps = s.vibration_velocity_mps
@@ -116,8 +120,9 @@ def step(
     t.sliding_velocity_mps = s.direction * s.sliding_mps
     t.window_s = s.window_s
     t.velocity_ratio = s.ratio_now
-    t.drive_stiffness_N_per_m = s.stiffness_N_per_m
-    t.drive_stiffness_sigma = s.stiffness_sigma
+    known = s.compliance_m_per_N > 0.0 and s.compliance_sigma < s.compliance_m_per_N
+    t.drive_stiffness_N_per_m = 1.0 / s.compliance_m_per_N if known else 0.0
+    t.drive_stiffness_sigma = s.compliance_sigma / s.compliance_m_per_N if known else 1.0
     t.breakaway_force_N = s.breakaway_N[way]
     t.sliding_force_N = s.sliding_N[way]
     t.loop_delay_s = max(s.loop_delay_steps, 0) * p.block_s
@@ -129,14 +134,14 @@ def step(
 @kernel
 def _begin(p: ControllerParams, s: ControllerMemory) -> None:
     """Set all memory whose initial value is not zero."""
-    begin(p, s)
+    begin_spring(p, s)
     begin_known(p, s)
     s.followed, s.confirmed, s.went_m[:] = -1, 1.0, -1.0
     s.listening, s.onset_steps, s.loop_delay_steps = 1, -1, -1
     s.silent_steps = p.silence_steps  # the base counts as at rest, as no vibration was ever commanded
     s.level, s.swing_level = -1, -1
-    s.growth, s.quiet_s = FIRST_SHARE, math.inf
-    s.demodulated_Hz = 0.0
+    s.growth, s.quiet_s, s.settled_s, s.slipped_s = FIRST_SHARE, math.inf, math.inf, math.inf
+    s.demodulated_Hz, s.random = 0.0, FIRST_RANDOM
     s.tail[:, :], s.spike_at[:] = math.nan, -1
     for way in range(2):
         s.ratio[way] = p.v_ratio
@@ -160,7 +165,7 @@ def _mean(
         slide_m = sum_without(s, SLIDE, block.mass_position_m, first, samples) if p.use_slide_position == 1 else 0.0
     force_N, slide_m, drive_m = force_N / samples, slide_m / samples, drive_m / samples
     if p.use_force == 0:
-        force_N = spring(s, drive_m - slide_m)
+        force_N = spring_force(s, drive_m - slide_m)
     return force_N, slide_m, drive_m
 
 
@@ -207,6 +212,7 @@ def _look(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> float:
             s.fresh[FORCE, fresh], s.fresh[SLIDE, fresh], s.fresh[DRIVE, fresh] = force_N, slide_m, drive_m
             fresh += 1
             tick_N += force_N
+            note_fall(p, s, force_N)
             if fresh == MOST_FRESH or i == p.bins_per_tick - 1:
                 push(p, s, fresh, True)
                 fresh = 0
@@ -214,7 +220,7 @@ def _look(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> float:
         total_N += tick_N
         drive_velocity(p, s, tick_s)
         contact(p, s, tick_N, tick_s)
-        stiffness(p, s)
+        learn_compliance(p, s, tick_s)
         forces(s, tick_N, tick_s)
         slip_began, stick_began = slip_began | s.slip_began, stick_began | s.stick_began
     s.slip_began, s.stick_began = slip_began, stick_began

@@ -15,10 +15,10 @@ from bridge.wire.topics import ANNOUNCE, COMMAND, SENSORS, SNAPSHOT, STATE, TRAC
 from controller.announced import take_announcement
 from controller.config import ControllerConfig
 from controller.core import step
+from controller.in_force import SETTLED_S
 from controller.records import build
 from controller.telemetry import SNAPSHOT_EVERY, STATE_EVERY, plotted, snapshot
 from controller.trips.age import MARGIN_NS, Age
-from controller.trips.stall import SETTLED_S
 from controller.trips.trip_events import TripEvents
 
 _RESTART_BLOCKS = 1024  # blocks that count as lost when a rig restarts, so that every window is emptied

@@ -8,7 +8,7 @@ import numpy as np
 
 from bridge.arrays import Records
 from bridge.kernel import record
-from controller.amplitude import LEARN_S, LOUD_S, MOST_DELAY_S, REMEMBERED, SETTLE_S, SILENCE_S, SLOTS, TAIL
+from controller.amplitude import LEARN_S, LOUD_S, MOST_DELAY_S, SETTLE_S, SILENCE_S, SLOTS, TAIL
 from controller.announced import MOST_ANNOUNCED
 from controller.config import (
     MODES,
@@ -20,6 +20,7 @@ from controller.config import (
 )
 from controller.estimate.spikes import BENDS
 from controller.estimate.windows import BINS, LEVELS, MOST_FRESH, ROWS
+from controller.in_force import REMEMBERED
 from controller.trips import band, confirmed, delivered, doubts, frozen, spring
 
 _BIN_S = 1e-4  # longest bin; one sample if samples are longer: four bins resolve the slips of a drive of 50 N/um
@@ -34,10 +35,9 @@ def _divisor(count: int, wanted: float) -> int:
 
 _PARAMS_FLOATS = (
     *("block_s", "sample_s", "bin_s", "spike_bends", "drive_stiffness_N_per_m", "least_feed_mps"),
-    *("first_probe_s", "probe_every_s", "probe_every_max_s", "probe_fade_s", "probe_hold_s"),
-    *("least_ratio", "most_ratio", "start_s", "settle_s"),
+    *("trial_every_s", "least_ratio", "most_ratio"),
     *("filter_share", "learn_share", "accel_bandwidth_Hz", "accel_range_mps2"),
-    *("gain_band", "told_gain", "follow_share", "travel_low_m", "travel_high_m"),
+    *("gain_band", "gain_floor", "told_gain", "follow_share", "travel_low_m", "travel_high_m"),
     *("v_ratio", "amplitude_max_m", "velocity_max_mps", "slew_m_per_step", "frequency_min_Hz", "frequency_max_Hz"),
 )
 _PARAMS_INTS = (
@@ -116,27 +116,28 @@ STATE = np.dtype(
         ("fine_mps", "f8"),  # sliding_mps over a longer window with less noise
         ("fine_sigma_mps", "f8"),
         ("force_rate", "f8"),
-        ("score", "f8"),
         ("stick_s", "f8"),
         ("since_stick_s", "f8"),
         ("smooth_s", "f8"),
-        ("slid_s", "f8"),  # duration of smooth sliding without vibration since v_d last changed
         ("expected_stick_s", "f8"),
         ("unseen_s", "f8"),
         ("time_to_slip_s", "f8"),
         ("blind", "i8"),
         ("slipping", "i8"),
+        ("slipped_s", "f8"),  # time since the last slip ended
+        ("slip_window_s", "f8"),  # window that showed its end
         ("slip_began", "i8"),  # 1 if a slip began in this step
         ("stick_began", "i8"),
         ("slips", "i8"),
         ("surges", "i8"),
         # learnt values of the axis
-        ("stiffness_N_per_m", "f8"),
-        ("stiffness_sigma", "f8"),  # relative sigma of the learnt stiffness
-        ("stiffness_learnt", "i8"),
-        ("taught", "f8"),
-        ("taught_ratio", "f8"),
-        ("taught_square", "f8"),
+        ("compliance_m_per_N", "f8"),  # 1 / k_d
+        ("compliance_sigma", "f8"),  # [m/N]; infinite while k_d is unknown
+        ("stiffness_learnt", "i8"),  # 1 once c is known from windows within 20 %
+        ("shown", "f8"),  # sums over the windows that show c: weight, weight c, weight (c - mean)^2, number
+        ("shown_c", "f8"),
+        ("shown_square", "f8"),
+        ("shown_windows", "f8"),
         ("relaxed_m", "f8"),  # elongation of the relaxed spring, for a rig without a force sensor
         ("shortest_m", "f8"),
         ("longest_m", "f8"),
@@ -156,44 +157,41 @@ STATE = np.dtype(
         ("demodulated_Hz", "f8"),
         # policy
         ("mode", "i8"),
-        ("reason", "i8"),
         ("mode_s", "f8"),
         ("calm_s", "f8"),  # duration of smooth sliding under vibration since the last stick or slip in it
         ("waiting_s", "f8"),
         ("swing", "f8"),  # relative swing of friction under vibration; decays
         ("even_s", "f8"),  # time in this mode for which v_s stayed within 10 % of v_d
-        ("swung", "f8"),  # mean square of (swing of v_s / v_d)
-        ("swung_least", "f8"),  # least `swung` since a trial fade began; infinite in a fade after a wobble
-        ("fade", "f8"),  # v_a / v_d of a probe, during which the vibration fades out
-        ("fade_from_N", "f8"),
+        ("why", "i8"),  # Reason of the present vibration
+        ("fade", "f8"),  # v_a / v_d of a trial that begins
         ("fade_per_s", "f8"),
-        ("unasked_s", "f8"),  # time in EXCITE since the last result of a probe or wobble
-        ("wobbles", "i8"),  # 1 while v_a wobbles, to test whether friction falls with speed
-        ("wobble_level", "i8"),  # level of the windows in which v_s is measured during a wobble
-        ("wobble_s", "f8"),
-        ("wobble_period_s", "f8"),
-        ("wobble_a", "f8", (3,)),  # weighted sums over a wobble: v_a times its cosine, v_a times its sine, v_a
-        ("wobble_v", "f8", (3,)),  # the same sums with v_s in place of v_a
+        ("untried_s", "f8", (_WAYS,)),  # vibrated time of motion since the last result of a trial
+        ("tried_s", "f8", (_WAYS,)),  # time without vibration in the present trial
+        ("compares", "i8"),  # 1: the trial shows whether the vibration helps
+        ("random", "i8"),  # of the times between trials
+        (
+            "crest_N",
+            "f8",
+        ),  # largest force along the motion in the present window of `controller.policy.fall`, and in the last
+        ("crest_before_N", "f8"),
+        ("fall_N", "f8"),  # largest fall below the crest in the present window
+        ("fall_s", "f8"),
+        ("fall_with_N", "f8", (_WAYS,)),  # largest fall with vibration, decays
+        ("crest_with_N", "f8", (_WAYS,)),
+        ("fall_without_N", "f8"),  # largest fall in a trial that compares
         ("lead", "f8"),  # share of v_d by which the slide is ahead because the ratio rose; decays
         ("swing_level", "i8"),  # level of the windows in which the swing of v_s is measured; -1: no level
         ("wound", "i8"),  # whether the spring was wound up when this move began
         ("slid_N", "f8", (_WAYS,)),  # force of the spring when the vibrated slide last followed v_d
         ("top", "f8"),  # largest share of v_d by which the slide was ahead; decays; -1: not known yet
-        ("settle_left_s", "f8"),
-        ("settle_mps", "f8"),
-        ("helpless", "i8"),
         ("failed", "i8"),  # number of slips or surges that more vibration could not have prevented
         ("failed_left_s", "f8"),  # time until `failed` restarts from 0
-        ("roughness", "f8"),
-        ("roughness_s", "f8"),
-        ("rough_with", "f8", (_WAYS,)),
-        ("harmful", "i8", (_WAYS,)),
         ("off_s", "f8", (_WAYS,)),
         ("off_left_s", "f8", (_WAYS,)),
         ("ratio", "f8", (_WAYS,)),  # set point of v_a / v_d
         ("edge_ratio", "f8", (_WAYS,)),  # largest ratio that was too small; 0: unknown
         ("edge_held_s", "f8", (_WAYS,)),
-        ("probe_s", "f8", (_WAYS,)),
+        ("proven", "i8", (_WAYS,)),  # 1 if a slip or surge was counted since the ratio last fell
         ("needed_to_mps", "f8", (_WAYS,)),
         ("needless_from_mps", "f8", (_WAYS,)),
         ("ratio_now", "f8"),
@@ -227,6 +225,7 @@ STATE = np.dtype(
         ("trip", "i8"),  # Reason of the reported trip; 0: no trip
         ("doubted", "i8"),  # bits of `controller.trips.doubts`
         ("known_gain", "f8", (MOST_CANDIDATES,)),  # delivered over commanded v_a, from which faults are detected
+        ("accepted_gain", "f8", (MOST_CANDIDATES,)),  # `known_gain` before it followed a warm exciter; 0: it did not
         ("known_steps", "i8", (MOST_CANDIDATES,)),  # number of steps over which `known_gain` is averaged
         ("checked_blocks", "i8"),  # number of received blocks with a tone of the last loop check
         ("tone_Hz", "f8", (MOST_CANDIDATES, 2)),  # nearest tones of the check below and above a candidate; 0: no tone
@@ -240,8 +239,9 @@ STATE = np.dtype(
         ("high_steps", "i8"),  # successive steps of too large a v_a; negative: RESONANCE, for as many steps
         ("rest_mps2_2", "f8"),  # mean square of the base's acceleration minus its sine, over a second
         ("rest_steps", "i8"),  # number of steps for which it has been far larger
+        ("kept_m_per_N", "f8"),  # c when the spring's law last held
+        ("stiffest_m_per_N", "f8"),  # least learnt c
         ("kept_mps", "f8", (ROWS,)),  # velocities of slide and drive when the spring's law last held
-        ("kept_N_per_m", "f8"),  # stiffness when the spring's law last held
         ("broken_steps", "i8"),  # steps for which the law is broken
         ("broken_drive", "i8"),  # checks during this break in which mostly the drive changed, minus the others
         ("broken_slide", "i8"),  # checks in which the slide was faster than drive and spring explain, minus the others
@@ -250,7 +250,6 @@ STATE = np.dtype(
         ("apart_s", "f8"),  # time for which slide and force do not confirm v_d
         ("apart_by", "i8"),  # row of the signal that alone changed before `apart_s` began; negative: unknown
         ("agreed_mps", "f8", (ROWS,)),  # velocities along the drive's direction when v_d was last confirmed
-        ("stiffest_N_per_m", "f8"),  # largest learnt stiffness
         ("went_m", "f8", (2,)),  # last two |changes| of the drive's position from block to block; negative: unknown
         ("jumps", "f8"),  # count of jumps of the drive's position, decays with a time constant of 1 s
         ("jumped_s", "f8"),  # time for which the v_d from before the last jump is still used
@@ -263,8 +262,10 @@ STATE = np.dtype(
         ("slip_count", "f8"),  # count of slips, decays with a time constant of 1 s
         ("slips_wound", "f8"),  # count of slips for which the spring could wind up, decays likewise
         ("unbelieved_s", "f8"),  # time for which slips are still ignored as noise
-        ("quiet_s", "f8"),  # time since the last stall of the computer or the link
-        ("stalling_s", "f8"),  # time for which blocks have not been compared with commands, because of stalls
+        ("overruled", "i8"),  # 1 if the rig vibrated otherwise than commanded in the last block
+        ("quiet_s", "f8"),  # time for which the commands have been in force, without a stall
+        ("settled_s", "f8"),  # time of `quiet_s` in which the exciter delivered no far larger v_a than commanded
+        ("stalling_s", "f8"),  # time for which blocks have not been compared with commands, because of interruptions
         ("noise_told_s", "f8"),  # time for which grown noise is still reported
         ("slide_accel_unread", "i8"),  # whether samples of the slide's accelerometer are not finite
         ("outside", "i8"),  # whether the drive is outside of its travel
@@ -320,14 +321,11 @@ def build(config: ControllerConfig) -> tuple[Records, Records]:
     p.levels = min(LEVELS, 1 + math.floor(math.log2(_LONGEST_WINDOW_S / (BINS * p.bin_s))))
     for level in range(LEVELS):
         p.window_s[level] = BINS * p.bin_s * 2**level
-    p.drive_stiffness_N_per_m = config.drive_stiffness_N_per_m
+    p.drive_stiffness_N_per_m = config.drive_stiffness_N_per_m or 0.0
     p.least_feed_mps = estimator.least_feed_mps
     p.use_force, p.use_slide_position = estimator.use_force, estimator.use_slide_position
     p.mode = MODES.index(policy.mode)
-    for name in (
-        *("first_probe_s", "probe_every_s", "probe_every_max_s", "probe_fade_s", "probe_hold_s"),
-        *("least_ratio", "most_ratio", "start_s", "settle_s"),
-    ):
+    for name in ("trial_every_s", "least_ratio", "most_ratio"):
         p[name] = getattr(policy, name)
     p.enabled_from_ns = round(policy.enabled_from_s * 1e9)
     p.filter_share = 1.0 - math.exp(-config.block_s / amplitude.filter_s)
@@ -341,7 +339,8 @@ def build(config: ControllerConfig) -> tuple[Records, Records]:
     p.travel_low_m, p.travel_high_m = limits.travel_m or (-math.inf, math.inf)
     p.broken_steps, p.first_steps = steps(spring.HOLD_S), max(steps(spring.FIRST_S), delivered.SOME)
     p.told_gain = amplitude.known_gain or 0.0
-    p.gain_band, p.follow_share = amplitude.gain_band, min(delivered.SOME * config.block_s / delivered.FOLLOW_S, 1.0)
+    p.gain_band, p.gain_floor = amplitude.gain_band, amplitude.gain_floor
+    p.follow_share = min(delivered.SOME * config.block_s / delivered.FOLLOW_S, 1.0)
     p.known_steps, p.low_steps, p.high_steps = (
         steps(band.KNOWN_S),
         steps(delivered.HOLD_S),

@@ -11,7 +11,7 @@ STATE_EVERY = 10  # steps between state messages: 100 Hz with blocks of 1 ms
 SNAPSHOT_EVERY = 1000  # steps between snapshots: one a second with blocks of 1 ms
 
 _COPIED = (
-    *("t_ns", "drive_force_N", "vibration_velocity_mps", "drive_velocity_mps", "force_rate", "score"),
+    *("t_ns", "drive_force_N", "vibration_velocity_mps", "drive_velocity_mps", "force_rate"),
     *("mode", "state", "slips"),
 )
 

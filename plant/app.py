@@ -1,19 +1,21 @@
 """The plant process: the rig on the bus, paced to the wall clock or in lockstep with the controller."""
 
 import collections
+import contextlib
 import secrets
 import threading
 from collections.abc import Callable, Sequence
 from functools import partial
 
 from bridge.faults import Fault
-from bridge.guard.config import wider
 from bridge.guard.events import GuardEvents
-from bridge.guard.kept import KeptGain, StopLatch
+from bridge.guard.keeper import Keeper
+from bridge.guard.kept import KeptGain, KeptHeat, StateFile, StopLatch
 from bridge.guard.received import CommandQueue
 from bridge.guard.states import RESET, STOP
+from bridge.guard.stop_file import RigFile
 from bridge.plain import StepReport, no_report
-from bridge.wire import realtime
+from bridge.wire import realtime, refusals
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.clock import time
 from bridge.wire.complaints import BAD_MESSAGE, FOREIGN, Complaints
@@ -26,12 +28,17 @@ from plant.config import RigConfig
 from plant.faults.line import Message
 from plant.faults.table import FaultTable
 from plant.node import PlantNode
+from plant.records import wide_limits
 
 _ANSWER_TIMEOUT_S = 5.0  # lockstep: longest wait for the command that answers a block
 _GOODBYE_S = 3.0  # longest wait of the ended plant for the other processes to leave the bus
 _ROUND_TRIPS_KEPT = 1024  # blocks whose time of sending is kept; answers to older blocks have no round trip
 _LONGEST_FADE_BLOCKS = 1000  # longest wait for the exciter to come to rest [blocks]
 _LATE_NS = 1_000_000  # round trip beyond which a command counts as late
+# Change of the exciter's warmth, over the largest allowed, after which it is stored. Smaller: more writes; with 0.05 there are 20
+# on the way to the limit, and 20 as it cools. Larger: a crash forgets more.
+_HEAT_STEP = 0.05
+_REMIND_NS = 86_400_000_000_000  # interval of the events about certificates that expire: a day
 _PAUSE_NS = 250_000_000  # delay of a due block from which this process counts as stalled
 
 
@@ -53,24 +60,33 @@ def run(
 
     Args:
         arm: start ARMED, if the scenario of a simulated rig demands it.
-        latch: keeps the operator's stop over restarts; None: the stop ends with the process, as in `stickslip run`.
+        latch: the operator's stop; in `stickslip run` it ends with the process; None in lockstep: no stop by file.
         faults: injected into the rig and its bus.
         report: reports the state of this process and important events to the operator.
 
     Raises Fault ENDPOINT_BUSY, NO_PEER, NOT_SECURE, PEER_DIED, LOCKSTEP_STALLED.
 
     """
-    latch_problem = latch.can_be_set() if latch is not None else ""
+    outlasts = latch is not None and latch.outlasts
+    latch_problem = latch.can_be_set() if latch is not None and outlasts else ""
     run_number = 1 if lockstep else secrets.randbits(63) | 1  # in lockstep the same run gives the same log
-    node = PlantNode(rig, seed, run_number, arm and not latch_problem, latch is not None and latch.is_set, faults)
-    kept = None if latch is None else KeptGain(rig.name, node.check_tones_Hz)
+    stop_kept = latch is not None and outlasts and latch.is_set
+    node = PlantNode(rig, seed, run_number, arm and not latch_problem, stop_kept, faults)
+    kept = KeptGain(rig.name, node.check_tones_Hz, rig.guard.exciter_gain) if outlasts else None
+    warmth = KeptHeat(rig.name, rig.guard.heat.time_s) if outlasts else None
     if kept is not None:
         node.accept_gain(kept.load())
+    if warmth is not None:
+        node.warm(warmth.load())
     node.warm_up()
     blocks = round(duration_s / rig.solver.block_s) if duration_s > 0 else 2**62
-    with Bus(bus_config, "plant", lockstep) as bus:
+    log = None if lockstep else refusals.captured()
+    with Bus(bus_config, "plant", lockstep) as bus, contextlib.ExitStack() as ending:
         bus.serve_header(header)
-        process = PlantProcess(node, bus, latch, report, kept)
+        keeper = None if latch is None else Keeper(latch, RigFile(latch.rig, bus_config.endpoint))
+        process = PlantProcess(node, bus, keeper, report, kept, warmth)
+        if log is not None:
+            ending.enter_context(refusals.reported(log, partial(process.event, "REFUSED")))
         # Priority is claimed before the other processes see this one: later, links may lapse on busy cores (docs/method/rig.md).
         if lockstep:
             realtime.claim(realtime.core(bus_config.port), realtime.LOCKSTEP_PRIORITY)
@@ -90,8 +106,10 @@ def run(
             process.event(
                 "STATE_FOLDER", f"{latch_problem}: a stop cannot be kept over a restart, so the rig starts disarmed"
             )
-        if wide := wider(rig.guard):
+        if wide := wide_limits(rig):
             process.event("WIDE_LIMITS", wide)
+        if keeper is not None:
+            ending.enter_context(keeper.running(run_number, partial(process.event, "STATE_FOLDER")))
         advance = process.lockstep if lockstep else process.realtime
         advance(blocks, stop)
         process.end()
@@ -119,9 +137,10 @@ class PlantProcess:
     Args:
         node: the rig.
         bus: its session.
-        latch: keeps the operator's stop; None: not kept.
+        keeper: keeps the operator's stop and finds a stop by file; None: neither.
         report: reports important events to the operator.
         kept: keeps the accepted gain of the exciter; None: not kept.
+        warmth: keeps the warmth of the exciter; None: not kept.
 
     """
 
@@ -129,18 +148,22 @@ class PlantProcess:
         self,
         node: PlantNode,
         bus: Bus,
-        latch: StopLatch | None,
+        keeper: Keeper | None,
         report: StepReport = no_report,
         kept: KeptGain | None = None,
+        warmth: KeptHeat | None = None,
     ) -> None:
         self._node = node
+        self._warmth, self._kept_heat = warmth, 0.0
         self._kept, self._accepted_gain = kept, node.accepted_gain
         self._report_step = report
-        self._latch = latch
+        self._keeper = keeper
         self._guard_events = GuardEvents()
         self._operator_orders, self._fault_orders = Inbox(16), Inbox(16)
         self._bus = bus
         self._complaints = Complaints(self.event)
+        # `ARM by WHO`, which the sender waits for
+        self._orders = Complaints(lambda code, text: self.event(code, text.replace(": ", " ", 1)))
         self._commands = CommandQueue(self._complaints)
         self._answers = Inbox(64)  # commands, read in lockstep only
         self._on_the_way: collections.deque[Received] = collections.deque(maxlen=WAITING)  # commands on the faulty bus
@@ -171,6 +194,7 @@ class PlantProcess:
     def end(self) -> None:
         """Publish END and withdraw the rig's liveliness token; the other processes end once they see both."""
         self._complaints.report_when_due(all_of_it=True)
+        self._orders.report_when_due(all_of_it=True)
         self._report_stall()
         self.event("END", f"blocks={self._node.block}")
         self._bus.withdraw()
@@ -203,19 +227,27 @@ class PlantProcess:
             self._send_announce(message.payload)
 
     def _apply_orders(self) -> None:
-        """Apply the operators' orders since the last block; report and ignore unreadable ones."""
+        """Apply the operators' orders since the last block; report and ignore unreadable ones.
+
+        Orders over the bus are at most 16 a block, and their events one a second for each action.
+        """
+        keeper = self._keeper
         while (received := self._operator_orders.get()) is not None:
             try:
                 order = parsed(wire.Operator, received.payload, OPERATOR.name)
                 name = wire.Operator.Action.Name(order.action)
             except (Fault, ValueError) as error:
-                self.event("OPERATOR", f"ignored: {error}")
+                self._complaints.note("OPERATOR", "ignored", str(error))
                 continue
             self._node.apply_order(order.action)
-            self.event("OPERATOR", f"{name} by {order.who or 'an unnamed operator'}")
-            if (latch := self._latch) is not None and order.action in (STOP, RESET):
-                write = partial(latch.set, order.who) if order.action == STOP else latch.clear
-                self._keep(latch, write, "the order does not outlast a restart")
+            self._orders.note("OPERATOR", name, f"by {order.who or 'an unnamed operator'}")
+            if keeper is not None and order.action == STOP:
+                keeper.keep_stop(order.who)
+            elif keeper is not None and order.action == RESET:
+                keeper.clear_stop()
+        if keeper is not None and (sender := keeper.stop_by_file()) is not None:
+            self._node.apply_order(STOP)
+            self._orders.note("OPERATOR", "STOP", f"by {sender or 'an unnamed operator'}, by file")
 
     def _take_orders(self) -> None:
         """Plan the requested faults from the block after the next one on; report and drop malformed requests."""
@@ -225,26 +257,26 @@ class PlantProcess:
             except Fault as fault:
                 self._complaints.note(BAD_MESSAGE, FAULT.name, f"{fault.line.partition(': ')[2]}: dropped")
 
-    def _keep(self, state: StopLatch | KeptGain, write: Callable[[], None], lost: str) -> None:
-        """Call `write`, which keeps a state over restarts, in a thread: a slow disk must not delay a fade."""
-
-        def keep() -> None:
-            try:
-                write()
-            except (OSError, Fault) as error:
-                self.event("STATE_FOLDER", f"{state.path}: {getattr(error, 'strerror', None) or error}: {lost}")
-
-        threading.Thread(target=keep, name="keep").start()
+    def _keep(self, state: StateFile, write: Callable[[], None], lost: str) -> None:
+        """Keep a state over restarts by `write`, in the keeper's thread."""
+        if self._keeper is not None:
+            self._keeper.keep(state, write, lost)
 
     def _publish_events(self) -> None:
         applied = self._node.applied
         for code, text in self._guard_events.news(applied):
-            changed = f"by a factor of {self._node.gain_change:.2f}; " if code == "GAIN_CHANGED" else ""
-            self.event(code, f"{changed}{text}")
+            measured = f"{self._node.gain_report}; " if code in ("GAIN_CHANGED", "GAIN_UNEXPECTED") else ""
+            self.event(code, f"{measured}{text}")
             if code == "GUARD" and (kept := self._kept) is not None and self._accepted_gain != self._node.accepted_gain:
                 self._accepted_gain = self._node.accepted_gain
                 lost = "the next run of this rig has no gain to compare with"
                 self._keep(kept, partial(kept.save, self._accepted_gain), lost)
+        heat_share = float(applied.heat_share)
+        if (warmth := self._warmth) is not None and abs(heat_share - self._kept_heat) > _HEAT_STEP:
+            self._kept_heat = heat_share
+            self._keep(
+                warmth, partial(warmth.save, heat_share), "the next run of this rig counts its exciter as colder"
+            )
         if refused := int(applied.commands_refused):
             text = "refused; does a controller of an earlier run still run?"
             self._complaints.note(FOREIGN, f"{COMMAND.name} of another run, or not newer than the last", text, refused)
@@ -254,15 +286,15 @@ class PlantProcess:
         try:
             self._advance_to(blocks, stop)
         finally:
-            self._fade_out()
+            self._fade_out(paced=True)
 
-    def _fade_out(self) -> None:
+    def _fade_out(self, paced: bool) -> None:
         node, pacer = self._node, realtime.Pacer(self._node.block_ns)
         node.let_go()
         for tick in range(_LONGEST_FADE_BLOCKS):
             if node.at_rest:
                 return
-            late_ns = pacer.wait(tick)
+            late_ns = pacer.wait(tick) if paced else 0
             sensors, applied = node.advance([], 0, 0, late_ns)
             self._send(sensors.payload, applied.payload)
 
@@ -270,8 +302,11 @@ class PlantProcess:
         node, pacer = self._node, realtime.Pacer(self._node.block_ns)
         sent_ns = [0] * _ROUND_TRIPS_KEPT
         tick = 0
+        remind_ticks = _REMIND_NS // node.block_ns
         while node.block < blocks and not stop.is_set():
             late_ns = pacer.wait(tick)
+            if tick % remind_ticks == 0 and (text := self._bus.expiring()):
+                self.event("CERTIFICATE", text)
             tick += 1
             self._apply_orders()
             self._take_orders()
@@ -289,6 +324,9 @@ class PlantProcess:
             sent_ns[(node.block - 1) % _ROUND_TRIPS_KEPT] = time.perf_counter_ns()
             self._send(sensors.payload, applied.payload)
             self._complaints.report_when_due()
+            self._orders.report_when_due()
+            if self._keeper is not None:
+                self._keeper.at_rest = node.is_stopped
             if late_ns > _PAUSE_NS:
                 self._paused_ns = max(self._paused_ns, late_ns)
             elif late_ns < node.block_ns and commands:  # commands arrive again: the link is up
@@ -301,14 +339,21 @@ class PlantProcess:
             self._paused_ns = 0
 
     def lockstep(self, blocks: int, stop: threading.Event) -> None:
-        """Advance block by block; each block waits for the command that answers the block before."""
+        """Advance block by block; each block waits for the command that answers the block before.
+
+        Before its end the vibration fades to zero on a stop and after a fault; a whole run has as many blocks as in one process.
+        """
         node = self._node
         commands: list[bytes] = []
-        while node.block < blocks and not stop.is_set():
-            self._apply_orders()
-            sensors, applied = node.advance(commands)
-            self._send(sensors.payload, applied.payload)
-            commands = [self._answer(node.block - 1, stop)]
+        try:
+            while node.block < blocks and not stop.is_set():
+                self._apply_orders()
+                sensors, applied = node.advance(commands)
+                self._send(sensors.payload, applied.payload)
+                commands = [self._answer(node.block - 1, stop)]
+        finally:
+            if node.block < blocks:
+                self._fade_out(paced=False)
 
     def _answer(self, block: int, stop: threading.Event) -> bytes:
         until_s = time.monotonic() + _ANSWER_TIMEOUT_S

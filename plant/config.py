@@ -79,7 +79,8 @@ class SlideConfig(Strict):
 class PiezoConfig(Strict):
     """The exciter: its limits, the rate at which its amplitude may change, and its mount."""
 
-    amplitude_max_m: Positive = 1e-7
+    # longest stroke of an exciter of a machine; longer commands are dropped
+    amplitude_max_m: Annotated[float, Field(gt=0, le=1e-3)] = 1e-7
     frequency_min_Hz: Positive = 500.0
     frequency_max_Hz: Positive = 5000.0
     # 1 um/s reaches the paper's 0.02 um in 20 ms
@@ -173,6 +174,9 @@ class RigConfig(Strict):
                 f"piezo.frequency_max_Hz = {piezo.frequency_max_Hz}: must be above "
                 f"piezo.frequency_min_Hz = {piezo.frequency_min_Hz}"
             )
+        self.guard.tones_Hz(
+            piezo.frequency_min_Hz, piezo.frequency_max_Hz
+        )  # a loop check without allowed tones is refused here
         coarsest_s = 1.0 / (_FEWEST_STEPS_A_PERIOD * piezo.frequency_max_Hz)
         if solver.step_s > coarsest_s * (1.0 + 1e-9):
             raise ValueError(

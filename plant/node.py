@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from bridge.faults import Fault
-from bridge.guard.check import gain_change
+from bridge.guard.check import gain_report
 from bridge.guard.core import NO_COMMAND
 from bridge.guard.states import LEAVE, apply_order
 from bridge.kernel_cache import compile_once
@@ -15,6 +15,7 @@ from bridge.wire.channels import CHANNELS
 from bridge.wire.messages import APPLIED as APPLIED_LAYOUT
 from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
 from bridge.wire.messages import sealed, sensor_block
+from bridge.wire.stickslip_pb2 import FAULT
 from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, SENSORS, Outgoing
 from plant.config import RigConfig
 from plant.faults.schedule import Faults
@@ -135,6 +136,10 @@ class PlantNode:
         """Set the gains that later checks are compared with, one per tone, from an earlier run; empty: no comparison."""
         self._guard_state[0].accepted[: len(gains)] = gains
 
+    def warm(self, heat_share: float) -> None:
+        """Set the modelled warmth of the exciter from an earlier run, over the largest allowed."""
+        self._guard_state["heat"] = heat_share
+
     @property
     def accepted_gain(self) -> list[float]:
         """The accepted exciter gain at each tone of the loop check; empty before the first check."""
@@ -142,9 +147,9 @@ class PlantNode:
         return gains if all(gains) else []
 
     @property
-    def gain_change(self) -> float:
-        """Largest factor, either way, between the gains of the last check and the accepted gains."""
-        return gain_change(self._guard_params[0], self._guard_state[0])
+    def gain_report(self) -> str:
+        """The measured and the expected gain at each tone of the last loop check, as text."""
+        return gain_report(self._guard_params[0], self._guard_state[0])
 
     @property
     def applied(self) -> Any:
@@ -166,6 +171,11 @@ class PlantNode:
     def at_rest(self) -> bool:
         """Whether the base is at rest."""
         return self._state["amplitude_m"][0] == 0.0
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether the guard holds the base at rest in FAULT."""
+        return self.at_rest and self._guard_state["state"][0] == FAULT
 
 
 def no_number(config: RigConfig, block: int) -> Fault:

@@ -6,13 +6,16 @@ from typing import Any
 import numpy as np
 
 from bridge.arrays import Records
+from bridge.guard.config import GuardConfig, Level
 from bridge.guard.core import NO_COMMAND
-from bridge.guard.records import ExciterLimits
+from bridge.guard.records import DRIVE_WINDOW_S, ExciterLimits
 from bridge.guard.records import build as build_guard
+from bridge.guard.wide import wider
 from bridge.kernel import record
 from plant.config import PiezoConfig, RigConfig, SensorsConfig
 from plant.effects.library import EFFECTS
 from plant.loop_delay import LINE
+from plant.piezo import delivered_share
 
 # Rows of the array of quantities without a sensor, one column per sample.
 TRUTH = (
@@ -38,6 +41,7 @@ PARAMS = np.dtype(
             *(name for effect in EFFECTS.values() for name in (*effect.fields.values(), *effect.numbers)),
             *("age_length_m", "roughness_ratio", "roughness_length_m", "roughness_seed"),
             *("elastic_ratio", "stribeck_tail"),
+            "always_on",  # 1: a fault makes the exciter vibrate while its enable line is off
         )
     ]
     + [
@@ -72,6 +76,11 @@ STATE = np.dtype(
 # Longest step while the slide sticks, in radians of the slide's swing on the bristles. From 2 on the leapfrog is unstable; at 1
 # the swing is 4.7 % too fast, 2 asin(1/2) / 1. Smaller: stiff rigs take more steps.
 _STICK_STEP_RAD = 1.0
+_PEAK_SIGMAS = 6.0  # sigmas of the drive velocity's noise that its peaks reach in a long run
+_SLOWEST_MPS = 1e-6  # fastest drive of a rig that never moves, as a limit must be above 0
+_LEAST_SHARE = (
+    0.1  # least share of the command that sets the simulated rig's limit of v_a; a weaker exciter cannot help
+)
 
 
 def _keep(bandwidth_Hz: float, period_s: float) -> float:
@@ -116,10 +125,39 @@ def build(config: RigConfig) -> tuple[Records, Records]:
     return params, state
 
 
+def simulated_guard(config: RigConfig) -> GuardConfig:
+    """The guard of a simulated rig: an absolute limit that the rig file leaves out follows from its drive and its exciter."""
+    guard, piezo, sensors = config.guard, config.piezo, config.sensors
+    p: Any = build(config)[0][0]
+    noise_m = math.hypot(sensors.position_noise_m, sensors.position_resolution_m) / math.sqrt(
+        config.solver.samples_per_block
+    )
+    noise_mps = math.sqrt(2.0) * noise_m / DRIVE_WINDOW_S
+    ripple = p.ripple_ratio + p.ripple_per_N * p.F_s
+    driven_mps = (1.0 + ripple) * max(config.drive.speeds_mps(), default=0.0) + _PEAK_SIGMAS * noise_mps
+    fastest_mps = guard.fastest_drive_mps or max(driven_mps, _SLOWEST_MPS)
+    # An exciter that delivers less needs a larger command for the same v_a.
+    frequencies_Hz = np.linspace(piezo.frequency_min_Hz, piezo.frequency_max_Hz, 50)
+    least = (1.0 - p.sag_ratio) * min(delivered_share(p, frequency_Hz) for frequency_Hz in frequencies_Hz)
+    largest_mps = fastest_mps / min(max(least, _LEAST_SHARE), 1.0)
+    ratio = guard.velocity_ratio
+    velocity = guard.velocity_mps or Level(alarm=ratio.alarm * largest_mps, abort=ratio.abort * largest_mps)
+    return guard.model_copy(update={"fastest_drive_mps": fastest_mps, "velocity_mps": velocity})
+
+
 def guard_records(config: RigConfig, run: int, arm: bool, stop_kept: bool = False) -> tuple[Records, Records]:
     """Parameters and memory of the rig's guard; the other arguments are passed to `bridge.guard.records.build`."""
+    return build_guard(simulated_guard(config), _exciter(config), run, arm, stop_kept)
+
+
+def wide_limits(config: RigConfig) -> str:
+    """The limits of a rig that protect less than usual, as text; empty without such a limit."""
+    return wider(config.guard, _exciter(config), simulated_guard(config).fastest_drive_mps or 0.0)
+
+
+def _exciter(config: RigConfig) -> ExciterLimits:
     piezo, solver = config.piezo, config.solver
-    exciter = ExciterLimits(
+    return ExciterLimits(
         piezo.amplitude_max_m,
         piezo.frequency_min_Hz,
         piezo.frequency_max_Hz,
@@ -128,7 +166,6 @@ def guard_records(config: RigConfig, run: int, arm: bool, stop_kept: bool = Fals
         solver.samples_per_block,
         piezo.command_timeout_s,
     )
-    return build_guard(config.guard, exciter, run, arm, stop_kept)
 
 
 def _add_effects(p: Any, config: RigConfig) -> None:

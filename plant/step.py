@@ -2,7 +2,7 @@
 
 from bridge.arrays import Floats, Records
 from bridge.guard.check import write_gain
-from bridge.guard.core import accept, allow, look
+from bridge.guard.core import accept, allow, look, write_in_force
 from bridge.guard.estimates import expect_drive
 from bridge.kernel import shared_kernel
 from bridge.layouts import AppliedRow, GuardMemory, GuardParams, PlantMemory, PlantParams, SensorRow
@@ -54,10 +54,11 @@ def act(
         send(s, commands[newest], delay_blocks)
     receive(s)
     allow(gp, g, s.command_block, s.commanded_Hz, s.commanded_m)
+    amplitude_m = g.amplitude_m if g.enable == 1 or p.always_on != 0.0 else 0.0
     if p.disturbed:
-        advance_disturbed(params, state, drive_velocity_mps, g.frequency_Hz, g.amplitude_m, analogue, truth)
+        advance_disturbed(params, state, drive_velocity_mps, g.frequency_Hz, amplitude_m, analogue, truth)
     else:
-        advance(params, state, drive_velocity_mps, g.frequency_Hz, g.amplitude_m, analogue, truth)
+        advance(params, state, drive_velocity_mps, g.frequency_Hz, amplitude_m, analogue, truth)
     block: SensorRow = sensors[0]
     block.sequence = s.block
     block.t_ns = (s.block + 1) * p.block_ns
@@ -96,6 +97,7 @@ def report(
     block.run = gp.run
     block.guard_state = g.state
     write_gain(gp, g, block)
+    write_in_force(g, s.command_block, block)
     a: AppliedRow = applied[0]
     a.sequence = s.block
     a.t_ns = (s.block + 1) * p.block_ns
@@ -113,4 +115,5 @@ def report(
     a.commands_refused = g.refused
     g.refused = 0
     a.heat_share = g.heat
+    a.toggle = g.toggle
     s.block += 1

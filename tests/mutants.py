@@ -22,7 +22,7 @@ TESTS = "tests/unit/bridge/guard"
 MODULES = {
     "core": ("core", "states", "limits"),
     "limits": ("limits", "core", "states"),
-    "senses": ("limits", "states", "core"),
+    "estimates": ("limits", "states", "core"),
     "states": ("states", "core", "limits"),
     "check": ("states", "core", "limits"),
 }
@@ -37,9 +37,9 @@ SAME = {
     "if velocity_mps >= fastest_mps:": "of two equal velocities either is the larger",
     "elif velocity_mps >= second_mps:": "of two equal velocities either is the larger",
     "if determinant <= 1e-9:": "a measured number is never equal to the last bit",
-    "if s.tone_mps2 <= _HEARD * s.quiet_mps2:": "a measured number is never equal to the last bit",
-    "elif not 1.0 / _WILD <= s.gain[at] < _WILD:": "a measured number is never equal to the last bit",
-    "elif not 1.0 / _WILD < s.gain[at] <= _WILD:": "a measured number is never equal to the last bit",
+    "if s.amplitude_m == 0.0 or not s.tone_mps2 >= _ANSWERS * s.quiet_mps2:": "a measured number is never equal to the last bit",
+    "if s.tone_mps2 > _ANSWERS * s.quiet_mps2:": "a measured number is never equal to the last bit",
+    "if slide_mps >= _STICKS * drive_mps:": "a measured number is never equal to the last bit",
 }
 _ABOUT = (
     "Made by `python -m tests.mutants --report runs/mutants.md`; `make mutants` runs the same and fails where more than "

@@ -18,5 +18,6 @@ axes_map.py   for which axes the controller works: stiffness, feed, noise and de
 page.py       one HTML page: the table first, then the failures
 command.py    the command line, `python -m bench control`
 drawn         axes drawn at random
+trust/        drawn axes, axes that never stick, disturbed runs and re-sticks: `python -m bench trust`
 plots         a failed run as a picture
 """

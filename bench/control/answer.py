@@ -11,7 +11,7 @@ from bridge.kernel import Record, kernel
 from bridge.wire.stickslip_pb2 import EXCITE, PROBE, SLIP, STICK, STICK_SEEN
 
 _SETTLED_S = 10.0  # time after the first announcement from which the energy is compared with the least possible
-_EXCITED = 0.05  # v_a / v_d above which the rig counts as vibrated
+EXCITED = 0.05  # v_a / v_d above which the rig counts as vibrated
 _START_S, _FIRST_LOOP_DELAYS = 0.15, 12.0  # time after a start for v_a to reach v_d; loop delays added at the first
 _ABOVE, _TWICE = 1.3, 2.0  # limits of v_a over the wanted v_a, and over v_d; the time above them is counted
 _EXACT = 1.0 - 1e-6  # share of v_d that v_a must reach: v_d is a difference of rounded positions
@@ -83,9 +83,9 @@ def _add_moving(p: Record, s: Record, t: Record, v_a_mps: float, v_d: float) -> 
     s.enabled_moving_s += dt
     s.energy += v_a_mps * v_a_mps * dt
     s.drive_energy += v_d * v_d * dt
-    excited_s = dt if v_a_mps > _EXCITED * v_d else 0.0
+    excited_s = dt if v_a_mps > EXCITED * v_d else 0.0
     s.excited_s += excited_s
-    if v_a_mps > _TWICE * v_d:
+    if v_a_mps > _TWICE * s.fastest:  # a braking drive is not followed at once: its recent largest v_d counts
         s.twice_s += dt
     if t.reason == p.blind_reason:
         s.blind_s += dt

@@ -33,7 +33,7 @@ _CROWD_MM_PER_S = 0.4  # most runs have feeds near this value; names go on the e
 _OFF = 10.0  # time to see a stick over its duration, in place of infinity: far above the border at 1
 _MACHINES = ("paper-c45-c45", "pneumatic-seal", "belt-axis", "ball-screw-axis")
 _SEES, _BLIND, _INK = "#dcebd8", "#d5d8dc", "#1f2d3a"
-_CLEAN, _MISSED, _REPORTS_BLIND, _HELPLESS = "clean", "slips or surges", "reports BLIND", "reports CANNOT_HELP"
+_CLEAN, _MISSED, _REPORTS_BLIND, _HELPLESS = "clean", "slips or surges", "reports BLIND", "reports EXCITER_END"
 _MARKS: dict[str, dict[str, Any]] = {
     _CLEAN: {"marker": "o", "color": "#1e8449", "s": 20, "linewidths": 0},
     _REPORTS_BLIND: {"marker": "s", "facecolors": "none", "color": "#17202a", "s": 70, "linewidths": 1.8},
@@ -121,7 +121,7 @@ def _outcome(run: Figures) -> str:
     if run.expect == "helped":
         return _MISSED if run.slips + run.surges else _REPORTS_BLIND if run.blind_share > 0.5 else _CLEAN
     if run.expect == "cannot-help":
-        return _HELPLESS if "CANNOT_HELP" in run.words else _MISSED
+        return _HELPLESS if "EXCITER_END" in run.words else _MISSED
     return _REPORTS_BLIND if "BLIND" in run.words else _MISSED if run.slips + run.surges else _CLEAN
 
 

@@ -107,6 +107,10 @@ def _slips(runs: dict[str, list[Figures]], controller: str) -> Bar:
         name: f"{sum(run.slips for run in _counted(runs[name]))} slips, {sum(run.surges for run in _counted(runs[name]))} surges"
         for name in runs
     }
+    trials = [run for run in _counted(runs[controller]) if run.trial_slips]
+    values[controller] += (
+        f", {sum(run.trial_slips for run in trials)} more in trials of {sum(run.moving_s for run in trials):.0f} s"
+    )
     energies = {name: _mean_energy(runs[name]) for name in runs}
     moving = next((name for name in runs if name == NAMES[MOVING]), None)
     if moving is None:
@@ -212,7 +216,7 @@ def _above(controlled: list[Figures], controller: str) -> Bar:
 
 def _words(controlled: list[Figures], controller: str) -> Bar:
     asked = [run for run in controlled if run.expect in {"helped", "blind", "cannot-help"}]
-    silent = [run for run in asked if any(line.startswith(("BLIND", "CANNOT_HELP", SILENT)) for line in run.failures)]
+    silent = [run for run in asked if any(line.startswith(("BLIND", "EXCITER_END", SILENT)) for line in run.failures)]
     return Bar(
         "axes where it neither helps nor reports it",
         "0",

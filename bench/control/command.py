@@ -18,8 +18,9 @@ def control(
     small: Annotated[bool, typer.Option("--small", help="The small part of the bank alone, some seconds.")] = False,
     drawn: Annotated[
         int | None,
-        typer.Option(metavar="SEED", help="In place of the bank: 60 axes that are drawn at random with this seed."),
+        typer.Option(metavar="SEED", help="In place of the bank: axes that are drawn at random with this seed."),
     ] = None,
+    count: Annotated[int, typer.Option("--axes", min=1, metavar="N", help="Number of axes to draw.")] = 60,
     rivals: Annotated[bool, typer.Option(help="Run the rivals of the controller, too.")] = True,
     report: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a report, one .html file.")] = None,
     axes: Annotated[
@@ -43,7 +44,7 @@ def control(
             check_output("--report", report, PAGE)
         if axes is not None:
             check_output("--map", axes, PICTURE)
-        bank = chosen(load_bank() if drawn is None else drawn_axes(drawn), only, small)
+        bank = chosen(load_bank() if drawn is None else drawn_axes(drawn, count), only, small)
         with watched() as progress:
             result = bench(bank, rivals, jobs or cpu_count(), lambda share, line: progress(line, share))
         if report is not None:

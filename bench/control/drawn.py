@@ -1,7 +1,8 @@
 """Axes drawn at random: unseen axes judge a controller better than the bank that it was developed with.
 
 Drive stiffness 0.013 to 50 N/um, mass 0.5 to 200 kg and feed 0.1 to 1.5 mm/s, each log-uniform. Only axes with stick-slip
-without control are kept. Every second axis moves back and forth; 25 % have late commands, another 15 % long blocks.
+without control are kept. Every second axis moves back and forth; 25 % have late commands, another 15 % long blocks. Every second
+pair of axes gives the controller no k_d, and its names show it.
 """
 
 import math
@@ -22,19 +23,22 @@ def drawn_axes(seed: int, count: int = AXES) -> list[BankScenario]:
     while len(axes) < count:
         table = _axis(random, back_and_forth=len(axes) % 2 == 1)
         if table is not None:
-            name = f"axis-{len(axes) + 1:02d}"
-            axes.append(scenario_of("drawn", f"--drawn {seed}: {name}", {"name": name, **table}))
+            gives_k_d = len(axes) % 4 < 2
+            name = f"axis-{len(axes) + 1:02d}{'' if gives_k_d else '-without-k_d'}"
+            bank = {"told": {"drive_stiffness_given": gives_k_d}}
+            axes.append(scenario_of("drawn", f"--drawn {seed}: {name}", {"name": name, "bank": bank, **table}))
     return axes
 
 
-def _by_factors(random: Random, low: float, high: float) -> float:
+def by_factors(random: Random, low: float, high: float) -> float:
+    """Log-uniform number, rounded to three digits."""
     return float(f"{math.exp(random.uniform(math.log(low), math.log(high))):.3g}")
 
 
 def _axis(random: Random, back_and_forth: bool) -> dict[str, Any] | None:
     """A scenario as in a file of the bank; None for an axis that does not stick and slip, or whose run takes too long."""
-    k_d, mass_kg = 1e6 * _by_factors(random, 0.0126, 50.0), _by_factors(random, 0.5, 200.0)
-    v_d, drop = _by_factors(random, 1e-4, 1.5e-3), random.uniform(0.1, 0.3)
+    k_d, mass_kg = 1e6 * by_factors(random, 0.0126, 50.0), by_factors(random, 0.5, 200.0)
+    v_d, drop = by_factors(random, 1e-4, 1.5e-3), random.uniform(0.1, 0.3)
     static_N = float(f"{mass_kg * random.uniform(2.0, 5.0):.3g}")
     stick_s, load_s = 2.0 * drop * static_N / (k_d * v_d), 2.0 * static_N / (k_d * v_d)
     fastest = drop * static_N / math.sqrt(k_d * mass_kg) / v_d  # largest v_s of a slip, over v_d
@@ -52,7 +56,7 @@ def _axis(random: Random, back_and_forth: bool) -> dict[str, Any] | None:
         drive |= {"profile": [[0.0, v_d]]}
     if duration_s > 120.0:
         return None
-    rig = _rig(mass_kg, static_N, drop) | {"drive": drive}
+    rig = rig_table(mass_kg, static_N, drop) | {"drive": drive}
     return {"description": words + _loop(random, rig), "duration_s": duration_s, "rig": rig}
 
 
@@ -62,7 +66,8 @@ def _there_and_back(v_d: float, way_s: float) -> dict[str, Any]:
     return {"profile": [list(point) for point in (*turns, *back)], "repeat_every_s": 2.0 * way_s}
 
 
-def _rig(mass_kg: float, static_N: float, drop: float) -> dict[str, Any]:
+def rig_table(mass_kg: float, static_N: float, drop: float) -> dict[str, Any]:
+    """A rig without its drive; `drop` is the share by which friction falls."""
     stiffness = static_N / _GIVE_M
     return {
         "slide": {"mass_kg": mass_kg},

@@ -7,16 +7,16 @@ import numpy as np
 
 from bench.control import record
 from bench.control.oracle import Oracle
-from bench.control.run import Judged, wrong_from
+from bench.control.run import Judged, of_trials, wrong_from
 from bench.control.scenario import BankScenario
 from bridge.wire import stickslip_pb2 as wire
 
 _SLOWEST_S = 0.012  # delay of an announcement that is always allowed; noise allows more
 _LEAST_SETTLED_S, _LEAST_MOVING_S = 45.0, 150.0  # least motion to judge energy; to judge needless vibration
 _MOST_EXCITED, _LEAST_COVERED = 0.02, 0.9995  # bars: share of needless vibration; of blocks with v_a >= v_d
-_BLIND_S, _CANNOT_HELP_S, _CANNOT_HELP_PERIODS = 1.0, 2.0, 3.0  # latest BLIND; CANNOT_HELP, plus periods of stick-slip
+_BLIND_S, _END_S, _END_PERIODS = 1.0, 2.0, 3.0  # latest BLIND; EXCITER_END, plus periods of stick-slip
 _ABOVE_S = 0.005  # longest time of v_a above 1.3 times the wanted; a block is added
-_SAYS_SO = {"BLIND", "CANNOT_HELP", "HARMFUL"}  # reasons that report that the controller does not help
+_SAYS_SO = {"BLIND", "EXCITER_END", "CANNOT_HELP"}  # reasons that report that the controller does not help
 _LEFT_ALONE = 0.1  # share of the slips without control from which a run counts as not helped
 SILENT = "neither helps nor reports it"
 
@@ -28,6 +28,7 @@ class Figures(NamedTuple):
     scenario: str
     subject: str
     expect: str
+    k_d_given: bool  # whether the controller's file gives the drive's stiffness
     duration_s: float
     sticks: int  # number of true sticks that 5 sigma of the noise show, or that were announced
     recalled: int  # number of these sticks that were announced, or began in mode EXCITE
@@ -36,6 +37,7 @@ class Figures(NamedTuple):
     false_claims: int
     slips: int  # slips after the first announcement, once v_a can have reached v_d
     surges: int
+    trial_slips: int  # slips and surges in trials without vibration, which do not count as slips or surges
     slips_on_the_way: int  # slips and surges from the first announcement to that time
     slips_from_enabling: int  # slips and surges from enabling on
     energy_ratio: float  # mean v_a^2 over mean v_d^2 while the drive moves, from enabling on
@@ -47,7 +49,7 @@ class Figures(NamedTuple):
     uncovered: float  # number of these blocks in which it does not
     above_s: float  # longest time of v_a above 1.3 times the wanted
     above_limit_s: float
-    twice_share: float  # time with v_a above 2 v_d over the vibrated time
+    twice_share: float  # time of motion with v_a above twice the recent largest v_d, over the moving time
     moving_s: float
     error_rms_m: float
     error_peak_m: float
@@ -55,6 +57,7 @@ class Figures(NamedTuple):
     turn_stick_s: float  # longest stick of the slide after a reversal
     quadrant_m: float  # largest following error after a reversal, minus its mean over the rest of the stroke
     words: dict[str, float]  # reasons of the controller, and the moving time until each was given
+    reports: list[str]  # events of rig and controller that report a fault or a limit; see `bench.control.trust.reports`
     counted_from_s: float  # time from which slips and surges are counted
     failures: list[str]
     oracle: Oracle | None  # result of the oracle, for a run of the controller with slips or surges, counted or not
@@ -64,7 +67,8 @@ def refused(scenario: BankScenario, subject: str, why: str) -> Figures:
     """The figures of a scenario that the controller does not take."""
     empty = dict.fromkeys(Figures._fields, 0)
     given = {"family": scenario.family, "scenario": scenario.name, "subject": subject, "expect": scenario.bank.expect}
-    lists = {"delays_s": [], "late_ratios": [], "words": {}, "failures": [f"refused: {why}"]}
+    given |= {"k_d_given": scenario.bank.told.drive_stiffness_given}
+    lists = {"delays_s": [], "late_ratios": [], "words": {}, "reports": [], "failures": [f"refused: {why}"]}
     none = {"settled_ratio": -1.0, "oracle": None}
     return Figures(**(empty | given | lists | none))  # pyright: ignore[reportArgumentType]
 
@@ -98,14 +102,16 @@ def figures(scenario: BankScenario, subject: str, judged: Judged, is_controller:
         scenario=scenario.name,
         subject=subject,
         expect=scenario.bank.expect,
+        k_d_given=scenario.bank.told.drive_stiffness_given,
         duration_s=judged.duration_s,
         sticks=len(seen),
         recalled=int(np.sum((seen[:, 5] >= 0.0) | (seen[:, 6] == 1.0))),
         delays_s=[round(float(delay_s), 6) for delay_s in delays_s],
         late_ratios=[round(float(late_ratio), 4) for late_ratio in delays_s / soon_s],
         false_claims=int(np.sum(kinds == record.CLAIMED)),
-        slips=int(np.sum((kinds == record.SLIPPED) & (begins > able_s))),
-        surges=int(np.sum((kinds == record.SURGED) & (begins > able_s))),
+        slips=int(np.sum((kinds == record.SLIPPED) & wrong & (begins > able_s))),
+        surges=int(np.sum((kinds == record.SURGED) & wrong & (begins > able_s))),
+        trial_slips=int(np.sum(of_trials(events))),
         slips_on_the_way=int(np.sum(wrong & (begins > from_s) & (begins <= able_s))),
         slips_from_enabling=int(np.sum(wrong)),
         energy_ratio=sums["energy"] / max(sums["drive_energy"], 1e-30),
@@ -119,7 +125,7 @@ def figures(scenario: BankScenario, subject: str, judged: Judged, is_controller:
         uncovered=sums["uncovered"],
         above_s=sums["above_s"],
         above_limit_s=_ABOVE_S + scenario.rig.solver.block_s,
-        twice_share=sums["twice_s"] / max(sums["excited_s"], 1e-9),
+        twice_share=sums["twice_s"] / moving_s,
         moving_s=sums["enabled_moving_s"],
         error_rms_m=math.sqrt(sums["error_square"] / max(sums["moving_s"], 1e-9)),
         error_peak_m=sums["error_peak_m"],
@@ -127,6 +133,7 @@ def figures(scenario: BankScenario, subject: str, judged: Judged, is_controller:
         turn_stick_s=sums["turn_stick_s"],
         quadrant_m=sums["quadrant_m"],
         words={name: moving for name, (_, moving, _) in judged.reasons.items()},
+        reports=[],
         counted_from_s=able_s,
         failures=[],
         oracle=None,
@@ -182,9 +189,9 @@ def _failures(scenario: BankScenario, run: Figures, judged: Judged) -> list[str]
         if needs_s > _BLIND_S or not helps:
             lines.append(_too_late("BLIND", words, 1, _BLIND_S))
     if expect == "cannot-help":
-        limit_s = _CANNOT_HELP_S + _CANNOT_HELP_PERIODS * _period_s(scenario)
-        if not ("CANNOT_HELP" in words and words["CANNOT_HELP"][2] <= limit_s + 1e-6):
-            lines.append(_too_late("CANNOT_HELP", words, 2, limit_s))
+        limit_s = _END_S + _END_PERIODS * _period_s(scenario)
+        if not ("EXCITER_END" in words and words["EXCITER_END"][2] <= limit_s + 1e-6):
+            lines.append(_too_late("EXCITER_END", words, 2, limit_s))
     return lines
 
 

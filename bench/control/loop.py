@@ -54,7 +54,8 @@ class JudgedLoop(ClosedLoop):
     ) -> None:
         self._rule = None if isinstance(subject, ControllerConfig) else subject
         if self._rule is not None:  # the guard must not end the vibration of a rival
-            guard = rig.guard.model_copy(update={"loud_ratio": Level(alarm=1e12, abort=1e12)})
+            free = Level(alarm=1e12, abort=1e12)
+            guard = rig.guard.model_copy(update={"loud_ratio": free, "velocity_mps": free})
             rig = rig.model_copy(update={"guard": guard})
         config = subject if isinstance(subject, ControllerConfig) else ControllerConfig()
         super().__init__(rig, seed, config, arm=True)

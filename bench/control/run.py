@@ -1,6 +1,7 @@
 """One scenario with one subject, from the start to the end, judged stretch by stretch so that hours need no memory."""
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ from bench.control.loop import Hum, JudgedLoop
 from bench.control.scenario import BankScenario
 from bench.control.watch import watch
 from bridge.wire import stickslip_pb2 as wire
-from cockpit.run.closed_loop import Pair
+from cockpit.run.closed_loop import Pair, Stretch
 from plant.config import RigConfig
 from plant.loop_delay import whole_blocks
 
@@ -58,13 +59,18 @@ class Judged(NamedTuple):
 
 
 def judge(
-    scenario: BankScenario, subject: Subject, ends_at_slip_from_s: float = math.inf, keep_at_s: float = -1.0
+    scenario: BankScenario,
+    subject: Subject,
+    ends_at_slip_from_s: float = math.inf,
+    keep_at_s: float = -1.0,
+    observe: Callable[[Stretch], None] = lambda _: None,
 ) -> Judged:
     """Run a scenario and judge it. Raises Fault CONFIG where the controller refuses the scenario.
 
     Args:
         ends_at_slip_from_s: the run ends at the first slip or surge after this time.
         keep_at_s: time whose curves are kept in any case; below 0: none.
+        observe: called with the messages of each stretch of the run.
 
     """
     rig, bank = scenario.rig, scenario.bank
@@ -83,7 +89,7 @@ def judge(
     loop = JudgedLoop(rig, scenario.seed, controls, hum, _sees_blocks(rig, subject))
     blind = dict(wire.Reason.items()).get("BLIND", -1)
     of_judge = record.build(rig, scenario.slowest_mps, enabled_from_s, velocity_max_mps, blind)
-    return _to_the_end(scenario, loop, of_judge, ends_at_slip_from_s, keep_at_s)
+    return _to_the_end(scenario, loop, of_judge, ends_at_slip_from_s, keep_at_s, observe)
 
 
 def _sees_blocks(rig: RigConfig, subject: Subject) -> tuple[int, int]:
@@ -95,7 +101,12 @@ def _sees_blocks(rig: RigConfig, subject: Subject) -> tuple[int, int]:
 
 
 def _to_the_end(
-    scenario: BankScenario, loop: JudgedLoop, of_judge: Pair, ends_at_slip_from_s: float, keep_at_s: float
+    scenario: BankScenario,
+    loop: JudgedLoop,
+    of_judge: Pair,
+    ends_at_slip_from_s: float,
+    keep_at_s: float,
+    observe: Callable[[Stretch], None],
 ) -> Judged:
     block_s = scenario.rig.solver.block_s
     blocks = round(scenario.duration_s / block_s)
@@ -111,6 +122,7 @@ def _to_the_end(
         begin = loop.block
         length = min(stretch, blocks - begin)
         made = loop.advance(length)
+        observe(made)
         done = len(made.trace)
         broken = done < length
         count = watch(*of_judge, made.truth, made.v_a_mps, made.frequency_Hz, made.gain, made.trace, room, rows[:done])
@@ -143,9 +155,17 @@ def _to_the_end(
 
 
 def wrong_from(events: npt.NDArray[np.float64], from_s: float) -> npt.NDArray[np.bool_]:
-    """Which events are slips or surges after a time."""
-    kinds = events[:, 0]
-    return ((kinds == record.SLIPPED) | (kinds == record.SURGED)) & (events[:, 1] > from_s)
+    """Which events are slips or surges after a time; slips in a trial do not count."""
+    return _fast(events) & (events[:, 1] > from_s) & (events[:, 5] != wire.PROBE)
+
+
+def of_trials(events: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+    """Which events are slips or surges in a trial without vibration."""
+    return _fast(events) & (events[:, 5] == wire.PROBE)
+
+
+def _fast(events: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+    return (events[:, 0] == record.SLIPPED) | (events[:, 0] == record.SURGED)
 
 
 def _worth_keeping(events: npt.NDArray[np.float64], of_judge: Pair) -> bool:

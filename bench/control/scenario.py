@@ -30,6 +30,7 @@ class AssumedConfig(Strict):
     """The controller's settings of the rig, as ratios to the true values."""
 
     drive_stiffness_ratio: Annotated[float, Field(gt=0)] = 1.0
+    drive_stiffness_given: bool = Field(default=True, description="false: its file gives no drive_stiffness_N_per_m.")
 
 
 class BankConfig(Strict):
@@ -121,6 +122,13 @@ def scenario_of(family: str, source: str, table: dict[str, Any]) -> BankScenario
     return BankScenario(family, str(table["name"]), str(table["description"]), bank, rig, table, source)
 
 
+def changed(scenario: BankScenario, name: str, duration_s: float, table: dict[str, Any]) -> BankScenario:
+    """The scenario under another name, with another duration and the keys of `table`."""
+    bank = scenario.bank.model_dump(exclude_defaults=True)
+    table = merged(scenario.table, {"name": name, "duration_s": duration_s, "bank": bank, **table})
+    return scenario_of(scenario.family, f"{scenario.name} as {name}", table)
+
+
 def _controller_table(rig: RigConfig, assumed: AssumedConfig) -> dict[str, Any]:
     """The controller's table that follows from the rig."""
     piezo = rig.piezo
@@ -131,10 +139,10 @@ def _controller_table(rig: RigConfig, assumed: AssumedConfig) -> dict[str, Any]:
     }
     if piezo.amplitude_slew_m_per_s > 0.0:
         limits["slew_m_per_s"] = piezo.amplitude_slew_m_per_s
-    return {
+    stiffness_N_per_m = rig.drive.stiffness_N_per_m * assumed.drive_stiffness_ratio
+    return ({"drive_stiffness_N_per_m": stiffness_N_per_m} if assumed.drive_stiffness_given else {}) | {
         "block_s": rig.solver.block_s,
         "samples_per_block": rig.solver.samples_per_block,
-        "drive_stiffness_N_per_m": rig.drive.stiffness_N_per_m * assumed.drive_stiffness_ratio,
         "contact_resonance_Hz": math.sqrt(rig.contact.stiffness_N_per_m / rig.slide.mass_kg) / (2.0 * math.pi),
         "limits": limits,
     }

@@ -10,6 +10,7 @@ from bench.control.figures import Figures, figures, refused
 from bench.control.oracle import Least, ask, least
 from bench.control.run import Curves, Judged, Subject, judge, wrong_from
 from bench.control.scenario import BankScenario
+from bench.control.trust.reports import Reports
 from bridge.faults import Fault
 from bridge.kernel_cache import compile_once
 
@@ -36,13 +37,14 @@ def run_one(scenario: BankScenario, rule: int) -> Done:
     """One scenario with one subject; a scenario that the controller refuses is a failure, not a fault."""
     subject = Subject(rule)
     by_controller = rule == rules.CONTROLLER
+    reports = Reports()
     try:
-        judged = judge(scenario, subject)
+        judged = judge(scenario, subject, observe=reports if by_controller else lambda _: None)
     except Fault as fault:
         if not by_controller:
             raise
         return Done(refused(scenario, subject.name, fault.line), None)
-    result = figures(scenario, subject.name, judged, by_controller)
+    result = figures(scenario, subject.name, judged, by_controller)._replace(reports=sorted(reports.codes))
     if by_controller and result.expect in _ASKED and result.slips_from_enabling:
         return _with_oracle(scenario, result, judged)
     return Done(result, judged if result.failures else None)
@@ -76,7 +78,7 @@ def run_bank(
     length_s = sum(scenario.duration_s for scenario, _ in plan)
     done: list[Done] = []
     spent_s = 0.0
-    for run, (scenario, _) in zip(_each(run_one, plan, jobs), plan, strict=True):
+    for run, (scenario, _) in zip(each(run_one, plan, jobs), plan, strict=True):
         done.append(run)
         spent_s += scenario.duration_s
         line = f"{run.figures.scenario}, {run.figures.subject}"
@@ -87,14 +89,14 @@ def run_bank(
 def find_least(bank: Sequence[BankScenario], jobs: int, progress: Callable[[float, str], None]) -> dict[str, Least]:
     """The least constant ratios of scenarios, by name."""
     ratios: dict[str, Least] = {}
-    for run, ratio in zip(bank, _each(least, [(run,) for run in bank], jobs), strict=True):
+    for run, ratio in zip(bank, each(least, [(run,) for run in bank], jobs), strict=True):
         ratios[run.name] = ratio
         line = f"{run.name}: least constant v_a / v_d {ratio.from_one:.2f}, {ratio.of_all:.2f} without the floor of 1"
         progress(len(ratios) / len(bank), line)
     return ratios
 
 
-def _each(function: Callable[..., R], items: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[R]:
+def each(function: Callable[..., R], items: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[R]:
     """`function(*item)` for every item, in their order, in `jobs` processes."""
     if jobs == 1:
         yield from (function(*item) for item in items)

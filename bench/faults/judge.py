@@ -5,6 +5,7 @@ The truth is the rig's: v_a of its base, the velocity of its drive and of its sl
 
 import contextlib
 from collections import Counter
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -22,7 +23,7 @@ from bridge.wire.payloads import sequence_and_time
 from bridge.wire.topics import SENSORS, TRACE
 from cockpit.faults.catalogue import CatalogueEntry
 from cockpit.run.in_process import TimedAction
-from cockpit.run.scenario import load_scenario
+from cockpit.run.scenario import Scenario, load_scenario
 from plant.faults.schedule import BEGAN, ENDED
 
 SAFE, SILENT, UNSAFE = "safe", "SILENT", "UNSAFE"
@@ -81,7 +82,7 @@ class Happened(NamedTuple):
 
 def judge(case: CatalogueEntry) -> Outcome:
     """Run one entry in simulated time and judge it. Raises Fault CONFIG for an invalid scenario."""
-    ran = _run(case, with_faults=True)
+    ran = happened(case, with_faults=True)
     told_as = next((word for word in ran.told if word.word in case.told and word.after_s <= case.entry.within_s), None)
     verdict, why = _verdict(case, ran, told_as)
     return Outcome(
@@ -130,10 +131,13 @@ def _key(row: CatalogueEntry) -> Any:
 
 @lru_cache(maxsize=16)
 def _healthy(key: str) -> Happened:
-    return _run(CatalogueEntry.model_validate_json(key), with_faults=False)
+    return happened(CatalogueEntry.model_validate_json(key), with_faults=False)
 
 
-def _run(case: CatalogueEntry, with_faults: bool) -> Happened:
+def happened(
+    case: CatalogueEntry, with_faults: bool, make: Callable[[Scenario, list[TimedAction]], TruthRun] = TruthRun
+) -> Happened:
+    """Run one entry in simulated time; `make` creates the run. Raises Fault CONFIG for an invalid scenario."""
     entry = case.entry
     seconds = entry.begin_s + entry.watch_s
     scenario = load_scenario(entry.scenario, [*case.settings, f"duration_s={seconds}"])
@@ -148,7 +152,7 @@ def _run(case: CatalogueEntry, with_faults: bool) -> Happened:
     ]
     if entry.checked:
         words.append(TimedAction(round(_ARM_S * 1e9), wire.Operator.ARM))
-    run = TruthRun(scenario, words)
+    run = make(scenario, words)
     ear = _Ear(entry.begin_s, scenario.controller.block_s)
     run.listen(ear)
     run.play()

@@ -29,9 +29,15 @@ class Truth(NamedTuple):
 class _TruthNode(PlantNode):
     """A rig that appends the truth of each block to a list."""
 
-    def __init__(self, truths: list[tuple[float, float, float, float]], now_ns: Callable[[], int], **rest: Any) -> None:
+    def __init__(
+        self,
+        truths: list[tuple[float, float, float, float]],
+        now_ns: Callable[[], int],
+        observe: Callable[[PlantNode], None],
+        **rest: Any,
+    ) -> None:
         PlantNode.__init__(self, **rest)
-        self._truths, self._now_ns = truths, now_ns
+        self._truths, self._now_ns, self._observe = truths, now_ns, observe
         self._drive_m = 0.0
 
     def advance(
@@ -44,6 +50,7 @@ class _TruthNode(PlantNode):
         self._drive_m = drive_m
         fastest_mps = float(speeds[np.abs(speeds).argmax()])
         self._truths.append((self._now_ns() * 1e-9, self.vibration_mps, drive_mps, fastest_mps))
+        self._observe(self)
         return sent
 
 
@@ -62,7 +69,10 @@ class TruthRun(SimulatedRun):
 
     def plant_node(self, **settings: Any) -> PlantNode:
         """The rig, which appends the truth of each block."""
-        return _TruthNode(self._truths, lambda: self._stage.now_ns, **settings)
+        return _TruthNode(self._truths, lambda: self._stage.now_ns, self.observe, **settings)
+
+    def observe(self, node: PlantNode) -> None:
+        """Look at the rig after each block. A subclass may override this."""
 
     @property
     def truth(self) -> Truth:

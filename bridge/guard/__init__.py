@@ -9,7 +9,10 @@ It is a process stop and no safety function: an emergency stop belongs in the su
     estimates  drive velocity and vibration velocity, from the rig's own samples
     check    the loop check: sensors live, exciter answers, its gain
     core     `accept` a command, `look` at a block, `allow` a vibration
-    kept     the operator's stop and the accepted exciter gain, kept over restarts
+    kept     the operator's stop, the accepted exciter gain and the exciter's warmth, kept over restarts
+    keeper   the thread that writes and watches these files
+    stop_file  a stop without the bus: set, found and confirmed as a file
+    wide     limits of a rig file that protect less than usual
     events   events of a rig's guard
     received valid commands of the bus, in order
 

@@ -11,6 +11,7 @@ _LONGEST_S = 1e9  # longest time: 30 years; a far longer one overflows the count
 HoldTime = Annotated[float, Field(ge=0, le=_LONGEST_S)]
 Share = Annotated[float, Field(gt=0, le=1)]
 MOST_BANDS = 8  # most forbidden bands
+_TONES = 5  # tones of a loop check without `check_Hz`
 
 
 class Level(Strict):
@@ -45,12 +46,24 @@ class GuardConfig(Strict):
     stroke_m: Level | None = Field(
         None, description="Commanded stroke. Not given: piezo.amplitude_max_m, abort at 1.5 times that."
     )
+    fastest_drive_mps: Positive | None = Field(
+        None,
+        description="Fastest velocity of the drive; the guard trips at 1.5 times that. A real rig must give it; a simulated rig "
+        "takes it from its drive.",
+    )
     velocity_mps: Level | None = Field(
-        None, description="Commanded v_a. Not given: the v_a of the stroke at the highest frequency."
+        None,
+        description="v_a, commanded or measured. A real rig must give it; a simulated rig takes velocity_ratio times its fastest "
+        "drive, over the least share that its exciter delivers.",
+    )
+    exciter_gain: Positive = Field(
+        1.0,
+        description="Delivered over commanded amplitude of the mounted exciter; 1 for a rigid mount. The first loop check must "
+        "measure it within a factor of 1.5.",
     )
     velocity_ratio: Level = Field(
         Level(alarm=3.0, abort=4.0, hold_s=0.1),
-        description="Commanded v_a, times the gain of the loop check, over the drive's velocity.",
+        description="Commanded v_a, times the gain of the loop check but at least exciter_gain, over the drive's velocity.",
     )
     loud_ratio: Level = Field(
         Level(alarm=3.0, abort=4.0, hold_s=0.1), description="Measured v_a over the drive's velocity."
@@ -72,7 +85,8 @@ class GuardConfig(Strict):
         0.75, description="Time without a fresh command until the rig is DISARMED."
     )
     check_Hz: Annotated[list[Positive], Field(max_length=8)] = Field(
-        [], description="Frequencies of the loop check, rising. Not given: five over piezo's range, none forbidden."
+        [],
+        description="Frequencies of the loop check, rising, allowed ones. Not given: five over piezo's range, none forbidden.",
     )
     gain_change: Annotated[float, Field(ge=1.05, le=2.0)] = Field(
         1.25,
@@ -89,19 +103,25 @@ class GuardConfig(Strict):
             raise ValueError(f"check_Hz = {self.check_Hz}: must rise")
         return self
 
+    def tones_Hz(self, lowest_Hz: float, highest_Hz: float) -> list[float]:
+        """The frequencies of the loop check for an exciter with this range. Raises ValueError for a forbidden tone."""
+        spaced = [lowest_Hz + (highest_Hz - lowest_Hz) * n / (_TONES + 1) for n in range(1, _TONES + 1)]
+        for tone in self.check_Hz:
+            if not lowest_Hz <= tone <= highest_Hz:
+                raise ValueError(
+                    f"guard.check_Hz = {tone:g}: must be within the exciter's range, {lowest_Hz:g} to {highest_Hz:g} Hz"
+                )
+            if self._forbids(tone):
+                raise ValueError(
+                    f"guard.check_Hz = {tone:g}: must be outside of guard.forbidden_Hz; choose another tone"
+                )
+        tones = self.check_Hz or [tone for tone in spaced if not self._forbids(tone)]
+        if not tones:
+            raise ValueError(
+                "guard.forbidden_Hz: no tone is left for the loop check, and no rig is armed without it; narrow the bands, or "
+                "set guard.check_Hz"
+            )
+        return tones
 
-_WEAKER_IF_LARGER = ("velocity_ratio", "loud_ratio", "band_hold_s", "drive_memory_s", "command_lost_s", "gain_change")
-
-
-def wider(config: GuardConfig) -> str:
-    """The limits that protect less than the defaults, as text; empty without such a limit."""
-    default = GuardConfig()
-    weaker: list[str] = []
-    for name in _WEAKER_IF_LARGER:
-        chosen, usual = getattr(config, name), getattr(default, name)
-        if isinstance(chosen, Level):
-            parts = [(f"{name}.{part}", getattr(chosen, part), getattr(usual, part)) for part in Level.model_fields]
-        else:
-            parts = [(name, chosen, usual)]
-        weaker += [f"{key} = {value:g} (default {usual:g})" for key, value, usual in parts if value > usual]
-    return ", ".join(weaker)
+    def _forbids(self, frequency_Hz: float) -> bool:
+        return any(low <= frequency_Hz <= high for low, high in self.forbidden_Hz)

@@ -2,14 +2,17 @@
 
 import math
 
-from bridge.guard.check import check_tone, follow_check
+from bridge.guard.check import check_tone, enable_off, follow_check
 from bridge.guard.estimates import see_drive, see_vibration
-from bridge.guard.limits import held, watch
+from bridge.guard.limits import held, held_by_drive, watch
 from bridge.guard.states import enter, note_vibration
 from bridge.kernel import kernel
 from bridge.layouts import CommandRow, GuardMemory, GuardParams, SensorRow
 from bridge.wire import stickslip_pb2 as wire
 
+_MOST = (
+    2**62
+)  # number of a command from which it is refused: far below 2^63, from which `last_sequence` would be negative
 NO_COMMAND = -1  # NO_BLOCK of bridge.wire.messages as a signed number
 
 
@@ -20,7 +23,7 @@ def accept(p: GuardParams, s: GuardMemory, command: CommandRow) -> bool:
     A restarted controller counts from 0, so after a time without fresh commands any number is newer.
     """
     sequence, block = int(command.sequence), int(command.block)
-    numbers = math.isfinite(command.frequency_Hz) and math.isfinite(command.amplitude_m)
+    numbers = math.isfinite(command.frequency_Hz) and math.isfinite(command.amplitude_m) and sequence < _MOST
     ours = command.run == p.run and 0 <= block < s.block
     if ours and numbers and command.amplitude_m >= 0.0 and (sequence > s.last_sequence or s.fresh == 0):
         s.last_sequence = sequence
@@ -31,7 +34,9 @@ def accept(p: GuardParams, s: GuardMemory, command: CommandRow) -> bool:
 
 @kernel
 def allow(p: GuardParams, s: GuardMemory, command_block: int, frequency_Hz: float, amplitude_m: float) -> None:
-    """Set `frequency_Hz` and `amplitude_m` of the next block, from the command in force.
+    """Set `frequency_Hz`, `amplitude_m`, `enable` and `toggle` of the next block, from the command in force.
+
+    `enable` is the enable line of the exciter's amplifier; a watchdog of the device ends the vibration once `toggle` stays.
 
     Args:
         p, s: records of `bridge.guard.records`.
@@ -45,7 +50,8 @@ def allow(p: GuardParams, s: GuardMemory, command_block: int, frequency_Hz: floa
     if s.state in (wire.ARMED, wire.ACTIVE):
         if s.fresh == 1:
             s.heard, s.lost_blocks = 1, 0
-            target_Hz, target_m = frequency_Hz, held(p, s, frequency_Hz, amplitude_m)
+            target_Hz = frequency_Hz
+            target_m = min(held(p, s, frequency_Hz, amplitude_m), held_by_drive(p, s, frequency_Hz, amplitude_m))
         elif (
             s.heard == 1 or s.cause != wire.ARMED_BY_SCENARIO
         ):  # not while a rig armed by its scenario waits for its controller; an operator arms only with one
@@ -53,11 +59,12 @@ def allow(p: GuardParams, s: GuardMemory, command_block: int, frequency_Hz: floa
             s.lost_blocks += 1
             if s.lost_blocks > p.lost_blocks:
                 enter(s, wire.DISARMED, wire.COMMAND_LOST)
-        watch(p, s)
-        if s.state not in (wire.ARMED, wire.ACTIVE):
-            target_m = 0.0
     elif s.state == wire.CHECKING:
-        target_Hz, target_m = check_tone(p, s)
+        target_Hz, tone_m = check_tone(p, s)
+        target_m = held(p, s, target_Hz, tone_m)
+    watch(p, s)
+    if s.state not in (wire.CHECKING, wire.ARMED, wire.ACTIVE):
+        target_m = 0.0
     if target_m > 0.0:
         s.frequency_Hz = target_Hz  # a fading vibration keeps its frequency
     slewed_m = min(max(target_m, s.amplitude_m - p.slew_m_per_block), s.amplitude_m + p.slew_m_per_block)
@@ -65,6 +72,10 @@ def allow(p: GuardParams, s: GuardMemory, command_block: int, frequency_Hz: floa
         s.limit = wire.SLEW_RATE
     s.amplitude_m = slewed_m
     note_vibration(s)
+    s.toggle = 1 - s.toggle
+    proof = s.state == wire.CHECKING and enable_off(p, s)
+    may_vibrate = s.state in (wire.CHECKING, wire.ARMED, wire.ACTIVE) or s.amplitude_m > 0.0
+    s.enable = 1 if may_vibrate and not proof else 0
 
 
 @kernel
@@ -75,3 +86,13 @@ def look(p: GuardParams, s: GuardMemory, block: SensorRow) -> None:
     if s.state == wire.CHECKING:
         follow_check(p, s, block, s.square_mps2)
     s.block += 1
+
+
+@kernel
+def write_in_force(s: GuardMemory, command_block: int, block: SensorRow) -> None:
+    """Write the vibration in force at the block's end, as `allow` set it; `command_block` as there."""
+    block.applied_Hz = s.frequency_Hz
+    block.applied_m = s.amplitude_m
+    block.applied_block = command_block
+    block.fallback = 1 - s.fresh
+    block.guard_limit = s.limit

@@ -8,6 +8,12 @@ from bridge.layouts import GuardMemory, GuardParams, SensorRow
 
 _TWO_PI = 2.0 * math.pi
 _PARTS = 5  # parts of the window for the drive's velocity
+# Share of the drive's velocity up to which the slide sticks, and cannot be a witness. Smaller: a slide that creeps before it
+# slips lowers the limits. Larger: an encoder with twice its scale passes as a stick. With 0.35, DRIVE_RATIO holds v_a at 1.3 v_d
+# or more while a slide creeps.
+_STICKS = 0.35
+# Largest drive velocity over the velocity of its witness. Smaller: noise and ramps lower the limits. Larger: they rise as much.
+_AGREES = 1.25
 
 
 @kernel
@@ -16,20 +22,41 @@ def see_drive(p: GuardParams, s: GuardMemory, block: SensorRow) -> None:
 
     A position jump affects at most two of five parts of the 50 ms, so the velocity is limited to the median of the parts.
     """
-    samples = block.drive_position_m.shape[0]
-    mean_m = 0.0
-    for i in range(samples):
-        mean_m += float(block.drive_position_m[i]) / samples
-    if not math.isfinite(mean_m):
+    drive_m = _mean(block.drive_position_m)
+    if not math.isfinite(drive_m):
         return
-    s.drive_m[s.seen_blocks % RING] = mean_m
+    at = s.seen_blocks % RING
+    s.drive_m[at], s.slide_m[at] = drive_m, _mean(block.mass_position_m)
     s.drive_mps *= p.memory_keep
+    s.announced_mps = max(s.announced_mps * p.announced_keep, s.newest_mps)
     back = min(p.window_blocks, s.seen_blocks)
     if back > 0:
-        before_m = s.drive_m[(s.seen_blocks - back) % RING]
-        velocity_mps = math.fabs(mean_m - before_m) / (back * p.block_s)
-        s.drive_mps = max(s.drive_mps, min(velocity_mps, _median(p, s, back)))
+        before = (s.seen_blocks - back) % RING
+        velocity_mps = min(math.fabs(drive_m - s.drive_m[before]) / (back * p.block_s), _median(p, s, back))
+        slide_mps = math.fabs(s.slide_m[at] - s.slide_m[before]) / (back * p.block_s)
+        s.drive_mps = max(s.drive_mps, _agreed(s, velocity_mps, slide_mps))
     s.seen_blocks += 1
+
+
+@kernel
+def _mean(samples: Record) -> float:
+    mean = 0.0
+    for i in range(samples.shape[0]):
+        mean += float(samples[i]) / samples.shape[0]
+    return mean
+
+
+@kernel
+def _agreed(s: GuardMemory, drive_mps: float, slide_mps: float) -> float:
+    """The velocity of the drive as far as the slide, unless it sticks, and the announcements, if any, agree with it [m/s].
+
+    A stick cannot be distinguished from an encoder whose scale is wrong by a factor of 3 or more; `fastest_drive_mps` shows that.
+    """
+    if slide_mps > _STICKS * drive_mps:
+        drive_mps = min(drive_mps, _AGREES * slide_mps)
+    if s.newest_mps >= 0.0:
+        drive_mps = min(drive_mps, _AGREES * s.announced_mps)
+    return drive_mps
 
 
 @kernel
@@ -55,8 +82,9 @@ def _median(p: GuardParams, s: GuardMemory, blocks: int) -> float:
 
 @kernel
 def expect_drive(s: GuardMemory, velocity_mps: float) -> None:
-    """Note a future velocity of the drive: a vibration may begin before the move."""
-    s.drive_mps = max(s.drive_mps, math.fabs(velocity_mps))
+    """Note an announced velocity of the drive: a vibration may begin before the move."""
+    s.newest_mps = math.fabs(velocity_mps)
+    s.drive_mps = max(s.drive_mps, s.newest_mps)
 
 
 @kernel

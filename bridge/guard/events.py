@@ -52,8 +52,10 @@ class GuardEvents:
             text = f"{before}{wire.GuardState.Name(state)}: {self._help[('cause', int(applied.cause))]}"
             tripped = state == wire.FAULT and int(applied.cause) not in (wire.STOP_BY_PERSON, wire.STOP_KEPT)
             events.append(("FAULT" if tripped else "GUARD", text))
-            if (state, int(applied.cause)) == (wire.READY, wire.GAIN_CHANGED):
-                events.append(("GAIN_CHANGED", self._help[("cause", wire.GAIN_CHANGED)].partition(": ")[2]))
+            if state == wire.READY:
+                events.append(
+                    (wire.Cause.Name(applied.cause), self._help[("cause", int(applied.cause))].partition(": ")[2])
+                )
         t_s = int(applied.t_ns) * 1e-9
         if limit != self._limit and limit in LIMITS and t_s - self._reported_s.get(limit, -_AGAIN_S) >= _AGAIN_S:
             self._reported_s[limit] = t_s

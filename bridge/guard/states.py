@@ -30,9 +30,8 @@ def trip(s: GuardMemory, cause: int) -> None:
 def apply_order(s: GuardMemory, order: int) -> bool:
     """Apply an order of the operator or of the ending process. Returns whether it changed the state.
 
-    A stop is valid in every state. ARM begins a check in DISARMED, in ARMED without a check, and in READY after a change of the
-    gain; otherwise it arms in READY. ACCEPT_GAIN does the same, but arms after a change of the gain. A rig in FAULT must be
-    reset first.
+    A stop is valid in every state. ARM begins a check in DISARMED, in READY, and in ARMED without a check. ACCEPT_GAIN does the
+    same, but in READY it accepts the measured gain and arms. A rig in FAULT must be reset first.
     """
     before = s.state
     if order == STOP:
@@ -41,14 +40,11 @@ def apply_order(s: GuardMemory, order: int) -> bool:
     if order == RESET and before == wire.FAULT:
         enter(s, wire.DISARMED, wire.RESET_BY_PERSON)
     elif order in (ARM, ACCEPT_GAIN):
-        changed = before == wire.READY and s.cause == wire.GAIN_CHANGED
-        if changed and order == ACCEPT_GAIN:
+        if before == wire.READY and order == ACCEPT_GAIN:
             s.accepted[:] = s.gain
             enter(s, wire.ARMED, wire.GAIN_ACCEPTED)
-        elif changed or before == wire.DISARMED or (before == wire.ARMED and s.verified == 0):
+        elif before in (wire.DISARMED, wire.READY) or (before == wire.ARMED and s.verified == 0):
             enter(s, wire.CHECKING, wire.ARMED_BY_PERSON)
-        elif before == wire.READY:
-            enter(s, wire.ARMED, wire.ARMED_BY_PERSON)
     elif order in (DISARM, LEAVE) and before not in (wire.DISARMED, wire.FAULT):
         enter(s, wire.DISARMED, wire.DISARMED_BY_PERSON if order == DISARM else wire.RUN_ENDED)
     return before != s.state

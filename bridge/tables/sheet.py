@@ -1,5 +1,6 @@
 """A sheet of a workbook (xlsx, xls, ods) as a table."""
 
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +14,16 @@ from bridge.tables.text.head import read_head
 
 _BETWEEN = "\x1f"  # joins the cells of a line: an ASCII control character that no cell contains
 _HEAD_ROWS = 400  # rows within which the numbers must begin
+# Largest workbook after decompression, which 8 million cells reach; reading it takes 1.3 GB. Larger: a file of 1 MB may fill the
+# memory. Smaller: long measurements are refused.
+_MOST_BYTES = 256_000_000
 
 
 def read_sheet(path: Path, given: Dialect) -> Table:
     """The sheet that `given` names, or the sheet with most rows. Raises Fault BAD_TABLE."""
     from python_calamine import load_workbook
 
+    _refuse_large(path)
     book: Any = load_workbook(str(path))
     names: list[str] = list(book.sheet_names)
     if given.sheet is not None and given.sheet not in names:
@@ -53,6 +58,20 @@ def read_sheet(path: Path, given: Dialect) -> Table:
         findings=findings,
         written={"sheet": name, "columns": width},
     )
+
+
+def _refuse_large(path: Path) -> None:
+    """Raise Fault BAD_TABLE for a workbook that is too large after decompression, by the directory of its archive (xlsx, ods)."""
+    if not zipfile.is_zipfile(path):  # xls is not compressed
+        return
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(member.file_size for member in archive.infolist())
+    except (zipfile.BadZipFile, OSError, ValueError):
+        return  # the reader reports a damaged file
+    if size > _MOST_BYTES:
+        line = f"{path.name}: has {size * 1e-6:.0f} MB after decompression: must be at most {_MOST_BYTES * 1e-6:.0f} MB"
+        raise Fault("BAD_TABLE", f"{line}; save the sheet with the measurement as .csv")
 
 
 def _column(cells: list[Any], form: TextLayout) -> Any:

@@ -67,9 +67,8 @@ class Complaints:
         now_s = self._clock()
         if not at_once and now_s - kind.reported_s < _EVERY_S:
             return
-        count = (
-            f" ({kind.pending} times, {kind.times} in all)" if kind.times > kind.pending else f" ({kind.times} times)"
-        )
-        count = count if kind.times > 1 else ""
+        counts = [f"{kind.pending} times"] if kind.pending > 1 else []
+        counts += [f"{kind.times} in all"] if kind.times > kind.pending else []
+        count = f" ({', '.join(counts)})" if counts else ""
         kind.pending, kind.reported_s = 0, now_s
         self._publish(code, f"{where}: {kind.text}{count}")

@@ -33,8 +33,7 @@ _SCALARS = {  # NumPy type and protobuf wire type of each field type
     FieldDescriptor.TYPE_ENUM: ("u1", 0),  # a varint: one byte up to 127; zeros are written too
 }
 _PACKED_WIRE_TYPE = 2
-_SUM_BYTES = 4  # length of the checksum at the end of a sensor block, without its tag of one byte
-_NO_SUM = bytes(_SUM_BYTES)
+_SUM_BYTES = 4  # length of the checksum of a sensor block, without its tag of one byte
 
 
 def _varint(value: int) -> bytes:
@@ -145,22 +144,37 @@ def sensor_block(samples: int) -> Layout:
     return Layout(wire.SensorBlock, samples)
 
 
+_EMPTY = sensor_block(1).blank().tobytes()
+_PLACES = dict(sensor_block(1).dtype.fields or {})
+_AFTER = _PLACES["checksum"][1] + _SUM_BYTES - len(_EMPTY)  # end of the checksum, counted from the block's end
+_UNKNOWN = _EMPTY[_AFTER:]  # the fields after the checksum in a block of schema 2
+
+
+def _checksum(block: bytes | memoryview) -> int:
+    return crc32(block[_AFTER:], crc32(block[: _AFTER - _SUM_BYTES - 1]))
+
+
+def _written(block: bytes) -> int:
+    return int.from_bytes(block[_AFTER - _SUM_BYTES : _AFTER], "little")
+
+
 def sealed(block: bytes) -> bytes:
     """A canonical sensor block with its checksum, which reveals any corruption between the rig and a reader."""
-    return block[:-_SUM_BYTES] + crc32(block[: -_SUM_BYTES - 1]).to_bytes(_SUM_BYTES, "little")
+    return block[: _AFTER - _SUM_BYTES] + _checksum(block).to_bytes(_SUM_BYTES, "little") + block[_AFTER:]
 
 
 def seal_all(blocks: Records) -> None:
     """Write the checksum of each sensor block, in place."""
     data, size = memoryview(blocks.tobytes()), blocks.dtype.itemsize
-    blocks["checksum"] = [crc32(data[at : at + size - _SUM_BYTES - 1]) for at in range(0, len(data), size)]
+    blocks["checksum"] = [_checksum(data[at : at + size]) for at in range(0, len(data), size)]
 
 
 def has_checksum(block: bytes) -> bool:
     """Whether a canonical sensor block has a checksum."""
-    return block[-_SUM_BYTES:] != _NO_SUM
+    return _written(block) != 0
 
 
 def is_whole(block: bytes) -> bool:
-    """Whether the checksum of a canonical sensor block matches its bytes."""
-    return crc32(block[: -_SUM_BYTES - 1]) == int.from_bytes(block[-_SUM_BYTES:], "little")
+    """Whether the checksum of a canonical sensor block matches its bytes; a block of schema 2 had no bytes after it."""
+    schema_2 = block[_AFTER:] == _UNKNOWN and crc32(block[: _AFTER - _SUM_BYTES - 1]) == _written(block)
+    return schema_2 or _checksum(block) == _written(block)

@@ -11,8 +11,8 @@ from google.protobuf.message import DecodeError, Message
 from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
 
-SCHEMA_VERSION = 2
-READABLE_VERSIONS = (1, 2)  # fields are only appended, so an older log lacks only the newer fields
+SCHEMA_VERSION = 3
+READABLE_VERSIONS = (1, 2, 3)  # fields are only appended, so an older log lacks only the newer fields
 
 # Longest message that is parsed [bytes]: eight times the longest block, 8 kB with 400 samples; snapshots and headers may be
 # longer. Larger: invalid messages cost a process more time.
@@ -49,7 +49,7 @@ def parsed(message: type[M], payload: bytes, topic: str) -> M:
 def refuse_other_schema(header: wire.Header) -> None:
     """Raise Fault BAD_MESSAGE if a process of the run uses an unsupported version of the messages."""
     if header.schema_version not in READABLE_VERSIONS:
-        known = " or ".join(map(str, READABLE_VERSIONS))
+        known = f"{READABLE_VERSIONS[0]} to {READABLE_VERSIONS[-1]}"
         line = f"header/{header.role}: schema_version = {header.schema_version}: must be {known}"
         raise Fault("BAD_MESSAGE", f"{line}; use versions of stickslip that agree on both sides")
 

@@ -64,6 +64,9 @@ class Cause(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     FIRST_CHECK: _ClassVar[Cause]
     GAIN_CHANGED: _ClassVar[Cause]
     GAIN_ACCEPTED: _ClassVar[Cause]
+    GAIN_UNEXPECTED: _ClassVar[Cause]
+    ENABLE_DEAD: _ClassVar[Cause]
+    DRIVE_FAST: _ClassVar[Cause]
 
 class Limit(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = ()
@@ -113,6 +116,8 @@ class Reason(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     JUMPED: _ClassVar[Reason]
     LOOSE: _ClassVar[Reason]
     GAIN_OTHER: _ClassVar[Reason]
+    EXCITER_END: _ClassVar[Reason]
+    TRIAL: _ClassVar[Reason]
 DISABLED: Mode
 WATCH: Mode
 EXCITE: Mode
@@ -159,6 +164,9 @@ EXCITER_WILD: Cause
 FIRST_CHECK: Cause
 GAIN_CHANGED: Cause
 GAIN_ACCEPTED: Cause
+GAIN_UNEXPECTED: Cause
+ENABLE_DEAD: Cause
+DRIVE_FAST: Cause
 NO_LIMIT: Limit
 RANGE: Limit
 SLEW: Limit
@@ -202,9 +210,11 @@ POSITIONS_APART: Reason
 JUMPED: Reason
 LOOSE: Reason
 GAIN_OTHER: Reason
+EXCITER_END: Reason
+TRIAL: Reason
 
 class SensorBlock(_message.Message):
-    __slots__ = ("sequence", "t_ns", "drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m", "run", "guard_state", "check_Hz", "check_gain", "checksum")
+    __slots__ = ("sequence", "t_ns", "drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m", "run", "guard_state", "check_Hz", "check_gain", "checksum", "applied_Hz", "applied_m", "applied_block", "fallback", "guard_limit")
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     T_NS_FIELD_NUMBER: _ClassVar[int]
     DRIVE_FORCE_N_FIELD_NUMBER: _ClassVar[int]
@@ -217,6 +227,11 @@ class SensorBlock(_message.Message):
     CHECK_HZ_FIELD_NUMBER: _ClassVar[int]
     CHECK_GAIN_FIELD_NUMBER: _ClassVar[int]
     CHECKSUM_FIELD_NUMBER: _ClassVar[int]
+    APPLIED_HZ_FIELD_NUMBER: _ClassVar[int]
+    APPLIED_M_FIELD_NUMBER: _ClassVar[int]
+    APPLIED_BLOCK_FIELD_NUMBER: _ClassVar[int]
+    FALLBACK_FIELD_NUMBER: _ClassVar[int]
+    GUARD_LIMIT_FIELD_NUMBER: _ClassVar[int]
     sequence: int
     t_ns: int
     drive_force_N: _containers.RepeatedScalarFieldContainer[float]
@@ -229,7 +244,12 @@ class SensorBlock(_message.Message):
     check_Hz: float
     check_gain: float
     checksum: int
-    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., drive_force_N: _Optional[_Iterable[float]] = ..., mass_accel_mps2: _Optional[_Iterable[float]] = ..., base_accel_mps2: _Optional[_Iterable[float]] = ..., mass_position_m: _Optional[_Iterable[float]] = ..., drive_position_m: _Optional[_Iterable[float]] = ..., run: _Optional[int] = ..., guard_state: _Optional[int] = ..., check_Hz: _Optional[float] = ..., check_gain: _Optional[float] = ..., checksum: _Optional[int] = ...) -> None: ...
+    applied_Hz: float
+    applied_m: float
+    applied_block: int
+    fallback: int
+    guard_limit: int
+    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., drive_force_N: _Optional[_Iterable[float]] = ..., mass_accel_mps2: _Optional[_Iterable[float]] = ..., base_accel_mps2: _Optional[_Iterable[float]] = ..., mass_position_m: _Optional[_Iterable[float]] = ..., drive_position_m: _Optional[_Iterable[float]] = ..., run: _Optional[int] = ..., guard_state: _Optional[int] = ..., check_Hz: _Optional[float] = ..., check_gain: _Optional[float] = ..., checksum: _Optional[int] = ..., applied_Hz: _Optional[float] = ..., applied_m: _Optional[float] = ..., applied_block: _Optional[int] = ..., fallback: _Optional[int] = ..., guard_limit: _Optional[int] = ...) -> None: ...
 
 class Command(_message.Message):
     __slots__ = ("sequence", "t_ns", "block", "frequency_Hz", "amplitude_m", "mode", "limit", "reason", "run")
@@ -254,7 +274,7 @@ class Command(_message.Message):
     def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., block: _Optional[int] = ..., frequency_Hz: _Optional[float] = ..., amplitude_m: _Optional[float] = ..., mode: _Optional[int] = ..., limit: _Optional[int] = ..., reason: _Optional[int] = ..., run: _Optional[int] = ...) -> None: ...
 
 class Applied(_message.Message):
-    __slots__ = ("sequence", "t_ns", "frequency_Hz", "amplitude_m", "command_block", "commands", "fallback", "round_trip_ns", "late_ns", "commands_late", "guard_state", "cause", "guard_limit", "commands_refused", "heat_share")
+    __slots__ = ("sequence", "t_ns", "frequency_Hz", "amplitude_m", "command_block", "commands", "fallback", "round_trip_ns", "late_ns", "commands_late", "guard_state", "cause", "guard_limit", "commands_refused", "heat_share", "toggle")
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     T_NS_FIELD_NUMBER: _ClassVar[int]
     FREQUENCY_HZ_FIELD_NUMBER: _ClassVar[int]
@@ -270,6 +290,7 @@ class Applied(_message.Message):
     GUARD_LIMIT_FIELD_NUMBER: _ClassVar[int]
     COMMANDS_REFUSED_FIELD_NUMBER: _ClassVar[int]
     HEAT_SHARE_FIELD_NUMBER: _ClassVar[int]
+    TOGGLE_FIELD_NUMBER: _ClassVar[int]
     sequence: int
     t_ns: int
     frequency_Hz: float
@@ -285,7 +306,8 @@ class Applied(_message.Message):
     guard_limit: int
     commands_refused: int
     heat_share: float
-    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., frequency_Hz: _Optional[float] = ..., amplitude_m: _Optional[float] = ..., command_block: _Optional[int] = ..., commands: _Optional[int] = ..., fallback: _Optional[int] = ..., round_trip_ns: _Optional[int] = ..., late_ns: _Optional[int] = ..., commands_late: _Optional[int] = ..., guard_state: _Optional[int] = ..., cause: _Optional[int] = ..., guard_limit: _Optional[int] = ..., commands_refused: _Optional[int] = ..., heat_share: _Optional[float] = ...) -> None: ...
+    toggle: int
+    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., frequency_Hz: _Optional[float] = ..., amplitude_m: _Optional[float] = ..., command_block: _Optional[int] = ..., commands: _Optional[int] = ..., fallback: _Optional[int] = ..., round_trip_ns: _Optional[int] = ..., late_ns: _Optional[int] = ..., commands_late: _Optional[int] = ..., guard_state: _Optional[int] = ..., cause: _Optional[int] = ..., guard_limit: _Optional[int] = ..., commands_refused: _Optional[int] = ..., heat_share: _Optional[float] = ..., toggle: _Optional[int] = ...) -> None: ...
 
 class Trace(_message.Message):
     __slots__ = ("sequence", "t_ns", "block", "events", "gap_blocks", "state", "mode", "reason", "limit", "slips", "score", "force_rate", "drive_force_N", "burst_mps2", "drive_velocity_mps", "vibration_velocity_mps", "wanted_velocity_mps", "wanted_amplitude_m", "wanted_frequency_Hz", "time_to_slip_s", "lateness_ns", "announcements", "surges", "sliding_velocity_mps", "window_s", "velocity_ratio", "drive_stiffness_N_per_m", "drive_stiffness_sigma", "breakaway_force_N", "sliding_force_N", "loop_delay_s", "exciter_gain")

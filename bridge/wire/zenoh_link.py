@@ -6,10 +6,12 @@ into bounded queues: publishing from a callback can deadlock.
 
 import contextlib
 import ctypes
+import functools
 import os
 import re
 import socket
 import struct
+import sys
 import threading
 import time
 import uuid
@@ -19,7 +21,7 @@ from typing import Any, Self
 
 from bridge.faults import Fault
 from bridge.processes import this_process
-from bridge.wire import loopback_users
+from bridge.wire import certificates, loopback_users
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.bus_config import BusConfig
 from bridge.wire.inbox import Inbox, Received
@@ -31,6 +33,9 @@ __all__ = ["Bus", "BusConfig", "Inbox", "Received"]
 
 # Duration of one attempt to dial without a password. A starting rig makes a password, which only the next attempt can use.
 _WITHOUT_PASSWORD_S = 0.2
+# Interval of looking for new connections; those without a handshake are closed after 1 s. Longer: some are closed before, with a
+# wait of 7 ms each. Shorter: 0.1 ms of this process each time.
+_LINGER_S = 0.3
 _READS_S = 0.5  # time in which a running rig reads the first bytes of a connection, even on a busy computer
 _NO_PROTOCOL = b"\x08\x00" + b"\xff" * 8  # invalid as Zenoh and as TLS: a rig that runs ends the connection
 _AT_ONCE = struct.pack("ii", 0, 0)  # value of SO_LINGER: off
@@ -53,14 +58,20 @@ def _keep_thread_state() -> None:
         _of_thread.kept = True
 
 
-def _close_at_once(_event: zenoh.TransportEvent) -> None:
-    """Make this process close a new link without a wait for unsent data; called when a link was made.
+def _close_at_once(_event: zenoh.TransportEvent | None = None) -> None:
+    """Make this process close its links without a wait for unsent data; called when a link was made.
 
-    Zenoh sets SO_LINGER: if the other process is frozen, closing a link takes 30 to 40 ms, on the only thread that sends and
-    relays (zenoh issues 1101, 2350). Unsent data of a closed link are still sent.
+    Zenoh sets SO_LINGER: if the other process does not read, closing a link takes 7 to 40 ms, on a thread that others wait for
+    (zenoh issues 1101, 2350). Unsent data of a closed link are still sent.
     """
     for name in os.listdir("/proc/self/fd"):  # has no effect on files that are not sockets
         _LIBC.setsockopt(int(name), socket.SOL_SOCKET, socket.SO_LINGER, _AT_ONCE, len(_AT_ONCE))
+
+
+@functools.cache
+def _warn(text: str) -> None:
+    """Print a warning on stderr, once for each text: a viewer opens a session again after each absence of the rig."""
+    print(f"stickslip: warning: {text}", file=sys.stderr, flush=True)
 
 
 def _listening(config: BusConfig, lockstep: bool) -> zenoh.Session:
@@ -152,17 +163,25 @@ class Bus:
         self._claims: set[str] = set()
         self._alive_changed = threading.Condition()
         zenoh.init_log_from_env_or("off")
+        credentials = certificates.RIG if role == "plant" else role if role in loopback_users.ROLES else "viewer"
+        place = certificates.folder(config.certificates)
+        self._ends = certificates.ends_of(credentials, place) if config.encrypted else []
         self._session = (
             _listening(config, lockstep)
             if role == "plant"
             else _dialled(
                 config,
-                role if role in loopback_users.ROLES else "viewer",
+                credentials,
                 lockstep,
                 stop or threading.Event(),
                 patience_s,
             )
         )
+        if role != "plant" and (text := self.expiring()):
+            _warn(text)
+        self._over = threading.Event()
+        if role == "plant":
+            threading.Thread(target=self._close_refused_at_once, name="linger", daemon=True).start()
         # called in a Python thread, because it visits every open file of this process
         self._keep.append(self._session.info.declare_transport_events_listener(_close_at_once, history=True))
         self._keep.append(
@@ -177,8 +196,18 @@ class Bus:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._over.set()
         with contextlib.suppress(zenoh.ZError):
             self._session.close()
+
+    def _close_refused_at_once(self) -> None:
+        """Let connections that send nothing be closed without a wait: 300 of them stopped all links for 0.25 s."""
+        while not self._over.wait(_LINGER_S):
+            _close_at_once()
+
+    def expiring(self) -> str:
+        """The certificates of this session that end within 30 days, as text; empty if none does."""
+        return certificates.expiring(self._ends)
 
     def _key(self, name: str) -> str:
         return f"{self._config.prefix}/{name}"

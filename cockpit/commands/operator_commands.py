@@ -51,11 +51,27 @@ def stop(
 ) -> int:
     """Ramp a rig's vibration down until `stickslip reset`, over restarts too; exit status 4: no rig confirmed the stop.
 
-    This is a process stop, not an emergency stop: an emergency stop cuts the supply of the amplifier.
+    On the computer of the rig its user needs no bus, certificate or password for it. This is a process stop, not an emergency
+    stop: an emergency stop cuts the supply of the amplifier.
     """
     if reset_too:
         typer.echo("stickslip: --reset is now a command: `stickslip reset`, followed by `stickslip arm`", err=True)
-    return _send("RESET" if reset_too else "STOP", shared, as_json)
+        return _send("RESET", shared, as_json)
+    from bridge.guard.stop_file import confirmed
+    from bridge.plain import print_line
+    from bridge.wire import realtime
+    from cockpit.first_stop import ordered
+    from cockpit.live.operator import send_command, stop_rig
+
+    realtime.raise_priority()
+    if confirmed(ordered, 0.0):
+        print_line(f"stop     rig {ordered[0].rig} is at rest: it confirmed the stop by file; now over the bus")
+    for order in ordered:
+        if order.problem:
+            print_line(f"stop     no stop by file for rig {order.rig}: {order.problem}; now over the bus")
+    answer = stop_rig(lambda: send_command(shared.bus(), "STOP"), ordered)
+    print_result(as_json, answer, answer.in_words())
+    return 0 if answer.done else 1
 
 
 @command(*BUS)

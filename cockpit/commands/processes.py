@@ -59,7 +59,7 @@ def plant(
         warn_without_priority()
     described = header(made, "plant", shared.lockstep)
     # a stop inside `stickslip run` ends with that run; only a plant started alone keeps it over a restart
-    latch = None if shared.child or shared.lockstep else StopLatch(made.rig.name)
+    latch = StopLatch(f"{made.rig.name} at {made.bus.endpoint}", False) if shared.child else StopLatch(made.rig.name)
     with step_reports(quiet=bool(shared.child)) as report:
         blocks = serve(
             made.rig,
@@ -71,7 +71,7 @@ def plant(
             shared.lockstep,
             stop_event(shared.child),
             made.arm,
-            latch,
+            None if shared.lockstep else latch,
             made.fault,
             report,
         )

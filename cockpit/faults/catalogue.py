@@ -34,7 +34,7 @@ class NamedFault(Strict):
     checked: bool = Field(
         default=True, description="Armed by an operator, with a loop check; false: armed by its scenario."
     )
-    begin_s: NotNegative = Field(default=2.5, description="Begin in the run; the loop check ends at 1.6 s.")
+    begin_s: NotNegative = Field(default=2.5, description="Begin in the run; the loop check ends at 1.8 s.")
     watch_s: Positive = Field(default=4.0, description="Time from begin_s during which the entry is judged.")
     told: list[str] | None = Field(
         default=None,

@@ -95,7 +95,6 @@ SIGNALS = {
             unknown=0.0),
         PlottedSignal("time_to_slip_s", "", "predicted time to slip", "time to slip", "trace", 1.0, "s", _BROWN, _TO_SLIP,
             unknown=-1.0),
-        PlottedSignal("score", "", "score of stick-slip, 0 to 1", "score", "trace", 1.0, "", _RED),
         PlottedSignal("force_rate", "s", "rate of the force, 1 when stuck", "force rate", "trace", 1.0, "", _INK),
         PlottedSignal("base_accel_mps2", "", "base's acceleration", "acceleration", "sensors", 1.0, "m/s²", _BLUE, _ACCEL),
         PlottedSignal("mass_accel_mps2", "", "slide's acceleration", "acceleration", "sensors", 1.0, "m/s²", _GREEN, _ACCEL),

@@ -48,8 +48,8 @@ class PhaseSum:
         """Blocks in which the drive moved."""
         return self._following.moving
 
-    def add(self, forces: Forces, motion: BlockMotion | None, without: Stretches) -> None:
-        """Add the part of a window inside the stretch and outside of the stretches `without`."""
+    def add(self, forces: Forces, motion: BlockMotion | None, without: Stretches, doubted: Stretches) -> None:
+        """Add the part of a window inside the stretch and outside of the stretches `without`; no slips of `doubted` ones."""
 
         def counts(at_s: Floats) -> Any:
             return (at_s > self.from_s) & (at_s <= self.to_s) & ~within(at_s, without)
@@ -58,7 +58,7 @@ class PhaseSum:
         self._blocks += int(np.count_nonzero(inside))
         self.missing += int(forces.missing[inside].sum())
         breakaway_s = forces.cycles.breakaway_t_s
-        slips = (breakaway_s >= self.from_s) & (breakaway_s < self.to_s) & ~within(breakaway_s, without)
+        slips = (breakaway_s >= self.from_s) & (breakaway_s < self.to_s) & ~within(breakaway_s, [*without, *doubted])
         self.slips += int(np.count_nonzero(slips))
         self.unsure += int(np.count_nonzero(slips & forces.unsure))
         later = inside & (forces.t_s > min(self.from_s + _RAMP_S, 0.5 * (self.from_s + self.to_s)))
@@ -96,6 +96,10 @@ class Interruptions:
     def stops(self, is_last: bool) -> Stretches:
         """Stretches with the controller stopped or the rig not armed, each with its settling second."""
         return self._steps.stops(self._setup.block_s, is_last)
+
+    def doubted(self, is_last: bool) -> Stretches:
+        """Stretches in which the controller doubts the force or the slide position."""
+        return self._steps.doubted(is_last)
 
     def fallbacks(self) -> Stretches:
         """Stretches in which the rig had no fresh command; the end is infinite while one lasts."""

@@ -1,9 +1,9 @@
 """v_a over v_d while the rig vibrates, with a lower and an upper limit.
 
-Below 1.05 stick-slip may return. Far above the set point the vibration wears exciter, mount and workpiece without benefit, or v_a
-is measured wrongly. The set point is the configured one, or a higher one if the controller raised it after slips.
-Judged are steps in EXCITE with an evenly moving drive, after the ramp, except stalls of the computer and the second after each:
-during a stall v_a is as old as the last block before it.
+Below 1.05 stick-slip may return. Far above the set point (OVER_EXCITED) the vibration wears exciter, mount and workpiece without
+benefit, or v_a is measured wrongly. The set point is the configured one, or a higher one if the controller raised it after a slip
+or surge. Judged are steps in EXCITE with an evenly moving drive, after the ramp, except stalls of the computer: then v_a is as
+old as the last block before it. In the second after a stall only the upper limit holds, as the vibration begins again.
 """
 
 import math
@@ -71,6 +71,7 @@ class RatioWatch:
         self._above = Longest()
         self._lowest, self._highest = math.inf, 0.0
         self._judged = self._below = self._all_above = self._left_out = 0
+        self._events = 0  # slips and surges that the controller counted before it was enabled
 
     def add(self, window: Window) -> None:
         """Add the steps of a window; the rows before it show earlier ramps and stalls."""
@@ -82,17 +83,25 @@ class RatioWatch:
         counts &= (t_s > self._setup.settled_from_s) & np.isfinite(trace["vibration_velocity_mps"])
         after = self._after_stall(t_s, trace, window.applied)
         self._left_out += int(np.count_nonzero(counts & after))
-        counts &= ~after
         ratio = np.divide(trace["vibration_velocity_mps"], speed_mps, out=np.zeros(len(trace)), where=counts)
-        self._lowest = min(self._lowest, float(ratio[counts].min(initial=math.inf)))
-        self._highest = max(self._highest, float(ratio[counts].max(initial=0.0)))
-        self._judged += int(np.count_nonzero(counts))
-        self._below += int(np.count_nonzero(ratio[counts] < ALARM_RATIO))
-        # older logs have no set point in the trace
-        set_point = np.maximum(trace["velocity_ratio"], self._setup.v_ratio)
-        above = (counts & (ratio > _MOST_SET_POINTS * set_point))[judged]
+        shown = counts & ((trace["events"] & (GAP | STALE | LATE)) == 0)
+        self._highest = max(self._highest, float(ratio[shown].max(initial=0.0)))
+        above = self._is_above(trace, ratio, shown)[judged]
         self._all_above += int(np.count_nonzero(above))
         self._above.add(above)
+        counts &= ~after
+        self._lowest = min(self._lowest, float(ratio[counts].min(initial=math.inf)))
+        self._judged += int(np.count_nonzero(counts))
+        self._below += int(np.count_nonzero(ratio[counts] < ALARM_RATIO))
+
+    def _is_above(self, trace: Rows, ratio: Floats, counts: Bools) -> Bools:
+        """Steps above 1.5 set points; without a slip or surge under control the set point is the configured one."""
+        counted = trace["slips"].astype(np.int64) + trace["surges"]
+        before = counted[trace["t_ns"] * 1e-9 <= self._setup.enabled_from_s]
+        self._events = int(before[-1]) if len(before) else self._events
+        # older logs have no set point in the trace
+        raised = np.where(counted != self._events, trace["velocity_ratio"], 0.0)
+        return np.asarray(counts & (ratio > _MOST_SET_POINTS * np.maximum(raised, self._setup.v_ratio)))
 
     def _steady(self, speed_mps: Floats) -> Bools:
         steady, back = np.zeros(len(speed_mps), bool), max(round(_STEADY_S / self._block_s), 1)

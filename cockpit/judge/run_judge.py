@@ -39,7 +39,7 @@ from cockpit.judge.ratio_watch import RatioWatch
 from cockpit.judge.sensor_watch import SensorWatch
 from cockpit.judge.setup import SETTLING_S, Described, Setup, described, is_known, plant_of, setup_of
 from cockpit.judge.slips import Forces, bins_of, forces_of
-from cockpit.judge.verdict import MISSING_SHARE, RunVerdict
+from cockpit.judge.verdict import IN_CHARGE_SHARE, MISSING_SHARE, RunVerdict
 from cockpit.judge.watches import FrozenWatch, LatencyWatch, Losses, RigWatch, StepWatch, clock_fault, losses_of
 from cockpit.judge.window import LAYOUTS, HasMoved, WaitingRows, Window, reduced
 from diagnosis.slips import Cycles
@@ -95,13 +95,13 @@ class JudgedWindows:
             self.sensors.add(window, forces)
             for check in (self.ratio, self.commands, self.stalls):
                 check.add(window)
-        without = self._interruptions.all(is_last)
+        without, doubted = self._interruptions.all(is_last), self._interruptions.doubted(is_last)
         for name, sum_ in self.phases.items():
             sum_.to_s = min(sum_.to_s, last_s) if is_last else sum_.to_s
-            sum_.add(forces, motion, without if name in ("taking_over", "after") else [])
+            sum_.add(forces, motion, without if name in ("taking_over", "after") else [], doubted)
         if absences := self._interruptions.gone():
             self.alone.from_s, self.alone.to_s = absences[0][0], absences[-1][1]
-            self.alone.add(forces, motion, apart((0.0, np.inf), absences))
+            self.alone.add(forces, motion, apart((0.0, np.inf), absences), doubted)
         self._cycles.append(forces.cycles)
         self._has_force |= len(forces.t_s) > 0
         return window, forces
@@ -289,8 +289,9 @@ class RunJudge:
         self, charge: InCharge, after: Phase | None, losses: Losses, checksums: Checksums, damaged: list[str]
     ) -> list[str]:
         """Reasons for which a run that tests the controller still gets no verdict."""
-        setup, _, windows = self._begin()
+        setup, gaps, windows = self._begin()
         doubts = [clock_fault(self.log), self._rig.disarmed(), too_little(after, windows.phases, setup.block_s)]
+        doubts.append(self._too_seldom(setup, gaps.stops(is_last=True)))
         if charge.controller_until_s is not None:
             doubts.append(f"no step of the controller is in the log after {charge.controller_until_s:.2f} s")
         if after is not None:
@@ -304,6 +305,19 @@ class RunJudge:
         if not (losses.blocks_known or losses.planned_s):
             doubts.append(f"the number of missing blocks is unknown; {'; '.join(damaged)}")
         return [doubt for doubt in doubts if doubt]
+
+    def _too_seldom(self, setup: Setup, stops: Stretches) -> str:
+        """Reason for which the controller was not in charge for long enough, loop checks and stalls aside; else empty."""
+        end_s = self._last_ns * 1e-9
+        asked_s = max(end_s - setup.enabled_from_s, 0.0)
+        idle_s = sum(
+            max(min(until_s - SETTLING_S, end_s) - max(from_s, setup.enabled_from_s), 0.0) for from_s, until_s in stops
+        )
+        without_s = max(idle_s - setup.block_s * self._rig.checking, 0.0)
+        if without_s <= (1.0 - IN_CHARGE_SHARE) * asked_s:
+            return ""
+        line = f"the controller was stopped, or the rig not armed, for {without_s:.2f} of {asked_s:.2f} s"
+        return f"{line}, more than {100 * (1 - IN_CHARGE_SHARE):.0f} %: make the run longer, or keep the rig armed"
 
 
 def _slips_in(slips_s: Floats, stretches: Stretches, without: Iterable[tuple[float, float]] = ()) -> int:

@@ -21,8 +21,11 @@ Control = Literal["ok", "not ok", "not judged"]
 # Allowed share of missing blocks in the judged time. Larger: slips hide in a gap. Smaller: one stall of the recorder, 80 ms in
 # 8 s, leaves a run without a verdict.
 MISSING_SHARE = 0.01
+# Least share of the time asked for in which the controller was in charge. Smaller: a run without protection for longer is ok.
+# Larger: a short stop by an operator leaves a run without a verdict.
+IN_CHARGE_SHARE = 0.9
 # harmful events that concern the log alone, not the rig
-_OF_THE_LOG = {"GAP", "DROPPED", "LOG_WRITE", "LOG_LOST", "LOG_REPLACED"}
+_OF_THE_LOG = {"DROPPED", "LOG_WRITE", "LOG_LOST", "LOG_REPLACED"}
 _OF_THE_RIG = {code for code in EVENTS if harms(code)} - _OF_THE_LOG
 _TRIPS = {"FAULT", *TRIPS}
 
@@ -181,7 +184,7 @@ class RunVerdict(NamedTuple):
         if self.after is not None and self.after.slips > self.unsure_slips:
             wrong.append(f"{counted(self.after.slips, 'slip')} with the controller in charge")
         if self.ratio is not None and not self.ratio.ok:
-            wrong.append(f"v_a/v_d {self.ratio.in_words()}")
+            wrong.append(f"OVER_EXCITED: v_a/v_d {self.ratio.in_words()}")
         return wrong
 
 

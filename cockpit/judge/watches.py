@@ -63,12 +63,14 @@ class RigWatch:
         self.answered = False  # some block has a fresh command
         self.gain_seen = False  # a loop check confirmed the exciter's gain
         self.end_ns = 0  # time of the latest row
+        self.checking = 0  # blocks of loop checks
         self._disarmed_s = np.inf  # first time at which the rig disarmed itself without a fresh command
 
     def add(self, records: Records) -> None:
         """Add rows of the rig, [blocks]."""
         self.answered |= bool((records["fallback"] == 0).any())
         self.gain_seen |= bool(np.isin(records["cause"], (wire.CHECK_PASSED, wire.GAIN_ACCEPTED)).any())
+        self.checking += int((records["guard_state"] == wire.CHECKING).sum())
         self.end_ns = max(self.end_ns, int(records["t_ns"].max()))
         disarmed = (records["guard_state"] == wire.DISARMED) & (records["cause"] == wire.COMMAND_LOST)
         if disarmed.any():
@@ -101,6 +103,31 @@ class FrozenWatch:
             run.add(repeats)
 
 
+class _Stretches:
+    """First and last step of each stretch of steps with a property [s]."""
+
+    def __init__(self) -> None:
+        self._ended: list[tuple[float, float]] = []
+        self._from_s: float | None = None
+        self._last_s = 0.0
+
+    def add(self, has: npt.NDArray[np.bool_], t_s: npt.NDArray[np.float64]) -> None:
+        """Add steps, [steps]."""
+        for at in np.flatnonzero(steps(has.view(np.int8), int(self._from_s is not None))):
+            if has[at]:
+                self._from_s = float(t_s[at])
+            elif self._from_s is not None:
+                self._ended.append((self._from_s, float(t_s[at - 1]) if at else self._last_s))
+                self._from_s = None
+        self._last_s = float(t_s[-1])
+
+    def so_far(self, is_last: bool) -> list[tuple[float, float]]:
+        """The stretches; an open one ends at the last step, or never while the log is still read."""
+        if self._from_s is None:
+            return self._ended
+        return [*self._ended, (self._from_s, self._last_s if is_last else np.inf)]
+
+
 class StepWatch:
     """Arming, missed blocks and stops, from the steps of the controller."""
 
@@ -112,9 +139,7 @@ class StepWatch:
         self.highest_set_point = 0.0  # highest set point of v_a / v_d during vibration
         self.drive_velocity_max_mps = 0.0
         self.stale: list[tuple[float, float]] = []  # first and last step of each stretch without a timely block [s]
-        self._idle: list[tuple[float, float]] = []  # first and last step of each finished stop [s]
-        self._idle_from_s: float | None = None
-        self._last_s = 0.0
+        self._idle, self._doubted = _Stretches(), _Stretches()
 
     def add(self, records: Records) -> None:
         """Add steps of the controller, [steps]."""
@@ -132,21 +157,17 @@ class StepWatch:
             goes_on = self.stale and at_s - self.stale[-1][1] <= SETTLING_S
             self.stale[len(self.stale) - bool(goes_on) :] = [(self.stale[-1][0] if goes_on else at_s, at_s)]
         idle = (records["mode"] == wire.STOPPED) | not_armed
-        for at in np.flatnonzero(steps(idle.view(np.int8), int(self._idle_from_s is not None))):
-            if idle[at]:
-                self._idle_from_s = float(t_s[at])
-            elif self._idle_from_s is not None:
-                self._idle.append((self._idle_from_s, float(t_s[at - 1]) if at else self._last_s))
-                self._idle_from_s = None
-        self._last_s = float(t_s[-1])
+        self._idle.add(idle, t_s)
+        frozen = (records["reason"] == wire.FROZEN) & ~np.isin(records["limit"], (wire.HELD_OPEN_LOOP, wire.NO_DRIVE))
+        self._doubted.add(frozen | np.isin(records["reason"], (wire.FORCE_DOUBTED, wire.SLIDE_DOUBTED)), t_s)
 
     def stops(self, block_s: float, is_last: bool) -> list[tuple[float, float]]:
         """Stretches in which the controller is stopped or the rig not armed, each with its settling second [s]."""
-        stretches = [(from_s - block_s, last_s + SETTLING_S) for from_s, last_s in self._idle]
-        if self._idle_from_s is not None:
-            until_s = self._last_s + SETTLING_S if is_last else np.inf
-            stretches.append((self._idle_from_s - block_s, until_s))
-        return stretches
+        return [(from_s - block_s, last_s + SETTLING_S) for from_s, last_s in self._idle.so_far(is_last)]
+
+    def doubted(self, is_last: bool) -> list[tuple[float, float]]:
+        """Stretches in which the controller doubts the force or the slide position: their slips are not counted [s]."""
+        return self._doubted.so_far(is_last)
 
 
 class Losses(NamedTuple):

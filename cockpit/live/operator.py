@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from bridge.faults import Fault
+from bridge.guard.stop_file import StopOrder, confirmed
 from bridge.units import quantity
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
@@ -29,6 +30,8 @@ _SILENT_S = 1.0  # silence of the rig after which its last state is outdated; it
 _NOTHING_M = 1e-12  # a smaller amplitude counts as zero: rounding at the end of a ramp
 # Wait after a stop for the rig's event that it cannot keep the stop over a restart; also for the controller on the bus.
 _KEPT_S = 0.1
+# Longest wait for a confirmation by file, after the bus failed; a rig needs 10 ms and its ramp.
+_BY_FILE_S = 1.0
 _REFUSED_S = 1.0  # a rig that is in FAULT for this long after ARM refuses it
 _ARMS = (wire.Operator.ARM, wire.Operator.ACCEPT_GAIN)
 _QUIETING = (wire.Operator.STOP, wire.Operator.DISARM)
@@ -50,6 +53,7 @@ class CommandOutcome(NamedTuple):
     not_kept: str  # why a stop does not outlast a restart of the rig; empty if it does, or for another command
     taken: bool  # the rig confirmed this command
     alone: bool  # armed without a controller on the bus
+    bus_problem: str = ""  # why the bus did not deliver a stop that the rig confirmed by file; empty if the bus did
 
     def in_words(self) -> list[str]:
         """Lines for the operator."""
@@ -65,6 +69,8 @@ class CommandOutcome(NamedTuple):
             f"rig      {self.state}, {_vibration(self.amplitude_m)}",
             f"cause    {self.cause}: {self.help}",
         ]
+        if self.bus_problem:
+            lines.append(f"warning  confirmed by file, not over the bus: {self.bus_problem}")
         if self.not_kept:
             lines.append(f"warning  {self.not_kept}")
         if self.alone:
@@ -127,6 +133,43 @@ def send_command(bus_config: BusConfig, name: str) -> CommandOutcome:
     if action == wire.Operator.STOP and not outcome.done:
         raise Fault("NO_PEER", f"{where}: the rig is {before} after a stop: must be at rest; {_CUT_AMPLIFIER}")
     return outcome
+
+
+def stop_rig(by_bus: Callable[[], CommandOutcome], orders: list[StopOrder]) -> CommandOutcome:
+    """Stop a rig over the bus; if that fails, its confirmation of the stop by file suffices.
+
+    Args:
+        by_bus: sends STOP.
+        orders: the stops of this rig by file; empty for a rig of another computer.
+
+    Raises Fault as `by_bus` does; its line also describes the stop by file.
+
+    """
+    began_s = time.monotonic()
+    try:
+        return by_bus()
+    except Fault as fault:
+        problems = "; ".join(order.problem for order in orders if order.problem)
+        if not confirmed(orders, _BY_FILE_S):
+            unconfirmed = "; the stop file of the rig is set, but the rig did not confirm it"
+            if problems:
+                unconfirmed = f"; the stop file of the rig could not be set: {problems}"
+            advice = f"; STOP NOT DELIVERED: {_CUT_AMPLIFIER}" if fault.kind.code == "NOT_SECURE" else ""
+            raise Fault(fault.kind.code, fault.line + (unconfirmed if orders else "") + advice) from None
+        return CommandOutcome(
+            endpoint=orders[0].endpoint,
+            word="STOP",
+            done=True,
+            state="FAULT",
+            cause="STOP_BY_PERSON",
+            help=help_of("cause", "STOP_BY_PERSON"),
+            amplitude_m=0.0,
+            seconds=time.monotonic() - began_s,
+            not_kept=problems,
+            taken=True,
+            alone=False,
+            bus_problem=fault.line.partition("; ")[0],  # without its advice for a rig that vibrates
+        )
 
 
 class _Exchange:
@@ -221,7 +264,7 @@ class _Exchange:
             return
         event = parsed(wire.Event, received.payload, PLANT_EVENT.name)
         if event.code == "OPERATOR":
-            self.taken = self.taken or event.text == self._answer
+            self.taken = self.taken or event.text.startswith(self._answer)
         elif event.code == "STATE_FOLDER":
             self.not_kept = event.text
 

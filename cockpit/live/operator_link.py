@@ -10,16 +10,19 @@ import secrets
 import tempfile
 import time
 from collections.abc import Generator
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from pydantic import TypeAdapter, ValidationError
 
 from bridge.faults import Fault
+from bridge.guard.stop_file import order
 from bridge.plain import plain
 from bridge.wire.loopback_users import folders, is_private_folder
 from bridge.wire.zenoh_link import BusConfig
-from cockpit.live.operator import send_command
+from cockpit.first_stop import sender
+from cockpit.live.operator import send_command, stop_rig
 
 STOP, SCOPE = "STOP", "SCOPE"
 _WRONG_S = 1.0  # time for which a wrong token blocks further attempts, against guessing
@@ -75,9 +78,10 @@ class Words:
 
     async def _send(self, command: str) -> dict[str, Any]:
         until_s = time.monotonic() + (_STOP_S if command == STOP else 0.0)
+        orders = await asyncio.to_thread(order, self._bus.endpoint, sender()) if command == STOP else []
         while True:
             try:
-                outcome = await asyncio.to_thread(send_command, self._bus, command)
+                outcome = await asyncio.to_thread(stop_rig, partial(send_command, self._bus, command), orders)
             except Fault as fault:
                 if fault.kind.code != "NO_PEER" or time.monotonic() > until_s:
                     return _answer(command, False, [fault.line])

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bridge.arrays import Records
-from bridge.guard.config import wider
 from bridge.guard.events import GuardEvents, changes
 from bridge.log.runlog import RunLog
 from bridge.wire import stickslip_pb2 as wire
@@ -30,6 +29,7 @@ from controller.replay import Change
 from controller.telemetry import SNAPSHOT_EVERY, STATE_EVERY, plotted, snapshot
 from controller.trips import trip_events as trips
 from plant.node import no_number
+from plant.records import wide_limits
 
 if TYPE_CHECKING:
     from cockpit.judge.run_judge import RunJudge
@@ -73,7 +73,7 @@ def run_onboard(
         judge.begin(log.tables)
     publish = _Events(log, judge)
     publish("plant", 0, "START", "lockstep")
-    if wide := wider(scenario.rig.guard):
+    if wide := wide_limits(scenario.rig):
         publish("plant", 0, "WIDE_LIMITS", wide)
     ahead, due = list(changes), list(words)
     try:

@@ -189,7 +189,7 @@ def _base(
     candidates_Hz = np.array(candidate_frequencies_Hz(controller))
 
     def accel_mps2(v_d_mps: float) -> tuple[float, float]:
-        """Acceleration of the base at this feed, and the vibration frequency that `controller.frequency` would choose."""
+        """Acceleration of the base at this feed, and the vibration frequency that `controller.policy.frequency` would choose."""
         v_a_mps = min(limits.v_ratio * v_d_mps, limits.velocity_max_mps)
         omega = 2.0 * math.pi * candidates_Hz
         needed_mps2 = omega * v_a_mps / controller.amplitude.accel_range_mps2

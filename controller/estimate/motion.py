@@ -4,6 +4,7 @@ import math
 
 from bridge.kernel import kernel
 from bridge.layouts import ControllerMemory, ControllerParams
+from controller.estimate.compliance import least_compliance
 from controller.estimate.windows import BINS, DRIVE, FORCE, SLIDE, WELL_KNOWN
 
 _SIGMAS = 6.0  # least slope of a moving drive, in sigmas: error rate of 1e-9 a window at rest
@@ -132,7 +133,7 @@ def _pulling(p: ControllerParams, s: ControllerMemory) -> float:
             break
         if p.window_s[level] * s.allowed_Hz >= _EXCITER_PERIODS or s.allowed_m == 0.0:
             surely_N_per_s = s.direction * s.slope[FORCE, level] - _RISE_SIGMAS * s.noise[FORCE, level]
-            least_mps = max(least_mps, surely_N_per_s / s.stiffness_N_per_m)
+            least_mps = max(least_mps, surely_N_per_s * least_compliance(s))
     return least_mps + min(s.fine_mps, math.fabs(s.drive_velocity_mps)) if least_mps > 0.0 else 0.0
 
 
@@ -180,11 +181,13 @@ def _stands(p: ControllerParams, s: ControllerMemory) -> bool:
 @kernel
 def _climbing(p: ControllerParams, s: ControllerMemory) -> float:
     """Velocity of a drive that winds up its spring against a stuck slide [m/s]; 0 where the positions exclude it."""
+    if least_compliance(s) == 0.0:
+        return 0.0
     for level in range(p.levels):
         if s.pushed[level] < BINS or p.window_s[level] > _BY_FORCE_S:
             break
         noise_N_per_s, noise_mps = s.noise[FORCE, level], s.noise[DRIVE, level]
-        velocity_mps = s.slope[FORCE, level] / s.stiffness_N_per_m
+        velocity_mps = s.slope[FORCE, level] * s.compliance_m_per_N
         if s.differences[level] >= WELL_KNOWN and math.fabs(s.slope[FORCE, level]) > _SIGMAS * noise_N_per_s:
             seen = math.fabs(velocity_mps - s.slope[DRIVE, level]) < _SIGMAS * noise_mps
             return velocity_mps if seen and math.fabs(velocity_mps) > p.least_feed_mps else 0.0

@@ -84,10 +84,10 @@ def _note_window(p: ControllerParams, s: ControllerMemory, level: int, learn: bo
         s.differences[level] += 1
         count = s.differences[level]
         up = _UP if count >= _MANY else math.exp(0.25 * max(_FIRST_SHARE / count, _LEAST_SHARE))
-        law_mps, per_N_per_m = 0.0, 1.0 / s.stiffness_N_per_m
+        law_mps = 0.0
         for row in range(ROWS):
             bend = slope[row, level] - 2.0 * before[row, level, 0] + before[row, level, 1]
-            law_mps += bend * (per_N_per_m if row == FORCE else 1.0 if row == SLIDE else -1.0)
+            law_mps += bend * (s.compliance_m_per_N if row == FORCE else 1.0 if row == SLIDE else -1.0)
             sigma[row, level] = _moved(sigma[row, level], math.fabs(bend) * _OF_BEND, up, count)
         if both:
             s.agreements[level] += 1
@@ -133,7 +133,7 @@ def _note_noise(p: ControllerParams, s: ControllerMemory, level: int, both: bool
     # only under vibration: without it the swing after a slip would count as further slips
     if both and s.allowed_m > 0.0 and s.agreements[level] >= WELL_KNOWN:
         off_mps = math.sqrt(s.law_mps[level] * s.law_mps[level] + s.noise[DRIVE, level] * s.noise[DRIVE, level])
-        s.noise[FORCE, level] = min(s.noise[FORCE, level], s.stiffness_N_per_m * off_mps)
+        s.noise[FORCE, level] = min(s.noise[FORCE, level], off_mps / s.compliance_m_per_N)
         s.noise[SLIDE, level] = min(s.noise[SLIDE, level], off_mps)
 
 

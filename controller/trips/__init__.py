@@ -6,7 +6,6 @@ delivered  measured v_a against the v_a expected from the command: OPEN_LOOP, CL
 frozen     channels that repeat their bits: FROZEN; an accelerometer that drops out: LOOSE
 spring     force and positions against the law of the drive's spring: FORCE_DOUBTED, DRIVE_DOUBTED, SLIDE_DOUBTED
 confirmed  v_d as far as slide and force confirm it: POSITIONS_APART
-stall      after a stall of the computer or the link no doubt begins until v_a corresponds to the command again
 age        age of the blocks when they are answered
 jumps      a drive position that jumps: JUMPED
 reset      a reset forgets values learnt from a doubted force or position

@@ -1,9 +1,12 @@
 """The exciter's known gain, and the stroke that it allows.
 
 The known gain of a frequency comes from the rig's loop check at the neighbouring tones, else from the configuration, else from
-the mean over the first tenth of a second of even vibration, within the range of the check. It does not follow the gain learnt
-later: an accelerometer that loses gain looks like an exciter that loses gain, and the loop would raise the stroke without end. So
-the stroke never exceeds the stroke for the wanted v_a at the known gain, times the band.
+the mean over the first tenth of a second of even vibration, within the range of the check. The stroke never exceeds the stroke
+for the wanted v_a at the known gain, times the band.
+
+An accelerometer that loses gain looks like an exciter that loses gain, and the contact is the second witness: a slide that sticks
+while the measured v_a is at v_d shows a weak, warm exciter, and the known gain becomes the measured one, down to a floor. A slide
+that continues to slide shows a wrong accelerometer.
 """
 
 import math
@@ -24,6 +27,7 @@ def begin_known(p: ControllerParams, s: ControllerMemory) -> None:
     for i in range(p.candidates):
         s.known_gain[i] = p.told_gain
         s.known_steps[i] = p.known_steps if p.told_gain > 0.0 else 0
+    s.accepted_gain[:] = 0.0
 
 
 @kernel
@@ -55,6 +59,7 @@ def _use_check(p: ControllerParams, s: ControllerMemory) -> None:
         alike = high < p.gain_band * low
         s.known_gain[i] = math.sqrt(low * high)
         s.known_steps[i] = p.known_steps if alike else 0
+        s.accepted_gain[i] = 0.0
         other = other and not low / p.gain_band < p.told_gain < high * p.gain_band
     s.gain_other_s = OTHER_REPORTED_S if other else 0.0
 
@@ -99,6 +104,15 @@ def note_known(p: ControllerParams, s: ControllerMemory, i: int, gain: float) ->
 def is_known(p: ControllerParams, s: ControllerMemory, i: int) -> bool:
     """Whether the gain of a candidate is known well enough to detect faults by it."""
     return s.known_steps[i] >= p.known_steps
+
+
+@kernel
+def accept_weaker(p: ControllerParams, s: ControllerMemory) -> None:
+    """Lower the known gain of the present candidate to the measured gain, not below the floor."""
+    i = s.candidate
+    if s.accepted_gain[i] == 0.0:
+        s.accepted_gain[i] = s.known_gain[i]
+    s.known_gain[i] = min(max(math.exp(s.log_gain[i]), p.gain_floor * s.accepted_gain[i]), s.known_gain[i])
 
 
 @kernel

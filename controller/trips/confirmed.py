@@ -22,11 +22,11 @@ _EXACT = 0.05  # largest noise of both positions together in a used window, over
 _APART = 1.2  # ratio of v_d to the v_d by slide and force from which they disagree; errors of scale are smaller
 _MARGIN = 1.1  # factor on the confirmed v_d while drive, slide and force disagree
 _RISES_S = 1.0  # time constant of a rise of the confirmed share during a disagreement: v_a itself moves slide and force
-_WINDOWS = 5.0 * BINS  # fewest windows of a learnt stiffness: BINS windows overlap, under hum five agree by chance
+_WINDOWS = 5.0  # fewest independent windows of a learnt stiffness
 _SURE = 0.03  # largest relative sigma of a learnt stiffness; the first values are a third too large
 # Share of v_d below which the slide sticks, and the share that counts as confirmed then: the rest depends on the stiffness.
 _STICKS, _STUCK = 0.25, 0.4
-_SOFTER = 2.0  # factor by which the spring may have become softer than `stiffest_N_per_m`
+_SOFTER = 2.0  # factor by which the spring may have become softer than the stiffest
 _TWICE = 2.0  # ratio of two changes from which only the larger counts as a change
 _SAME = 0.08  # smallest change of a velocity that counts, over v_d: less than half of the difference at a trip
 _NONE = -1  # in place of a row: no single signal changed, or it is unknown
@@ -39,18 +39,19 @@ def watch_confirmed(p: ControllerParams, s: ControllerMemory) -> None:
     some_s = SOME * p.block_s
     vibrates = s.moving == 1 and (s.allowed_m > 0.0 or s.confirmed < 1.0)
     s.shaken_s = s.shaken_s + some_s if vibrates else 0.0
-    if s.stiffness_learnt == 1 and s.stiffness_sigma < _SURE and s.taught >= _WINDOWS:
-        s.stiffest_N_per_m = max(s.stiffest_N_per_m, s.stiffness_N_per_m)
+    c = s.compliance_m_per_N
+    if s.stiffness_learnt == 1 and s.compliance_sigma < _SURE * c and s.shown_windows >= _WINDOWS:
+        s.stiffest_m_per_N = c if s.stiffest_m_per_N == 0.0 else min(s.stiffest_m_per_N, c)
     level = _level(p, s)
     if s.doubted & CONTACT and s.trip != POSITIONS_APART:  # a doubted force or slide position cannot confirm v_d
         s.apart_s, s.confirmed = 0.0, 1.0
         return
     if s.moving == 0:
         s.apart_s = 0.0
-    if level < 0 or s.stiffest_N_per_m == 0.0:
+    if level < 0 or s.stiffest_m_per_N == 0.0:
         return
     drive_mps, slide_mps = s.direction * s.slope[DRIVE, level], s.direction * s.slope[SLIDE, level]
-    winds_mps = s.direction * s.slope[FORCE, level] / s.stiffest_N_per_m
+    winds_mps = s.direction * s.slope[FORCE, level] * s.stiffest_m_per_N
     share = (slide_mps + winds_mps) / drive_mps
     sticks = slide_mps < _STICKS * drive_mps
     if (_STUCK if sticks else 1.0 / _APART) < share < _APART:

@@ -11,9 +11,9 @@ from bridge.kernel import kernel
 from bridge.layouts import ControllerMemory, ControllerParams
 from bridge.wire.messages import RESET
 from bridge.wire.stickslip_pb2 import CHECKING
+from controller.in_force import is_judged
 from controller.trips.band import begin_known, forget_check
 from controller.trips.reset import forget_motion, forget_needs
-from controller.trips.stall import is_judged
 
 ACCELEROMETER, CONTACT, DRIVE = 1, 2, 4  # bits of `s.doubted`
 OF_FORCE, OF_SLIDE, OF_DRIVE, OF_BASE = range(4)  # channels: indices of `s.same_steps`
@@ -24,7 +24,7 @@ CHANNELS = 4
 def trip(s: ControllerMemory, reason: int, doubts: int) -> None:
     """Doubt signals; the first trip is reported until it ends, unless a later trip ends the vibration.
 
-    Soon after a stall of the computer no doubt begins; a broken signal is still broken afterwards.
+    Soon after an interruption of the commands no doubt begins; a broken signal is still broken afterwards.
     """
     if not is_judged(s):
         return
@@ -60,5 +60,5 @@ def _forget(s: ControllerMemory) -> None:
     s.rest_steps, s.broken_steps = 0, 0
     s.same_steps[:] = 0
     s.grown_steps, s.drops, s.jumps, s.jumped_s = 0, 0.0, 0.0, 0.0
-    s.apart_s, s.confirmed, s.stiffest_N_per_m = 0.0, 1.0, 0.0
+    s.apart_s, s.confirmed, s.stiffest_m_per_N = 0.0, 1.0, 0.0
     s.agreed_mps[:] = 0.0

@@ -6,7 +6,7 @@ of exciter, loop delay and accelerometer stay: they do not depend on the doubted
 
 from bridge.kernel import kernel
 from bridge.layouts import ControllerMemory, ControllerParams
-from controller.estimate.learning import begin
+from controller.estimate.compliance import begin_spring
 from controller.estimate.windows import clear_windows
 
 
@@ -17,7 +17,7 @@ def forget_motion(p: ControllerParams, s: ControllerMemory) -> None:
     for table in (s.slope, s.sigma, s.noise):
         table[:, :] = 0.0
     s.slope_before[:, :, :] = 0.0
-    s.law_mps[:], s.resolution[:], s.kept_mps[:], s.kept_N_per_m = 0.0, 0.0, 0.0, 0.0
+    s.law_mps[:], s.resolution[:], s.kept_mps[:], s.kept_m_per_N = 0.0, 0.0, 0.0, 0.0
     s.bends[:], s.agreements[:], s.differences[:] = 0.0, 0, 0
     s.looks[:, :], s.lively[:, :], s.first_seen = 0, 0.0, 0
     s.bend_m, s.bent, s.noise_told_s, s.unbelieved_s, s.slip_count, s.slips_wound = 0.0, 0, 0.0, 0.0, 0.0, 0.0
@@ -33,14 +33,13 @@ def _forget_velocities(s: ControllerMemory) -> None:
     s.measured, s.moving, s.blind = 0, 0, 0
     s.sliding_mps, s.fine_mps, s.fine_sigma_mps = 0.0, 0.0, 0.0
     s.level, s.swing_level, s.slipping = -1, -1, 0
-    s.stick_s, s.since_stick_s, s.smooth_s, s.slid_s, s.unseen_s = 0.0, 0.0, 0.0, 0.0, 0.0
+    s.stick_s, s.since_stick_s, s.smooth_s, s.unseen_s = 0.0, 0.0, 0.0, 0.0
 
 
 @kernel
 def _forget_forces(p: ControllerParams, s: ControllerMemory) -> None:
-    begin(p, s)
-    s.stiffness_learnt, s.stretched = 0, 0
-    s.taught, s.taught_ratio, s.taught_square = 0.0, 0.0, 0.0
+    begin_spring(p, s)
+    s.stretched = 0
     s.peak_N, s.slip_from_N = 0.0, 0.0
     for force_N in (s.swing_N, s.breakaway_N, s.sliding_N, s.slid_N):
         force_N[:] = 0.0
@@ -50,9 +49,9 @@ def _forget_forces(p: ControllerParams, s: ControllerMemory) -> None:
 @kernel
 def forget_needs(p: ControllerParams, s: ControllerMemory) -> None:
     """Forget where a vibration was needed, was not, or did not help: some may have been learnt with the exciter off."""
-    for needs in (s.edge_ratio, s.edge_held_s, s.probe_s, s.needed_to_mps, s.needless_from_mps, s.rough_with):
+    for needs in (s.edge_ratio, s.edge_held_s, s.untried_s, s.needed_to_mps, s.needless_from_mps):
         needs[:] = 0.0
     s.ratio[:] = p.v_ratio
-    s.off_s[:], s.off_left_s[:], s.harmful[:] = 0.0, 0.0, 0
-    s.swing, s.even_s, s.lead, s.top, s.roughness, s.roughness_s = 0.0, 0.0, 0.0, -1.0, 0.0, 0.0
-    s.helpless, s.failed, s.failed_left_s, s.wobbles = 0, 0, 0.0, 0
+    s.off_s[:], s.off_left_s[:], s.fall_with_N[:], s.crest_with_N[:] = 0.0, 0.0, 0.0, 0.0
+    s.swing, s.even_s, s.lead, s.top = 0.0, 0.0, 0.0, -1.0
+    s.failed, s.failed_left_s, s.proven[:] = 0, 0.0, 0

@@ -20,6 +20,7 @@ from controller.trips.doubts import DRIVE as DRIVE_DOUBT
 SHORTEST_S = 0.01  # shortest window; in a shorter one a force with a delay of 2 ms breaks the law in every slip
 HOLD_S, _WINDOWS = 0.05, 2.0  # time for which the law is broken until a trip; number of windows added to it
 FIRST_S = 0.015  # first part of HOLD_S, whose changes of v_d and v_s decide which signal is doubted
+_OF_COMPLIANCE = 3.0  # sigmas of c that a broken law must exceed: an axis of unknown stiffness breaks no law
 _SIGMAS = 8.0  # least ratio of half of v_d to the noise in a window
 # Largest difference of the law's two sides, over the larger: for a spring that is softer or stiffer by a factor of 5; by a factor
 # of 20 while k_d is configured and not learnt yet.
@@ -35,15 +36,15 @@ def watch_spring(p: ControllerParams, s: ControllerMemory) -> None:
     level = _level(p, s)
     if level < 0:
         return
-    known = s.kept_N_per_m > 0.0 and s.stiffness_learnt == 1 and s.stiffness_sigma > _SURE
-    if s.broken_steps == 0 and not known:  # during a fault, or by noise if no spring winds up, k_d is learnt wrongly
-        s.kept_N_per_m = s.stiffness_N_per_m
-    by_force_mps = s.slope[FORCE, level] / s.kept_N_per_m
+    unsure = s.kept_m_per_N > 0.0 and s.stiffness_learnt == 1 and s.compliance_sigma > _SURE * s.compliance_m_per_N
+    if s.broken_steps == 0 and not unsure:  # during a fault, or by noise if no spring winds up, c is learnt wrongly
+        s.kept_m_per_N = s.compliance_m_per_N
+    by_force_mps = s.slope[FORCE, level] * s.kept_m_per_N
     drive_mps, slide_mps = s.slope[DRIVE, level], s.slope[SLIDE, level]
     apart_mps = drive_mps - slide_mps
     off_mps = math.fabs(apart_mps - by_force_mps)
     larger_mps = max(math.fabs(apart_mps), math.fabs(by_force_mps))
-    counts_mps = _HALF * _largest_mps(p, s)
+    counts_mps = _HALF * _largest_mps(p, s) + _OF_COMPLIANCE * s.compliance_sigma * math.fabs(s.slope[FORCE, level])
     most_off = _OFF if s.stiffness_learnt == 1 else _TOLD_OFF
     if off_mps <= most_off * larger_mps or off_mps <= counts_mps:
         s.broken_steps = max(s.broken_steps - (SOME if larger_mps > counts_mps else SOME // 2), 0)
@@ -77,11 +78,13 @@ def _level(p: ControllerParams, s: ControllerMemory) -> int:
     """Level of the shortest windows in which half of v_d exceeds the noise; -1: no level. Constant while the law is broken."""
     if s.broken_steps > 0:
         return s.spring_level
+    if not math.isfinite(s.compliance_sigma):
+        return -1
     counts_mps = _HALF * _largest_mps(p, s)
     for level in range(p.spring_level, p.levels):
         if s.pushed[level] < 2 * BINS or s.differences[level] < WELL_KNOWN:
             return -1
-        by_noise_mps = s.noise[FORCE, level] / s.stiffness_N_per_m
+        by_noise_mps = s.noise[FORCE, level] * s.compliance_m_per_N
         noise_slide, noise_drive = s.noise[SLIDE, level], s.noise[DRIVE, level]
         square = by_noise_mps * by_noise_mps + noise_slide * noise_slide + noise_drive * noise_drive
         if _SIGMAS * _SIGMAS * square < counts_mps * counts_mps:

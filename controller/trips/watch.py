@@ -4,10 +4,9 @@ import math
 
 from bridge.kernel import Record, kernel
 from bridge.layouts import ControllerMemory, ControllerParams, SensorRow
-from bridge.wire.stickslip_pb2 import GAIN_OTHER, JUMPED, NOISE, RESONANCE, TRAVEL_END
 from controller.estimate.windows import DRIVE as DRIVE_ROW
 from controller.trips.confirmed import watch_confirmed
-from controller.trips.delivered import SOME, is_loud, watch_delivered, watch_rest
+from controller.trips.delivered import SOME, watch_delivered, watch_rest
 from controller.trips.doubts import ACCELEROMETER, CONTACT, DRIVE, OF_DRIVE
 from controller.trips.frozen import watch_frozen
 from controller.trips.noise import watch_slips
@@ -39,8 +38,7 @@ def watch(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> None:
         s.slip_began, s.stick_began = 0, 0
     if doubted:
         s.blind = 1
-        for way in range(s.ratio.shape[0]):  # false slips may have raised the ratio
-            s.ratio[way] = min(s.ratio[way], p.v_ratio)
+        s.ratio[:] = p.v_ratio  # false slips may have raised the ratio, and a false swing may have lowered it
 
 
 @kernel
@@ -62,19 +60,3 @@ def restrain(p: ControllerParams, s: ControllerMemory) -> None:
         s.wanted_velocity_mps *= s.confirmed
     if s.doubted & ACCELEROMETER and s.followed >= 0 and s.wanted_Hz != p.candidate_Hz[s.followed]:
         s.candidate, s.wanted_Hz = s.followed, p.candidate_Hz[s.followed]
-
-
-@kernel
-def reported_reason(s: ControllerMemory) -> int:
-    """The reason in a command: the trip, else a passing condition, else the policy's reason."""
-    if s.trip > 0:
-        return s.trip
-    if s.outside == 1:
-        return TRAVEL_END
-    if is_loud(s):
-        return RESONANCE
-    if s.jumped_s > 0.0:
-        return JUMPED
-    if s.gain_other_s > 0.0:
-        return GAIN_OTHER
-    return NOISE if s.noise_told_s > 0.0 or s.unbelieved_s > 0.0 else s.reason

@@ -75,7 +75,7 @@ def rig_config(rig: RigTable, values: dict[str, float], effects: Effects, roughn
             "roughness_seed": roughness.seed,
         }
     # the exciter of the model follows its command at once and without limit; any deviation from this is a gap
-    table["piezo"] = {"amplitude_max_m": 1.0, "amplitude_slew_m_per_s": 0.0}
+    table["piezo"] = {"amplitude_max_m": 1e-3, "amplitude_slew_m_per_s": 0.0}
     return RigConfig.model_validate(table)
 
 

@@ -13,6 +13,8 @@ from plant.faults.table import FaultTable
 
 _JUMP_S = 0.1  # time with, then without the offset of the fault `jumping`
 _HUM_HZ = 50.0  # mains frequency, of the fault `hum`
+_SLIP_S = 0.01  # time between two steps of the fault `slipping`
+_BURST_S, _BURST_EVERY_S = 0.003, 0.037  # duration and period of the bursts of the fault `bursts`
 _LOOSE_BLOCKS = 5.0  # mean length of a burst of the fault `loose` [blocks]
 
 
@@ -63,6 +65,7 @@ class _Channel:
         self.before: Floats = np.zeros(1)
         self.line: list[Floats] = []
         self.is_off = False
+        self.charge = 0.0  # level that the fault `charge` has removed
 
     def delayed(self, samples: Floats, _s: float) -> Floats:
         """Samples delayed by whole samples; the channel holds its last healthy value until the first one arrives."""
@@ -95,6 +98,20 @@ class _Channel:
         samples[len(samples) // 2] = self.size
         return samples
 
+    def charged(self, samples: Floats, _s: float) -> Floats:
+        """Samples minus their slow mean, which a charge amplifier loses; at the begin nothing is lost."""
+        share, shown, level = self.sample_s / self.size, np.empty_like(samples), self.charge
+        for i, sample in enumerate(samples):
+            shown[i] = sample - level
+            level += share * shown[i]
+        self.charge = level
+        return shown
+
+    def bursts(self, samples: Floats, since_s: float) -> Floats:
+        """Samples with random numbers within the value added in the bursts."""
+        added = self.random.uniform(-self.size, self.size, samples.shape)
+        return samples + np.where(self.times_s(samples, since_s) % _BURST_EVERY_S < _BURST_S, added, 0.0)
+
     def times_s(self, samples: Floats, since_s: float) -> Floats:
         """Times of the samples since the begin of the fault [s]."""
         return since_s + self.sample_s * np.arange(len(samples))
@@ -120,4 +137,7 @@ _KINDS: dict[str, Callable[[_Channel, Floats, float], Floats]] = {
     "coarse": lambda of, true, _: np.round(true / of.size) * of.size if of.size > 0.0 else true,
     "hum": lambda of, true, since_s: true + of.size * np.sin(2.0 * math.pi * _HUM_HZ * of.times_s(true, since_s)),
     "flipped": _Channel.flipped,
+    "slipping": lambda of, true, since_s: true + of.size * np.ceil(of.times_s(true, since_s) / _SLIP_S),
+    "bursts": _Channel.bursts,
+    "charge": _Channel.charged,
 }

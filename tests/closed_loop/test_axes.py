@@ -85,7 +85,8 @@ def test_without_a_slide_position_a_configured_stiffness_that_is_too_small_is_ra
 
 @pytest.mark.parametrize("missing", ["use_force", "use_slide_position"])
 def test_either_channel_may_be_missing(missing: str) -> None:
-    loop = close_the_loop(6.0, controller={"estimator": {missing: False}})
+    controller = {"estimator": {missing: False}, "drive_stiffness_N_per_m": 11700.0}
+    loop = close_the_loop(6.0, controller=controller)
     assert loop.slips(0.0) == 0
     assert loop.ratio(0.5).min() > 1.04
 
@@ -143,14 +144,13 @@ def test_an_axis_that_cannot_be_seen_is_vibrated_while_it_moves_and_reported() -
     assert loop.excited(2.0) == 0.0
 
 
-def test_an_exciter_that_cannot_help_is_switched_off_and_reported() -> None:
-    loop = close_the_loop(9.0, rig={"piezo": {"delivered_ratio": 0.05}})
-    assert loop.reasons(8.0) == {wire.CANNOT_HELP}
-    assert loop.excited(8.0) == 0.0
-    first = float(loop.t_s[loop.trace["reason"] == wire.CANNOT_HELP][0])
+def test_an_exciter_that_cannot_help_is_reported_and_switched_off_after_a_trial() -> None:
+    loop = close_the_loop(25.0, rig={"piezo": {"delivered_ratio": 0.02}})
+    first = float(loop.t_s[loop.trace["reason"] == wire.EXCITER_END][0])
     period_s = 1.05  # of stick-slip on this rig
     assert first <= 2.0 + 3.0 * period_s + 0.3
-    assert len(set(loop.trace["wanted_frequency_Hz"][loop.trace["wanted_velocity_mps"] > 0.0])) == 2
+    assert loop.reasons(20.0) == {wire.CANNOT_HELP}
+    assert loop.excited(20.0) == 0.0
 
 
 def test_an_announced_move_is_vibrated_before_it_begins() -> None:

@@ -13,6 +13,7 @@ import pytest
 
 from bench.control.drawn import drawn_axes
 from bridge.log.damage import Damage
+from bridge.log.storage.checksums import checksums_of
 from bridge.wire.channels import CHANNELS
 from cockpit.judge.run_judge import RunJudge
 from cockpit.judge.verdict import RunVerdict
@@ -75,8 +76,10 @@ def _with_sensor(scenario: Scenario, name: str, value: float) -> Scenario:
 
 
 def _verdict(scenario: Scenario, folder: Path) -> RunVerdict:
-    judge = RunJudge(folder / "run.mcap", {})
-    return judge.result(Damage(0, 0, closed=True), run_onboard(scenario, folder / "run.mcap", {}, judge=judge), {})
+    log = folder / "run.mcap"
+    judge = RunJudge(log, {})
+    run_onboard(scenario, log, {}, judge=judge)
+    return judge.result(Damage(0, 0, closed=True), checksums_of(log), {})
 
 
 def _differs(sound: RunVerdict, other: RunVerdict) -> bool:

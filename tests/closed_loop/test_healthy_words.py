@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 
-from bridge.guard.events import GuardEvents
-from bridge.guard.events import changes as guard_changes
+from bench.control.trust.reports import Reports
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.run.closed_loop import ClosedLoop, Stretch
 from cockpit.run.scenario import load_scenario
-from controller.trips.trip_events import TripEvents, changes
 
 ARM, DISARM = wire.Operator.ARM, wire.Operator.DISARM
 
@@ -18,8 +16,7 @@ def played(name: str, seconds: float, words: dict[float, int]) -> tuple[set[str]
     scenario = load_scenario(name, ["controller.policy.enabled_from_s=0.0"])
     loop = ClosedLoop(scenario.rig, scenario.seed, scenario.controller, arm=False)
     block_s = scenario.rig.solver.block_s
-    guard, trips = GuardEvents(), TripEvents()
-    codes: set[str] = set()
+    reports = Reports()
     parts: list[Stretch] = []
     for at_s, ends_s in zip(words, [*list(words)[1:], seconds], strict=True):
         if loop.block < round(at_s / block_s):
@@ -27,13 +24,8 @@ def played(name: str, seconds: float, words: dict[float, int]) -> tuple[set[str]
         loop.apply_order(words[at_s])
         parts.append(loop.advance(round(ends_s / block_s) - loop.block))
     for part in parts:
-        codes |= {code for row in guard_changes(part.applied) for code, _ in guard.news(part.applied[row])}
-        codes |= {code for row in changes(part.trace) for code, _ in trips.news(part.trace[row])}
-    slips = np.concatenate([part.trace["slips"] for part in parts]).astype(np.int64)
-    speeds_mps = np.concatenate([part.trace["drive_velocity_mps"] for part in parts])
-    if ((np.diff(slips) > 0) & (speeds_mps[1:] == 0.0)).any():
-        codes.add("DRIVE_UNSEEN")
-    return codes - {"GUARD"}, parts
+        reports(part)
+    return reports.codes, parts
 
 
 @pytest.mark.parametrize("name", ["belt-axis", "ball-screw-axis"])

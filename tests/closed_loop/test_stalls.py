@@ -11,7 +11,7 @@ from bridge.log.logfile import RunData, read_run
 from bridge.wire.event_codes import TRIPS, WEAK_REASONS
 from cockpit.run.scenario import load_scenario
 from cockpit.run.simulated.run import run_with_faults
-from controller.trips.stall import MOST_S, SETTLED_S
+from controller.in_force import MOST_S, SETTLED_S
 from plant.faults.table import FaultTable
 
 FROM_S = 1.0
@@ -32,7 +32,7 @@ def blamed(data: RunData) -> Iterator[tuple[float, str, str]]:
 
 @pytest.mark.parametrize(("role", "for_s"), [("controller", 0.1), ("plant", 0.5), ("controller", 1.0)])
 def test_a_stall_loses_nothing_and_teaches_nothing(tmp_path: Path, role: str, for_s: float) -> None:
-    """A stall of 0.1 s gave PIEZO_WEAK, and one of 0.5 s halved the learnt gain."""
+    """A stall of 0.1 s gave EXCITER_END, and one of 0.5 s halved the learnt gain."""
     frozen = {"kind": "frozen", "target": role, "from_s": FROM_S, "for_s": for_s}
     data = run(tmp_path / "run.mcap", FROM_S + for_s + 2.5, frozen)
     numbers = data.sensors["sequence"].astype(np.int64)
@@ -43,6 +43,16 @@ def test_a_stall_loses_nothing_and_teaches_nothing(tmp_path: Path, role: str, fo
     t_s = data.trace["t_ns"] * 1e-9
     before, after = (data.trace["exciter_gain"][t_s > at_s][0] for at_s in (FROM_S - 0.1, FROM_S + for_s + 0.5))
     assert after == pytest.approx(before, rel=0.01)
+
+
+@pytest.mark.parametrize("for_s", [0.067, 0.12])
+def test_a_gap_in_the_commands_raises_no_vibration_and_doubts_nothing(tmp_path: Path, for_s: float) -> None:
+    """A gap of 67 ms raised v_a to 1.6 set points within 3 s, and a gap of 120 ms gave OPEN_LOOP until a reset."""
+    data = run(tmp_path / "run.mcap", 4.0, {"kind": "cut", "target": "commands", "from_s": FROM_S, "for_s": for_s})
+    assert {event.code for event in data.events} >= {"FALLBACK"}
+    assert list(blamed(data)) == []
+    after = data.trace["t_ns"] * 1e-9 > FROM_S
+    assert data.trace["velocity_ratio"][after].max() < 1.31
 
 
 def test_an_accelerometer_that_fails_in_a_stall_is_reported_soon_after_it(tmp_path: Path) -> None:
@@ -69,7 +79,7 @@ def test_a_computer_that_stalls_all_the_time_is_named_and_delays_a_doubt_by_the_
 def test_a_sound_rig_is_not_doubted_though_the_computer_stalls_all_the_time(
     tmp_path: Path, role: str, every_s: float
 ) -> None:
-    """Such stalls gave OPEN_LOOP or PIEZO_WEAK once the longest wait was over."""
+    """Such stalls gave OPEN_LOOP or EXCITER_END once the longest wait was over."""
     stalls = [
         {"kind": "frozen", "target": role, "from_s": at_s, "for_s": 0.1} for at_s in np.arange(FROM_S, 6.0, every_s)
     ]

@@ -56,7 +56,7 @@ def test_an_accelerometer_whose_gain_is_lost_slowly_is_given_no_more_stroke_than
     assert came.peak < 1.1 * BAND  # 8 % more while a wobble asks for the need
     assert came.slips == 0
     assert "GAIN_LIMIT" in came.limits
-    assert came.reasons["PIEZO_WEAK"] > 1.0
+    assert came.reasons["EXCITER_END"] > 1.0
 
 
 def test_more_vibration_than_commanded_is_followed_down_and_reported() -> None:

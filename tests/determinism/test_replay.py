@@ -53,10 +53,10 @@ def test_replay_equals_record_from_anywhere(log: Path, from_s: float) -> None:
 def test_a_changed_bit_is_found_and_named(log: Path) -> None:
     run = read_run(log)
     trace = np.frombuffer(bytearray(run.trace.tobytes()), run.trace.dtype)
-    trace["score"][4321] = np.nextafter(trace["score"][4321], 1.0)
+    trace["force_rate"][4321] = np.nextafter(trace["force_rate"][4321], 1.0)
     result = replay(run._replace(trace=trace), changes_of(run, []))
     assert result.difference is not None
-    assert (result.difference.table, result.difference.step, result.difference.field) == ("trace", 4321, "score")
+    assert (result.difference.table, result.difference.step, result.difference.field) == ("trace", 4321, "force_rate")
 
 
 def delivered(path: Path, deliver: "list[int]", blocks: list[bytes], run: Scenario) -> RunData:
@@ -190,7 +190,7 @@ def test_closed_loop_compares_both(log: Path, tmp_path: Path) -> None:
     arguments = ["--closed-loop", "--set", "limits.v_ratio=1.5", "--json", "--log", str(out)]
     changed = json.loads(CliRunner().invoke(app, ["replay", str(log), *arguments]).stdout)
     assert changed["now"]["vibration_dose_mm2_per_s"] > changed["was"]["vibration_dose_mm2_per_s"]
-    assert changed["now"]["velocity_ratio_min"] > 1.15 > changed["was"]["velocity_ratio_min"]
+    assert changed["now"]["velocity_ratio_min"] > 1.25 > changed["was"]["velocity_ratio_min"]
 
 
 def test_the_log_of_a_closed_loop_with_a_change_replays(log: Path, tmp_path: Path) -> None:
@@ -210,19 +210,19 @@ def test_an_operators_stop_is_repeated_in_the_closed_loop_and_no_stick_slip_of_t
     run = load_scenario("from-the-start", ["duration_s=14.0"])
     words = [
         TimedAction(4_000_000_000, wire.Operator.STOP),
-        TimedAction(9_000_000_000, wire.Operator.RESET),
-        TimedAction(9_100_000_000, wire.Operator.ARM),
+        TimedAction(5_200_000_000, wire.Operator.RESET),
+        TimedAction(5_300_000_000, wire.Operator.ARM),
     ]
     run_onboard(run, stopped, {}, words=words)
     slips = verdict_of(read_run(stopped))
     assert (slips.before, slips.good) == (None, True)
     assert slips.after is not None
-    assert slips.after.seconds == pytest.approx(6.4, abs=0.1)
-    assert slips.stopped_s == pytest.approx(6.6, abs=0.1)
+    assert slips.after.seconds == pytest.approx(10.0, abs=0.1)
+    assert slips.stopped_s == pytest.approx(3.0, abs=0.1)
     assert slips.stopped_slips > 0
     then = f"{slips.stopped_slips} slips"
     stopped_line = (
-        f"stopped  by an operator, or not armed, for 6.6 s (counted neither before nor after); {then} in this time"
+        f"stopped  by an operator, or not armed, for 3.0 s (counted neither before nor after); {then} in this time"
     )
     assert stopped_line in in_words(slips, verbose=True)
     assert headline(slips) == f"no stick-slip with the controller in charge; {then} while it was stopped or not armed"
@@ -273,29 +273,29 @@ def to_a_live_controller(log: Path, again: Path) -> list[int]:
                 process.wait()
 
 
-def told_whole(run: RunData) -> bool:
-    """Whether the log reports no loss, and the end of its controller."""
-    ends = [event.text for event in run.events if (event.source, event.code) == ("controller", "END")]
-    lost = {"GAP", "RESTART", "DROPPED", "STALE", "PLANT_LOST"} & {event.code for event in run.events}
-    return not lost and len(ends) == 1 and ends[0].endswith("dropped=0")
+def got_the_same_input(now: RunData, was: RunData) -> bool:
+    """Whether no message was lost, and no block was late: from late blocks the controller learns nothing."""
+    lost = {"GAP", "RESTART", "DROPPED", "STALE", "PLANT_LOST"} & {event.code for event in now.events}
+    return not lost and np.array_equal(now.trace["events"], was.trace["events"])
 
 
 @pytest.mark.realtime
 def test_a_log_on_the_bus_gets_the_same_answers_from_a_live_controller(log: Path, tmp_path: Path) -> None:
     again = tmp_path / "again.mcap"
-    # A process without CPU time for 0.1 to 0.3 s loses messages and reports it. Its
-    # answers are still checked bit for bit; only a run without a loss may need another try
+    was = read_run(log)
+    # On a busy computer blocks are lost, or come more than 15 ms late. The answers are still checked bit for bit against
+    # the input of this run, and another run is compared with the log
     for _ in range(3):
         statuses = to_a_live_controller(log, again)
         if statuses == [0, 0, 0]:
             now = read_run(again)
             assert replay(now, changes_of(now, [])).identical
-            if told_whole(now):
+            if got_the_same_input(now, was):
                 break
     assert statuses == [0, 0, 0]
-    was, now = read_run(log), read_run(again)
+    now = read_run(again)
     assert now.sensors.tobytes() == was.sensors.tobytes()
-    for field in ("mode", "score", "wanted_amplitude_m", "vibration_velocity_mps"):
+    for field in ("mode", "force_rate", "wanted_amplitude_m", "vibration_velocity_mps"):
         assert np.array_equal(now.trace[field], was.trace[field]), field
 
 

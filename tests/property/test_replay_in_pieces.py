@@ -61,7 +61,7 @@ def lossy(chance: random.Random, disorder: bool) -> RunData:
             rows[at:until] = rows[at:until][::-1]
             tables[topic] = rows_of(tables[topic], rows)
         elif kind == "changed" and len(rows):
-            field = {"announce": "drive_velocity_mps", "sensors": "check_Hz", "command": "mode", "trace": "score"}[
+            field = {"announce": "drive_velocity_mps", "sensors": "check_Hz", "command": "mode", "trace": "force_rate"}[
                 topic
             ]
             tables[topic][field][at % len(rows)] += 1

@@ -115,7 +115,7 @@ def test_a_stalled_process_reports_it_and_the_run_goes_on(tmp_path: Path, role: 
     else:
         assert {"RIG_BACK", "GAP"} <= {event.code for event in data.events}
     reported = [event for event in data.events if event.source == "controller"]
-    made_up_for = {"LATE", "FLOOD", "FOREIGN", "GAIN_LIMIT"}  # possible events when late blocks arrive at once
+    made_up_for = {"LATE", "FLOOD", "FOREIGN", "EXCITER_END"}  # possible events when late blocks arrive at once
     codes = [event.code for event in reported if event.code not in made_up_for]
     assert codes[-2:] == ["FRESH", "END"], [event.text for event in reported]
 

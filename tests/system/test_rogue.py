@@ -148,7 +148,7 @@ def test_a_rig_of_another_schema_is_refused() -> None:
             capture_output=True, text=True, timeout=60, check=False,
         )  # fmt: skip
     assert refused.returncode == 8
-    assert "BAD_MESSAGE: header/plant: schema_version = 9: must be 1 or 2" in refused.stderr
+    assert "BAD_MESSAGE: header/plant: schema_version = 9: must be 1 to 3" in refused.stderr
 
 
 @pytest.mark.parametrize(("size", "heard"), [(100_000, (1 << 16) + 1), (5_000_000, None)])

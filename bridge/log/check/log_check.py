@@ -152,7 +152,7 @@ def _of_file(path: Path, reader: LogReader, seen: LogWatch) -> list[Finding]:
     for role, table in reader.metadata.items():
         version = table.get("schema_version")
         if version is not None and version not in map(str, READABLE_VERSIONS):
-            text = f"the {role} has schema version {version}: must be {' or '.join(map(str, READABLE_VERSIONS))}"
+            text = f"the {role} has schema version {version}: must be {READABLE_VERSIONS[0]} to {READABLE_VERSIONS[-1]}"
             findings.append(Finding("schema-version", path.name, text))
     for topic, times in seen.unknown.items():
         text = f"{counted(times, 'message')} of a topic unknown to this version"

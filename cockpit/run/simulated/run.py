@@ -49,6 +49,10 @@ class SimulatedRun:
         """Create the rig's node. A subclass may override this to record the simulated truth."""
         return PlantNode(**settings)
 
+    def controller_node(self) -> ControllerNode:
+        """Create the controller. A subclass may override this to run a rule in its place."""
+        return ControllerNode(self._scenario.controller)
+
     def play(self, stopped: Callable[[], bool] = lambda: False) -> None:
         """Run to the end of the scenario; `stopped`, called at every turn, ends it like Ctrl-C. Raises the Fault of a process."""
         self._begin_controller()
@@ -101,9 +105,7 @@ class SimulatedRun:
         inbox = WaitingInbox(WAITING, stage)
         session = cast(Any, Session(self._hub, "controller"))
         self._hub.down.discard("controller")
-        process = ControllerProcess(
-            scenario.controller, ControllerNode(scenario.controller), session, lockstep=False, inbox=inbox
-        )
+        process = ControllerProcess(scenario.controller, self.controller_node(), session, lockstep=False, inbox=inbox)
         process.prepare()
         self._hub.announce("controller")
         self._players["controller"] = stage.enter(Player("controller", lambda: process.loop(self._stop, _GRANTED)))

@@ -227,6 +227,10 @@ class Session:
         """How often a role has joined the bus: a restart is noticed by it."""
         return self._hub.came.get(role, 0)
 
+    def expiring(self) -> str:
+        """Empty: a simulated bus has no certificates."""
+        return ""
+
     def linked(self) -> bool:
         """Whether the link to the rig is up."""
         return not self._hub.down & {self._role, "plant"}

@@ -110,8 +110,8 @@ def test_a_matlab_file_has_the_header_and_classes_of_version_7_3(
         names = ("trace/t_s", "sensors/drive_force_N", "trace/mode", "trace/sequence")
         assert [file[name].attrs["MATLAB_class"] for name in names] == [b"double", b"single", b"uint32", b"uint64"]
         assert {file[name].attrs["MATLAB_class"] for name in ("trace", "units", "units/trace")} == {b"struct"}
-        assert file["trace/score"].shape == (1, 400)
-        assert (file["trace/score"][0] == trace["score"]).all()
+        assert file["trace/force_rate"].shape == (1, 400)
+        assert (file["trace/force_rate"][0] == trace["force_rate"]).all()
         unit = file["units/trace/drive_force_N"]
         assert unit.attrs["MATLAB_class"] == b"char"
         assert unit.attrs["MATLAB_int_decode"] == 2

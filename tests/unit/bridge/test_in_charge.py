@@ -92,14 +92,14 @@ def test_a_rig_that_never_got_a_command_is_reported(long_run: Path, tmp_path: Pa
 
 def test_a_weak_exciter_is_reported(long_run: Path, tmp_path: Path) -> None:
     def weak(tables: Tables) -> None:
-        tables["trace"]["reason"][500:1900] = wire.PIEZO_WEAK
+        tables["trace"]["reason"][500:1900] = wire.EXCITER_END
 
     path = changed(long_run, tmp_path / "weak.mcap", weak)
     verdict = judge(path)
     assert not verdict.good
-    assert headline(verdict) == "not ok: PIEZO_WEAK"
-    assert any(fault.startswith("PIEZO_WEAK: for 1.40 s: v_a stays below") for fault in verdict.faults)
-    assert "piezo-weak" in {finding.kind for finding in check_log(path).findings}
+    assert headline(verdict) == "not ok: EXCITER_END"
+    assert any(fault.startswith("EXCITER_END: for 1.40 s: the exciter is at its end") for fault in verdict.faults)
+    assert "exciter-end" in {finding.kind for finding in check_log(path).findings}
 
 
 @pytest.mark.parametrize(
@@ -145,6 +145,6 @@ def test_every_code_has_its_severity_and_place() -> None:
     assert "use a larger range" in EVENTS["CLIPPED"].help
     protocol = (Path(__file__).parents[3] / "bridge/wire/PROTOCOL.md").read_text(encoding="utf-8")
     assert not [code for code in EVENTS if f"`{code}`" not in protocol]
-    assert (harms("GAP"), harms("STALE"), is_listed("STALE"), is_listed("START")) == (True, False, True, False)
+    assert (harms("DROPPED"), harms("GAP"), is_listed("GAP"), is_listed("START")) == (True, False, True, False)
     assert is_listed("OF_ANOTHER_VERSION")
     assert not harms("OF_ANOTHER_VERSION")

@@ -3,6 +3,7 @@
 import os
 import stat
 import time
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,8 @@ from bridge.log.logfile import read_run
 from bridge.log.mcap_chunks import ChunkWriter
 from bridge.log.recover import recover
 from bridge.plain import plain
+from bridge.tables.sheet import read_sheet
+from bridge.tables.text.dialect import Dialect
 from bridge.wire.messages import COMMAND
 from cockpit.cli import app
 from cockpit.run.scenario_file import load_bus
@@ -172,3 +175,15 @@ def test_a_folder_that_others_may_write_to_keeps_no_kernels(
     assert "others may write to it" in capsys.readouterr().err
     monkeypatch.setenv(kernel_cache.FOLDER, str(tmp_path / "new"))
     assert stat.S_IMODE(kernel_cache.usable_folder().stat().st_mode) == 0o700
+
+
+@pytest.mark.parametrize("suffix", [".xlsx", ".ods"])
+def test_a_workbook_that_grows_to_gigabytes_is_refused_before_it_is_read(tmp_path: Path, suffix: str) -> None:
+    """0.9 MB of zeros took 1.5 GB of memory and 94 s."""
+    path = tmp_path / f"bomb{suffix}"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        archive.writestr("xl/worksheets/sheet1.xml", bytes(300_000_000))
+    assert path.stat().st_size < 2_000_000
+    line = f"bomb{suffix}: has 300 MB after decompression: must be at most 256 MB; save the sheet with the measurement as .csv"
+    with pytest.raises(Fault, match=line):
+        read_sheet(path, Dialect())

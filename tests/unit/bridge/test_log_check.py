@@ -195,14 +195,14 @@ def test_no_log_is_a_fault(tmp_path: Path) -> None:
         channel = writer.register_channel("/chatter", "cdr", schema)
         writer.add_message(channel, 1, b"hello", 1)
         writer.finish()
-    version = (tmp_path / "version.mcap", short_log().replace(b"stickslip schema 2", b"stickslip schema 3"))
+    version = (tmp_path / "version.mcap", short_log().replace(b"stickslip schema 3", b"stickslip schema 4"))
     version[0].write_bytes(version[1])
     (tmp_path / "text.mcap").write_text("t_s,drive_force_N\n" * 100)
     (tmp_path / "folder.mcap").mkdir()
     expected = {
         "empty": "0 bytes, no MCAP file",
         "foreign": "holds no topic of a run: its messages are std_msgs/String; give a run log",
-        "version": "written by 'stickslip schema 3'",
+        "version": "written by 'stickslip schema 4'",
         "text": "no MCAP file",
         "folder": "is a folder, must be a file; ",
         "absent": "no such file; ",

@@ -148,7 +148,7 @@ def test_events_are_repeated_as_foxglove_log_with_a_level(tmp_path: Path) -> Non
         (3, "plant", "FALLBACK: so it is"),
         (4, "plant", "FAULT: so it is"),
         (3, "plant", "NOT_KNOWN: so it is"),
-        (4, "recorder", "GAP: three lost"),
+        (3, "recorder", "GAP: three lost"),
     ]
     assert [(one.timestamp.seconds, one.timestamp.nanos) for one in said][-1] == (2, 1)
     assert len(read_run(log.path).events) == 5  # none of them twice

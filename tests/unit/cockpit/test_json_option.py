@@ -227,7 +227,9 @@ def test_explain_knows_every_word_of_a_log() -> None:
         assert {(entry["word"], entry["number"]) for entry in told} == {*enum.items()}
         assert all(entry["help"] and entry["column"] == column for entry in told)
     output = call("explain", "piezo_weak").stdout
-    assert output.startswith("reason 10  PIEZO_WEAK      v_a stays below 1.05 v_d with the amplitude at its limit")
+    assert output.startswith(
+        "reason 10  PIEZO_WEAK      until schema 2: v_a stays below 1.05 v_d with the amplitude at its limit"
+    )
 
 
 def test_a_named_tuple_becomes_an_object_and_a_not_finite_number_null() -> None:

@@ -31,9 +31,9 @@ def made(ratio: Any) -> tuple[Any, Any]:
     return applied, trace
 
 
-def watched(applied: Any, trace: Any, per_window: int = 2500) -> RatioVerdict:
+def watched(applied: Any, trace: Any, per_window: int = 2500, enabled_from_s: float = 0.0) -> RatioVerdict:
     """Watch the ratio in windows of `per_window` blocks, each with its neighbouring blocks."""
-    watch, count = RatioWatch(SETUP), len(trace)
+    watch, count = RatioWatch(SETUP._replace(enabled_from_s=enabled_from_s)), len(trace)
     blocks = JudgedBlocks(*(np.asarray(trace["sequence"]), np.asarray(trace["t_ns"]), *[np.empty(0)] * 5))
     rows = rows_of(trace, TRACE_ROW), rows_of(applied, APPLIED_ROW)
     for first in range(0, count, per_window):
@@ -67,12 +67,17 @@ def test_above_one_and_a_half_set_points_for_long_is_not_ok(of_s: float, ok: boo
     assert ("above 1.5 set points" in seen.in_words()) is not ok
 
 
-def test_a_set_point_that_the_controller_raised_is_the_set_point() -> None:
+@pytest.mark.parametrize("per_window", [701, 6000])
+def test_a_set_point_that_the_controller_raised_after_a_slip_or_surge_is_the_set_point(per_window: int) -> None:
+    """Raised without one, after gaps in the commands, it hid 2.4 set points."""
     applied, trace = made(stretch(1.0, 2.4))
+    trace["slips"] = 7  # before the controller was enabled
     trace["velocity_ratio"] = 2.4
-    assert watched(applied, trace).ok
+    assert not watched(applied, trace, per_window, enabled_from_s=1.0).ok
+    trace["surges"][3900:] = 1
+    assert watched(applied, trace, per_window, enabled_from_s=1.0).ok
     trace["velocity_ratio"] = 0.0  # of an older log: the set point of the configuration
-    assert not watched(applied, trace).ok
+    assert not watched(applied, trace, per_window, enabled_from_s=1.0).ok
 
 
 def test_below_is_a_warning_with_its_seconds() -> None:
@@ -82,22 +87,30 @@ def test_below_is_a_warning_with_its_seconds() -> None:
 
 
 @pytest.mark.parametrize("bit", [GAP, STALE, LATE])
-def test_a_stall_and_the_second_after_it_are_left_out(bit: int) -> None:
-    applied, trace = made(stretch(0.9, 3.18))
+def test_a_stall_and_the_second_after_it_have_no_lower_limit(bit: int) -> None:
+    applied, trace = made(stretch(0.9, 0.5))
     trace["events"][3999] |= bit
     seen = watched(applied, trace)
-    assert seen.ok
-    assert seen.highest == pytest.approx(1.2)
+    assert seen.lowest == pytest.approx(1.2)
     assert seen.left_out_s == pytest.approx(1.0, abs=5e-3)
 
 
 @pytest.mark.parametrize(("field", "value"), [("late_ns", 40_000_000), ("fallback", 1)])
 def test_a_stall_of_the_rig_counts_as_well(field: str, value: int) -> None:
-    applied, trace = made(stretch(0.9, 3.18))
+    applied, trace = made(stretch(0.9, 0.5))
     applied[field][3999] = value
     seen = watched(applied, trace)
-    assert seen.ok
+    assert seen.below_s == 0.0
     assert seen.left_out_s == pytest.approx(1.0, abs=5e-3)
+
+
+def test_the_upper_limit_holds_after_a_stall() -> None:
+    """Gaps in the commands, once a second, hid each excess."""
+    applied, trace = made(stretch(0.9, 3.18))
+    applied["fallback"][3999] = 1
+    seen = watched(applied, trace)
+    assert not seen.ok
+    assert seen.highest == pytest.approx(3.18)
 
 
 def test_a_run_without_vibration_has_no_ratio_lines() -> None:

@@ -277,6 +277,43 @@ def test_a_rig_that_disarmed_itself_is_not_judged_and_named(run: RunData) -> Non
     assert "the rig disarmed itself at 5.50 s, as no fresh command reached it" in headline(verdict)
 
 
+@pytest.mark.parametrize(("stopped_s", "control"), [(0.3, OK), (1.0, NOT_JUDGED)])
+def test_a_run_that_was_stopped_for_a_tenth_of_the_time_asked_is_not_judged(
+    run: RunData, stopped_s: float, control: str
+) -> None:
+    """A run that was disarmed for most of its time, with six slips, was good."""
+    blocks = round(1e3 * stopped_s)
+    trace = tables_of(run)["trace"]
+    trace["reason"][-blocks:] = wire.NOT_ARMED
+    verdict = verdict_of(run._replace(trace=trace))
+    assert verdict.control == control, verdict.reason
+    assert ("the rig not armed, for 1.00 of" in verdict.reason) == (control == NOT_JUDGED)
+    applied = tables_of(run)["applied"]
+    applied["guard_state"][-blocks:] = wire.CHECKING
+    assert verdict_of(run._replace(trace=trace, applied=applied)).control == OK
+
+
+@pytest.mark.parametrize(
+    ("reason", "limit", "slips"),
+    [
+        (wire.FORCE_DOUBTED, wire.NO_LIMIT, 0),
+        (wire.FROZEN, wire.NO_LIMIT, 0),
+        (wire.FROZEN, wire.HELD_OPEN_LOOP, 1),  # of the accelerometer: the force still shows slips
+        (wire.DRIVE_DOUBTED, wire.NO_DRIVE, 1),
+    ],
+)
+def test_a_doubted_force_counts_no_slips(run: RunData, tmp_path: Path, reason: int, limit: int, slips: int) -> None:
+    """A dead force counted 362 slips after FROZEN."""
+
+    def doubted(tables: Tables) -> None:
+        slip(run, tables, 4500)
+        tables["trace"]["reason"][4300:], tables["trace"]["limit"][4300:] = reason, limit
+
+    verdict = judge(changed(run, tmp_path / "doubted.mcap", doubted))
+    assert verdict.after is not None
+    assert verdict.after.slips == slips
+
+
 def test_the_highest_set_point_is_named_with_the_ratio(run: RunData) -> None:
     """A ratio of "1.11 to 3.18 ... (ok)" alone hides that the controller raised its set point."""
     trace = tables_of(run)["trace"]

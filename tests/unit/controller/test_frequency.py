@@ -7,7 +7,7 @@ import pytest
 
 from bridge.config import validate
 from controller.config import ControllerConfig
-from controller.frequency import cheapest, cost
+from controller.policy.frequency import cheapest, cost
 from controller.records import build
 
 

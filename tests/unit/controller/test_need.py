@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from bridge.config import validate
-from bridge.wire import stickslip_pb2 as wire
 from controller.config import ControllerConfig
-from controller.needs.failures import forget_failures, note_lesson
-from controller.needs.need import (
+from controller.policy.need import (
     follow_swing,
     grows,
     is_needed,
@@ -53,6 +51,8 @@ def test_each_direction_has_its_own_memory() -> None:
     note_needed(s, 1e-3)
     assert is_needed(s, 5e-4)
     s.direction = 1
+    assert is_needed(s, 5e-4)  # nothing else is known there
+    note_needless(s, 2e-4)
     assert not is_needed(s, 5e-4)
     note_needless(s, 2e-3)
     s.direction = -1
@@ -107,7 +107,7 @@ def test_the_ratio_never_falls_onto_the_edge_until_that_is_forgotten() -> None:
 def test_the_ratio_rises_until_it_holds_a_swing_of_friction_and_stays(swing: float) -> None:
     """Friction that falls by the swing is still held: (1 - swing) is more than the mean friction, over that at v_a = v_s."""
     p, s = _start()
-    s.swing, s.even_s = swing, 0.2
+    s.swing, s.even_s, s.proven[:] = swing, 0.2, 1
     _follow(p, s, 40.0, settle_s=1.0)
     assert swing_held(float(s.ratio[0])) == pytest.approx(swing, rel=0.02)
     relative = np.abs(1.0 + s.ratio[0] * np.cos(np.linspace(0.0, 2.0 * np.pi, 100_000)))
@@ -121,6 +121,9 @@ def test_the_ratio_is_bounded_and_changes_no_faster_than_the_spring_follows() ->
     follow_swing(p, s, 0.01, 10.0)
     assert 1.2 < s.ratio[0] < 1.2 * 1.001
     assert s.lead == pytest.approx(s.ratio[0] / 1.2 - 1.0)
+    _follow(p, s, 60.0)
+    assert s.ratio[0] == pytest.approx(1.4 * p.v_ratio)  # without a slip or surge
+    s.proven[:] = 1
     _follow(p, s, 60.0)
     assert s.ratio[0] == p.most_ratio
     raise_ratio(p, s, 0.4)
@@ -158,15 +161,3 @@ def test_the_distance_from_the_edge_doubles_with_every_failure() -> None:
         _follow(p, s, 20.0)
         distances.append(float(s.ratio[0]) - 1.3)
     assert distances == pytest.approx([0.02, 0.04, 0.08, 0.16])
-
-
-def test_a_slip_that_repeats_after_a_raised_ratio_is_reported() -> None:
-    _, s = _start()
-    for reported in (False, False, True):
-        note_lesson(s)
-        assert (s.reason == wire.CANNOT_HELP) == reported
-    for _ in range(31):
-        forget_failures(s, 1.0)
-    assert s.reason == wire.HELD
-    note_lesson(s)
-    assert s.reason == wire.HELD

@@ -37,10 +37,15 @@ def test_a_reset_forgets_a_pause_in_which_vibration_did_not_help() -> None:
 
 def test_a_block_that_was_changed_on_its_way_is_refused_and_counts_as_lost() -> None:
     node = ControllerNode(CONFIG)
-    whole = [sealed(sensor_block(20).canonical(block(number), "sensors")) for number in range(3)]
+    blocks = sensor_block(20).blank(3)
+    for number in range(3):
+        blocks[number] = sensor_block(20).read(block(number), "sensors")[0]
+    blocks["applied_Hz"], blocks["applied_block"], blocks["guard_limit"] = 4500.0, 7, 20
+    whole = [sealed(blocks[number : number + 1].tobytes()) for number in range(3)]
     assert node.block(block(0)) is not None  # a rig that gives no checksum
     assert node.block(whole[1]) is not None
-    for at in (1, 10, 40, 200, 420, 430, 440, 452, 456):  # numbers, samples, the rig's state, the checksum and its tag
+    # numbers, samples, the rig's state, the checksum and its tag, the vibration in force
+    for at in (1, 10, 40, 200, 420, 430, 440, 452, 456, 460, 470, 485):
         changed = bytearray(whole[2])
         changed[at] ^= 0x10
         with pytest.raises(Fault, match="BAD_MESSAGE"):

@@ -33,13 +33,10 @@ def test_a_trip_and_its_end_are_reported_once() -> None:
     assert reported[0][1].startswith("failure: far less v_a than commanded")
 
 
-def test_a_limit_is_reported_once_it_has_held_for_a_while() -> None:
-    short, long = [wire.GAIN_LIMIT] * 100, [wire.GAIN_LIMIT] * 250
-    assert events_of([wire.HELD] * 110, [*short, *[wire.NO_LIMIT] * 10]) == []
-    assert [code for code, _ in events_of([wire.HELD] * 250, long)] == ["GAIN_LIMIT"]
-    assert events_of([wire.HELD] * 250, [wire.RANGE] * 250)[0][1].startswith(
-        "amplitude limited by limits.amplitude_max_m"
-    )
+def test_the_end_of_the_exciter_is_reported_with_its_limit() -> None:
+    (reported,) = events_of([wire.STICK_SEEN] * 5 + [wire.EXCITER_END] * 250, [wire.RANGE] * 255)
+    assert reported[0] == "EXCITER_END"
+    assert "cause: amplitude limited by limits.amplitude_max_m" in reported[1]
 
 
 def test_every_trip_is_an_event_with_a_letter() -> None:
@@ -50,7 +47,7 @@ def test_an_exciter_that_is_too_weak_is_an_event_of_the_log(tmp_path: Path) -> N
     scenario = load_scenario("from-the-start", ["rig.piezo.delivered_ratio=0.05", "duration_s=2.5"])
     run_onboard(scenario, tmp_path / "run.mcap", {})
     codes = [event.code for event in read_run(tmp_path / "run.mcap").events if event.source == "controller"]
-    assert codes == ["PIEZO_WEAK", "STROKE_MAX", "END"]
+    assert codes == ["EXCITER_END", "END"]
 
 
 @pytest.mark.slow

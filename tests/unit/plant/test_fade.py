@@ -30,6 +30,9 @@ class Wire:
     def withdraw(self) -> None:
         pass
 
+    def expiring(self) -> str:
+        return ""
+
 
 class Commanded(PlantNode):
     """A rig whose controller wants 30 nm, until it fails at a block."""
@@ -37,36 +40,45 @@ class Commanded(PlantNode):
     fails_at = 10**9
     failed = False
     run_of_controller = 1
+    stops: threading.Event | None = None  # set after 60 blocks
 
     def advance(self, _commands: list[bytes], *times: int) -> tuple[Outgoing, Outgoing]:
         if self.block == self.fails_at and not self.failed:
             self.failed = True
             raise RuntimeError("the converter is gone")
+        if self.block == 59 and self.stops is not None:
+            self.stops.set()
         wanted = COMMAND.blank()
         wanted["run"], wanted["sequence"], wanted["block"] = self.run_of_controller, self.block, max(self.block - 1, 0)
         wanted["frequency_Hz"], wanted["amplitude_m"] = 2600.0, 3e-8
         return super().advance([wanted.tobytes()] if self.block and not self.failed else [], *times)
 
 
-def left(node: Commanded, blocks: int, stop: threading.Event) -> Any:
+def left(node: Commanded, blocks: int, stop: threading.Event, lockstep: bool) -> Any:
     """The applied amplitude of each block, to the end of the process."""
     bus: Any = Wire()
     process = PlantProcess(node, bus, None)
+    process._answer = lambda _block, _stop: b""
+    advance = process.lockstep if lockstep else process.realtime
     if node.fails_at < blocks:
         with pytest.raises(RuntimeError, match="converter"):
-            process.realtime(blocks, stop)
+            advance(blocks, stop)
     else:
-        process.realtime(blocks, stop)
+        advance(blocks, stop)
     return np.frombuffer(b"".join(bus.sent["applied"]), APPLIED.dtype)
 
 
+@pytest.mark.parametrize("lockstep", [False, True])
 @pytest.mark.parametrize("way", ["end", "fault"])
-def test_the_vibration_fades_at_its_own_rate_before_the_process_ends(way: str) -> None:
+def test_the_vibration_fades_at_its_own_rate_before_the_process_ends(way: str, lockstep: bool) -> None:
     node = Commanded(load_rig("paper-c45-c45", []), 1, arm=True)
     node.warm_up()
     if way == "fault":
         node.fails_at = 60
-    applied = left(node, 60 if way == "end" else 100, threading.Event())
+    stop = threading.Event()
+    if way == "end" and lockstep:  # a whole run in lockstep has no fade
+        node.stops = stop
+    applied = left(node, 60 if way == "end" and not lockstep else 100, stop, lockstep)
     assert applied["amplitude_m"][59] == pytest.approx(3e-8)
     assert applied["amplitude_m"][-1] == 0.0
     assert len(applied) == pytest.approx(90, abs=2)

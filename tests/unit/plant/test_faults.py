@@ -94,6 +94,40 @@ def test_one_sample_is_huge_and_garbage_stays_within_its_value() -> None:
     assert 1.5 < np.abs(shown).max() <= 2.0
 
 
+def test_lost_counts_add_up_every_10_ms() -> None:
+    added = blocks(faults(table("slipping", "drive_force_N", value=7.0)), 25) - np.arange(25 * SAMPLES) - 1.0
+    assert (added[5], added[150], added[450]) == (7.0, 7.0, 21.0)
+
+
+def test_bursts_take_3_of_37_ms_and_stay_within_their_value() -> None:
+    added = blocks(faults(table("bursts", "drive_force_N", value=7.0)), 74) - np.arange(74 * SAMPLES) - 1.0
+    assert np.count_nonzero(added) == pytest.approx(2 * 3 * SAMPLES, abs=2)
+    assert np.abs(added).max() == pytest.approx(7.0, rel=0.1)
+
+
+def test_a_charge_amplifier_loses_a_constant_signal() -> None:
+    made = faults(table("charge", "base_accel_mps2", value=0.01))
+    sensors, last = sensor_block(SAMPLES).blank(), []
+    for block in range(21):
+        sensors["base_accel_mps2"][0] = 50.0
+        made.begin_block(block)
+        made.spoil(sensors, block)
+        last.append(float(sensors["base_accel_mps2"][0, -1]))
+    assert last[0] == pytest.approx(50.0 * math.exp(-0.1), rel=0.02)
+    assert last[20] == pytest.approx(50.0 * math.exp(-2.1), rel=0.02)
+
+
+def test_an_exciter_chatters_for_80_ms_of_every_second() -> None:
+    params, _ = build(validate(RigConfig, {"contact": {"pair": "C45-C45 @ 0.063"}}, "rig"))
+    made = Faults([table("chattering", "exciter", value=2.0)], 1, BLOCK_S, SAMPLES, params)
+    delivered = []
+    for block in range(1100):
+        made.begin_block(block)
+        delivered.append(float(params["delivered_ratio"][0]))
+    assert [block for block in range(1, 1100) if delivered[block] != delivered[block - 1]] == [80, 1000, 1080]
+    assert delivered[0] == 2.0 * delivered[500]
+
+
 def test_a_loose_plug_is_off_for_its_share_of_the_time() -> None:
     shown = blocks(faults(table("loose", "drive_force_N", value=0.3)), 4000)
     assert 0.2 < np.count_nonzero(shown == 0.0) / len(shown) < 0.4

@@ -20,9 +20,9 @@ from plant.node import PlantNode
 
 def rig(*settings: str):
     # The amplitude identifies the command that acts; it grows beyond the exciter's range
-    free = "guard.loud_ratio={alarm=1e9,abort=1e9}"
+    free = [f"guard.{limit}={{alarm=1e9,abort=1e9}}" for limit in ("loud_ratio", "velocity_mps")]
     slewing = ["piezo.amplitude_slew_m_per_s=0.0", "piezo.amplitude_max_m=0.001"]
-    return load_rig("paper-c45-c45", [free, *slewing, *settings])
+    return load_rig("paper-c45-c45", [*free, *slewing, *settings])
 
 
 def command(block: int) -> bytes:

@@ -23,3 +23,10 @@ def test_every_drawn_axis_is_accepted_and_slips_faster_than_its_feed() -> None:
 def test_every_other_axis_goes_back() -> None:
     lowest = [min(v for _, v in axis.rig.drive.profile) for axis in drawn_axes(6, 6)]
     assert [v < 0.0 for v in lowest] == [False, True] * 3
+
+
+def test_half_of_the_axes_give_the_controller_no_k_d_and_their_names_show_it() -> None:
+    axes = drawn_axes(6, 8)
+    given = [axis.scenario().controller.model_fields_set >= {"drive_stiffness_N_per_m"} for axis in axes]
+    assert given == [True, True, False, False] * 2
+    assert [axis.name.endswith("-without-k_d") for axis in axes] == [not k_d for k_d in given]

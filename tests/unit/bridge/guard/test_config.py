@@ -6,7 +6,10 @@ import pytest
 
 from bridge.config import validate
 from bridge.faults import Fault
-from bridge.guard.config import GuardConfig, wider
+from bridge.guard.config import GuardConfig
+from bridge.guard.records import build
+from bridge.guard.wide import wider
+from tests.unit.bridge.guard.rigs import EXCITER, real
 
 
 @pytest.mark.parametrize(
@@ -30,10 +33,52 @@ def test_equal_alarm_and_abort_levels_are_accepted() -> None:
     assert validate(GuardConfig, {"loud_ratio": {"alarm": 3.0, "abort": 3.0}}, "rig.toml").loud_ratio.abort == 3.0
 
 
-def test_limits_that_protect_less_than_the_defaults_are_named() -> None:
-    assert wider(GuardConfig()) == ""
-    assert wider(validate(GuardConfig, {"loud_ratio": {"alarm": 2.0, "abort": 3.0, "hold_s": 0.05}}, "rig.toml")) == ""
+def test_limits_that_protect_less_than_usual_are_named() -> None:
+    assert wider(GuardConfig(), EXCITER, 5e-4) == ""
+    tighter = {"loud_ratio": {"alarm": 2.0, "abort": 3.0, "hold_s": 0.05}, "heat": {"rise_max_K": 20.0}}
+    assert wider(validate(GuardConfig, tighter, "rig.toml"), EXCITER, 5e-4) == ""
     loose = validate(
         GuardConfig, {"loud_ratio": {"alarm": 3.0, "abort": 1e6, "hold_s": 0.1}, "command_lost_s": 9.0}, "rig.toml"
     )
-    assert wider(loose) == "loud_ratio.abort = 1e+06 (default 4), command_lost_s = 9 (default 0.75)"
+    assert wider(loose, EXCITER, 5e-4) == "loud_ratio.abort = 1e+06 (at most 4), command_lost_s = 9 (at most 0.75)"
+
+
+@pytest.mark.parametrize(
+    ("table", "exciter", "fastest_mps", "key"),
+    [
+        ({"stroke_m": {"alarm": 1.0, "abort": 1.0}}, {}, 5e-4, "stroke_m.alarm = 1 (at most 1e-07)"),
+        ({"velocity_mps": {"alarm": 100.0, "abort": 100.0}}, {}, 5e-4, "velocity_mps.alarm = 100 (at most 0.0015)"),
+        ({"heat": {"resistance_K_per_W": 1e-9}}, {}, 5e-4, "heat.resistance_K_per_W = 1e-09 (at least 1)"),
+        ({"heat": {"rise_max_K": 1e4}}, {}, 5e-4, "heat.rise_max_K = 10000 (at most 600)"),
+        ({"check_share": 1.0}, {}, 5e-4, "check_share = 1 (at most 0.1)"),
+        ({"exciter_gain": 0.01}, {}, 5e-4, "exciter_gain = 0.01 (at least 0.05)"),
+        ({}, {}, 20.0, "fastest_drive_mps = 20 (at most 1)"),
+        ({}, {"stroke_m": 1e-3}, 5e-4, "piezo.amplitude_max_m = 0.001 (at most 2e-06)"),
+        ({}, {"slew_m_per_s": 0.0}, 5e-4, "piezo.amplitude_slew_m_per_s = inf (at most 2e-05)"),
+        ({}, {"command_timeout_s": 5.0}, 5e-4, "piezo.command_timeout_s = 5 (at most 1)"),
+    ],
+)
+def test_an_absurd_limit_is_named(table: dict[str, Any], exciter: dict[str, Any], fastest_mps: float, key: str) -> None:
+    assert key in wider(validate(GuardConfig, table, "rig.toml"), EXCITER._replace(**exciter), fastest_mps)
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        (
+            {"forbidden_Hz": [[2900.0, 3100.0]], "check_Hz": [3000.0]},
+            "check_Hz = 3000: must be outside of guard.forbidden_Hz",
+        ),
+        ({"check_Hz": [9000.0]}, "check_Hz = 9000: must be within the exciter's range, 500 to 5000 Hz"),
+        ({"forbidden_Hz": [[500.0, 5000.0]]}, "no tone is left for the loop check"),
+    ],
+)
+def test_a_check_without_an_allowed_tone_is_refused(table: dict[str, Any], message: str) -> None:
+    with pytest.raises(Fault, match=message):
+        build(real(validate(GuardConfig, table, "rig.toml")), EXCITER, 1)
+
+
+@pytest.mark.parametrize("missing", ["fastest_drive_mps", "velocity_mps"])
+def test_a_real_rig_must_give_its_absolute_limits(missing: str) -> None:
+    with pytest.raises(Fault, match="must be given for a real rig"):
+        build(real(GuardConfig()).model_copy(update={missing: None}), EXCITER, 1)

@@ -6,7 +6,7 @@ import pytest
 
 from bridge.guard.check import write_gain
 from bridge.guard.config import GuardConfig
-from bridge.guard.core import NO_COMMAND
+from bridge.guard.core import NO_COMMAND, write_in_force
 from bridge.wire.messages import sensor_block
 from bridge.wire.stickslip_pb2 import (
     ACTIVE,
@@ -45,6 +45,20 @@ def test_a_vibration_begins_and_ends_at_the_slew_and_the_state_follows() -> None
     assert (rig.s.state, rig.s.cause, rig.s.amplitude_m) == (ARMED, VIBRATION_ENDED, 0.0)
 
 
+def test_the_watchdog_counter_toggles_and_the_exciter_is_enabled_only_where_it_may_vibrate() -> None:
+    rig = Rig()
+    rig.run(30)
+    assert rig.s.enable == 1
+    toggles: list[int] = []
+    rig.s.state = DISARMED
+    for _ in range(31):
+        rig.run(1)
+        toggles.append(int(rig.s.toggle))
+        assert rig.s.enable == (rig.s.amplitude_m > 0.0)  # on until the vibration has faded
+    assert rig.s.enable == 0
+    assert toggles == [1, 0] * 15 + [1]
+
+
 def test_only_commands_of_this_run_count_that_are_newer_and_answer_a_block_that_was_sent() -> None:
     rig = Rig()
     rig.run(10)
@@ -58,7 +72,12 @@ def test_only_commands_of_this_run_count_that_are_newer_and_answer_a_block_that_
     assert rig.command(block=0)
     assert rig.command(amplitude_m=0.0)
     assert not rig.command(sequence=int(rig.s.last_sequence))
-    assert rig.s.refused == 7
+    for past_the_end in (2**62, 2**63, 2**63 + 5, 2**64 - 1):  # as a signed number it would be below 0
+        rig.s.fresh = 0
+        assert not rig.command(sequence=past_the_end)
+        rig.s.fresh = 1
+        assert not rig.command(sequence=past_the_end)
+    assert rig.s.refused == 15
 
 
 @pytest.mark.parametrize(
@@ -133,3 +152,17 @@ def test_after_a_check_each_block_publishes_one_of_its_gains() -> None:
         write_gain(rig.p, rig.s, block[0])
         published.append((float(block[0]["check_Hz"]), float(block[0]["check_gain"])))
     assert published == [(1000.0, 1.0), (2000.0, 2.0), (4000.0, 6.0)]
+
+
+def test_each_block_states_the_vibration_in_force_and_the_limit_that_held_it() -> None:
+    rig, block = Rig(), sensor_block(20).blank()
+    names = "applied_Hz", "applied_m", "applied_block", "fallback", "guard_limit"
+    write_in_force(rig.s, NO_COMMAND, block[0])
+    assert block[0]["applied_block"] == 2**64 - 1
+    rig.run(2)
+    write_in_force(rig.s, 1, block[0])
+    assert [float(block[0][name]) for name in names] == pytest.approx([2600.0, 2 * NANO, 1, 0, SLEW_RATE])
+    for _ in range(60):
+        rig.block(1)
+    write_in_force(rig.s, 1, block[0])
+    assert (block[0]["fallback"], block[0]["guard_limit"]) == (1, COMMAND_LOST)

@@ -8,10 +8,13 @@ from bridge.guard.config import GuardConfig, HeatConfig, Level
 from bridge.guard.estimates import expect_drive
 from bridge.guard.limits import exciter_gain, passes, watch
 from bridge.guard.records import FIRST
+from bridge.guard.states import ARM, apply_order
 from bridge.wire.stickslip_pb2 import (
     ACTIVE,
     ARMED,
     BAND,
+    DISARMED,
+    DRIVE_FAST,
     DRIVE_MAX,
     DRIVE_RATIO,
     DUTY,
@@ -44,12 +47,15 @@ def test_the_stroke_is_held_at_its_alarm_and_trips_beyond_its_abort() -> None:
     assert (rig.s.state, rig.s.amplitude_m) == (FAULT, 0.0)
 
 
-def test_a_level_exceeded_now_and_then_does_not_trip() -> None:
-    rig = Rig(GuardConfig(loud_ratio=FREE))
-    for _ in range(10):
-        rig.run(199, amplitude_m=200 * NANO)
-        rig.run(1, amplitude_m=140 * NANO)
-    assert rig.s.state == ACTIVE
+@pytest.mark.parametrize(("above", "within", "trips"), [(1, 1, True), (1, 3, True), (1, 5, False), (20, 200, False)])
+def test_a_level_exceeded_for_more_than_a_fifth_of_the_time_trips(above: int, within: int, trips: bool) -> None:
+    """Two senders in turn cannot reset the time above the level."""
+    level = Level(alarm=50 * NANO, abort=80 * NANO, hold_s=0.05)
+    rig = Rig(GuardConfig(loud_ratio=FREE, stroke_m=level))
+    for _ in range(1500 // (above + within)):
+        rig.run(above, amplitude_m=100 * NANO)
+        rig.run(within, amplitude_m=20 * NANO)
+    assert bool(rig.s.state == FAULT) is trips
 
 
 def test_a_value_at_its_level_keeps_to_it() -> None:
@@ -72,17 +78,88 @@ def test_the_commanded_velocity_is_held() -> None:
     assert (rig.s.state, rig.s.cause) == (FAULT, DRIVE_MAX)
 
 
+def test_a_measured_velocity_above_the_absolute_limit_trips_whatever_the_encoder_shows() -> None:
+    rig = Rig(GuardConfig(velocity_mps=Level(alarm=1.5e-3, abort=2e-3)))
+    rig.gain, rig.v_d_mps, rig.drive_scale, rig.slide_mps = 5.0, 4e-4, 2.5, 1e-3
+    rig.run(350)
+    assert (rig.s.state, rig.s.cause) == (FAULT, DRIVE_MAX)
+
+
+@pytest.mark.parametrize(("scale", "state"), [(1.0, ACTIVE), (2.9, ACTIVE), (3.2, FAULT), (-3.2, FAULT)])
+def test_a_drive_faster_than_its_fastest_trips(scale: float, state: int) -> None:
+    rig = Rig()
+    rig.drive_scale = scale  # of a drive of 0.5 mm/s, with a fastest of 1 mm/s
+    rig.slide_mps = 5e-4 * abs(scale)
+    rig.run(500)
+    assert rig.s.state == ACTIVE  # the first velocities are noisy
+    rig.run(202)
+    assert rig.s.state == state
+    if state == FAULT:
+        assert rig.s.cause == DRIVE_FAST
+
+
+@pytest.mark.parametrize(
+    ("scale", "slide_mps", "agreed"),
+    [
+        (1.0, 5e-4, 1.0),
+        (2.0, 5e-4, 1.25),  # an encoder with twice its scale, on a slide that slides
+        (2.0, 2e-5, 2.0),  # on a slide that sticks nothing else shows v_d
+        (1.0, 5e-3, 1.0),  # a slip
+    ],
+)
+def test_the_velocity_of_the_drive_must_agree_with_the_slide(scale: float, slide_mps: float, agreed: float) -> None:
+    rig = Rig(GuardConfig(loud_ratio=FREE))
+    rig.drive_scale, rig.slide_mps = scale, slide_mps
+    rig.run(700)
+    assert rig.s.drive_mps == pytest.approx(agreed * 5e-4, rel=0.05)
+
+
+def test_the_velocity_of_the_drive_must_agree_with_its_announcements() -> None:
+    """Also where drive and slide have the same wrong unit."""
+    rig = Rig(GuardConfig(loud_ratio=FREE))
+    rig.drive_scale, rig.slide_mps = 2.0, 1e-3
+    expect_drive(rig.s, 5e-4)
+    rig.run(700)
+    assert rig.s.drive_mps == pytest.approx(1.25 * 5e-4, rel=0.05)
+    expect_drive(rig.s, 1e-3)
+    rig.run(100)
+    assert rig.s.drive_mps == pytest.approx(1e-3, rel=0.05)
+    expect_drive(rig.s, 0.0)  # ahead of the drive, which still moves
+    rig.run(200)
+    assert rig.s.drive_mps == pytest.approx(1e-3, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("scale", "slide", "noise_m"), [(2.0, 1.0, 0.0), (2.0, 2.0, 0.0), (10.0, 10.0, 0.0), (1.0, 1.0, 5e-5)]
+)
+def test_a_wrong_encoder_does_not_open_the_limits(scale: float, slide: float, noise_m: float) -> None:
+    """100 nm at 4500 Hz are 2.8 mm/s: 5.7 v_d."""
+    rig = Rig(GuardConfig(fastest_drive_mps=5e-4, velocity_mps=Level(alarm=1.5e-3, abort=2e-3)))
+    rig.s.verified, rig.s.gain[:] = 1, 1.0
+    rig.drive_scale, rig.slide_mps = scale, slide * 5e-4
+    rig.noise["drive_position_m"] = noise_m
+    for _ in range(600):
+        rig.run(1, 4500.0, 100 * NANO)
+        assert TWO_PI * 4500.0 * rig.s.amplitude_m < 1.6e-3
+    assert rig.s.state == FAULT
+
+
 def test_without_a_velocity_level_the_stroke_alone_bounds_the_velocity() -> None:
     rig = Rig(GuardConfig(loud_ratio=FREE))
     settled(rig, 1e-7, 5000.0)
     assert (rig.s.limit, rig.s.amplitude_m) == (NO_CAUSE, pytest.approx(100 * NANO))
 
 
-@pytest.mark.parametrize("gain", [1.0, 0.5])
+@pytest.mark.parametrize(
+    ("measured", "given", "gain"), [(1.0, 1.0, 1.0), (2.0, 1.0, 2.0), (0.1, 1.0, 1.0), (0.1, 0.5, 0.5)]
+)
 @pytest.mark.slow
-def test_a_checked_gain_bounds_the_ratio_of_vibration_to_drive_velocity(gain: float) -> None:
-    rig = Rig(GuardConfig(loud_ratio=FREE))
-    rig.s.verified, rig.s.gain[:] = 1, gain
+def test_a_checked_gain_bounds_the_ratio_of_vibration_to_drive_velocity(
+    measured: float, given: float, gain: float
+) -> None:
+    """A measured gain below the gain of the rig file does not raise the limit."""
+    rig = Rig(GuardConfig(loud_ratio=FREE, exciter_gain=given))
+    rig.s.verified, rig.s.gain[:] = 1, measured
     rig.v_d_mps = 2.5e-4
     amplitude_m = 3.5 * 2.5e-4 / (TWO_PI * 4000.0) / gain
     settled(rig, amplitude_m, 4000.0)
@@ -151,6 +228,23 @@ def test_warmth_follows_its_model_and_trips() -> None:
     rig.run(1000, amplitude_m=30 * NANO * warm)
     assert (rig.s.state, rig.s.limit) == (ACTIVE, HEAT)
     rig.run(1000, amplitude_m=30 * NANO * math.sqrt(1.2 / share))
+    assert (rig.s.state, rig.s.cause) == (FAULT, HEAT)
+
+
+@pytest.mark.parametrize("state", [DISARMED, FAULT])
+def test_an_exciter_cools_in_every_state_but_trips_only_where_it_may_vibrate(state: int) -> None:
+    rig = Rig(GuardConfig(heat=HeatConfig(time_s=0.2)))
+    rig.s.heat, rig.s.state = 2.0, state
+    rig.run(200)
+    assert (rig.s.state, rig.s.limit) == (state, NO_CAUSE)
+    assert rig.s.heat == pytest.approx(2.0 * math.exp(-1.0), rel=0.01)
+
+
+def test_a_hot_exciter_is_not_checked() -> None:
+    rig = Rig(arm=False)
+    rig.s.heat = 1.1
+    apply_order(rig.s, ARM)
+    rig.run(1)
     assert (rig.s.state, rig.s.cause) == (FAULT, HEAT)
 
 

@@ -47,7 +47,7 @@ class Rig(Source):
         trace["sequence"] = trace["block"] = number
         trace["t_ns"], trace["slips"], trace["mode"] = (number + 1) * BLOCK_NS, slips, mode
         trace["time_to_slip_s"], trace["state"] = -1.0, wire.SMOOTH
-        trace["vibration_velocity_mps"], trace["drive_velocity_mps"], trace["reason"] = 6e-4, 5e-4, wire.HELD
+        trace["vibration_velocity_mps"], trace["drive_velocity_mps"], trace["reason"] = 6e-4, 5e-4, wire.STICK_SEEN
         for name, value in more.items():
             trace[name] = value
         self.say(TRACE_TOPIC, trace.tobytes())

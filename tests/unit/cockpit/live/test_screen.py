@@ -33,7 +33,7 @@ def test_a_live_rig_is_described_in_words(rig: Rig) -> None:
         "12.50 N, breaks away at 17.40 N",
         "1.20: v_a 600 µm/s, v_d 500 µm/s",
         "20 nm of 100 nm at 2600 Hz",
-        "reason    HELD: vibrating, because it was needed",
+        "reason    STICK_SEEN: vibrating, because the contact sticks",
         "forecast  no slip expected",
         "GUARD (check): ARMED -> ACTIVE",
     ):

@@ -87,7 +87,7 @@ def test_a_piezo_that_is_too_weak_is_reported(diagnosed, tmp_path):
     weak = ("--set", "rig.effects.piezo-roll-off.corner_Hz=300.0")
     result = run("--rig", diagnosed, *weak, *SHORT, "--verbose", "--log", tmp_path / "run.mcap")
     assert "with piezo-roll-off, static-friction-ageing" in result.stdout
-    assert "PIEZO_WEAK" in result.stdout
+    assert "EXCITER_END" in result.stdout
     assert "stick-slip may return" in result.stdout or result.exit_code == 1
 
 

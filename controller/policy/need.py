@@ -8,13 +8,19 @@ import math
 
 from bridge.kernel import kernel
 from bridge.layouts import ControllerMemory, ControllerParams
+from controller.estimate.compliance import elongation_m
 
 _STEP = 0.02  # step of v_a / v_d at an edge, below which the slide slips: the transition is 0.02 to 0.04 wide
 _MARGIN = 1.5  # safety factor on the swing of friction
+# Largest v_a / v_d over `v_ratio` that a swing of the slide may reach without a slip or surge. Larger: interruptions that the rig
+# does not report raise v_a further. Smaller: an axis whose friction swings has a surge first.
+_UNPROVEN = 1.4
 _PACE = 0.2  # share of v_d by which the slide may run ahead or lag while the ratio changes
+_LONGEST_S = 60.0  # longest settling time, and the settling time of an axis of unknown stiffness
 _SLOW_S = 5.0  # settling time of the spring above which the ratio changes without waiting for it
 _FASTEST_S = 0.5  # shortest time in which the ratio changes by a factor of e
 _EDGE_HELD_S = 30.0  # time until ratios below an edge are tried again; doubles with each failure
+STEADY_S = 0.2  # duration of constant v_d from which the slide follows it
 _AROUND = 1.25  # a verdict at a speed holds for speeds up to this factor higher (needed) or lower (not needed)
 
 
@@ -26,8 +32,10 @@ def way_of(s: ControllerMemory) -> int:
 
 @kernel
 def is_needed(s: ControllerMemory, speed_mps: float) -> bool:
-    """Whether vibration was found to be needed at this speed."""
-    return speed_mps <= s.needed_to_mps[way_of(s)]
+    """Whether vibration was found to be needed at this speed; an unknown direction has the need of the opposite direction."""
+    way = way_of(s)
+    unknown = s.needless_from_mps[way] == 0.0 and s.needed_to_mps[way] == 0.0
+    return speed_mps <= s.needed_to_mps[1 - way if unknown else way]
 
 
 @kernel
@@ -64,14 +72,20 @@ def note_needless(s: ControllerMemory, speed_mps: float) -> None:
 
 
 @kernel
+def largest_ratio(p: ControllerParams, s: ControllerMemory, way: int) -> float:
+    """The largest v_a / v_d to which the ratio may rise; a larger present ratio stays."""
+    return p.most_ratio if s.proven[way] == 1 else max(s.ratio[way], min(_UNPROVEN * p.v_ratio, p.most_ratio))
+
+
+@kernel
 def raise_ratio(p: ControllerParams, s: ControllerMemory, by: float) -> None:
     """Raise v_a / v_d, and store the present ratio, which was too small, as the edge."""
     way = way_of(s)
     before = s.ratio[way]
     s.edge_ratio[way] = max(s.edge_ratio[way], before)
-    s.ratio[way] = min(before + by, p.most_ratio)
+    s.ratio[way] = min(before + by, largest_ratio(p, s, way))
     s.lead += s.ratio[way] / before - 1.0
-    s.edge_held_s[way] = min(max(2.0 * s.edge_held_s[way], _EDGE_HELD_S), p.probe_every_max_s)
+    s.edge_held_s[way] = min(max(2.0 * s.edge_held_s[way], _EDGE_HELD_S), p.trial_every_s)
     s.calm_s = 0.0
     s.swing = swing_held(s.ratio[way])
 
@@ -106,8 +120,7 @@ def settling_s(p: ControllerParams, s: ControllerMemory, force_N: float, speed_m
     """
     return (
         grows(max(s.ratio[way_of(s)], p.least_ratio))
-        * math.fabs(force_N)
-        / (s.stiffness_N_per_m * max(speed_mps, p.least_feed_mps))
+        * min(elongation_m(p, s, force_N) / max(speed_mps, p.least_feed_mps), _LONGEST_S)
         + 1e-9
     )
 
@@ -137,9 +150,10 @@ def follow_swing(p: ControllerParams, s: ControllerMemory, tick_s: float, settle
         floor = max(floor, min(s.edge_ratio[way] + _STEP * s.edge_held_s[way] / _EDGE_HELD_S, p.most_ratio))
     pace = min(_PACE * tick_s / settle_s, tick_s / _FASTEST_S)
     if swing_held(before) < s.swing:
-        s.ratio[way] = min(before * (1.0 + pace), p.most_ratio)
+        s.ratio[way] = min(before * (1.0 + pace), largest_ratio(p, s, way))
     elif is_wound_up(s, settle_s):
         s.ratio[way] = max(min(before, floor), before * (1.0 - pace))
+        s.proven[way] = s.proven[way] if s.ratio[way] == before else 0
     s.lead += s.ratio[way] / before - 1.0
     if s.calm_s > s.edge_held_s[way] and s.edge_ratio[way] > 0.0 and s.ratio[way] <= floor:
         s.edge_ratio[way] -= _STEP

@@ -1,0 +1,88 @@
+"""Sessions that the rig refused: a wrong or missing password or certificate, random bytes, or a connection that sends nothing.
+
+Zenoh reports them in its log alone, which its Python interface writes to file 1 of the process. So this file becomes a pipe, and
+stdout gets another number. Messages that a session has no right to send have a line only at the level that logs every message,
+so they are not counted.
+"""
+
+import contextlib
+import os
+import re
+import sys
+import threading
+from collections.abc import Callable, Generator
+
+from bridge.wire.session import zenoh
+
+_FILTER = (
+    "zenoh_transport::unicast::establishment::accept=debug,zenoh_transport::unicast::manager=debug,zenoh_link_tls=warn"
+)
+# A line without its colours and the line of Zenoh's source.
+_LINE = re.compile(
+    r"(zenoh_link_tls|accept|manager)(?:::\w+)*: (.*?)(?:\. Hint: .*| at /\S+\.rs:\d+\.?|:TransportLink.*)?$"
+)
+_COLOUR = re.compile(r"\x1b\[\d*m")
+_ACCEPTED = "New transport link accepted"
+_TIMEOUT = "Failed to accept link before deadline"
+# Interval of reading. Longer: a flood fills the pipe of 190 lines, and then Zenoh accepts at most 190 sessions in the interval.
+_READ_S = 0.1
+_READS = 10  # readings between two reports: one event a second at most
+_MOST_BYTES = 1 << 20
+
+
+def refused(line: str) -> str:
+    """The cause of a refusal in a line of Zenoh's log; empty for another line."""
+    match = _LINE.search(_COLOUR.sub("", line).rstrip())
+    if match is None:
+        return ""
+    place, text = match.groups()
+    if (place == "manager" and not text.startswith(_TIMEOUT)) or text.startswith(_ACCEPTED):
+        return ""
+    return text
+
+
+def captured() -> int | None:
+    """The file from which Zenoh's log of this process can be read; None if `RUST_LOG` is set: the log then stays on stdout.
+
+    Call it before the first session. It lasts as long as the process, because a session logs until its end.
+    """
+    if "RUST_LOG" in os.environ:
+        return None
+    sys.stdout.flush()
+    sys.stdout = os.fdopen(os.dup(1), "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors)
+    read, write = os.pipe()
+    os.set_blocking(read, False)
+    os.dup2(write, 1)
+    os.close(write)
+    zenoh.init_log_from_env_or(_FILTER)
+    return read
+
+
+@contextlib.contextmanager
+def reported(log: int, report: Callable[[str], object]) -> Generator[None]:
+    """Report the refused sessions in a log at most once a second in the body: their number and the newest cause."""
+    over = threading.Event()
+    thread = threading.Thread(target=_count, args=(log, report, over), name="refusals", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+def _count(log: int, report: Callable[[str], object], over: threading.Event) -> None:
+    rest = b""
+    new = total = 0
+    newest = ""
+    tick = 0
+    while not over.wait(_READ_S):
+        tick += 1
+        with contextlib.suppress(BlockingIOError):
+            *lines, rest = (rest + os.read(log, _MOST_BYTES)).split(b"\n")
+            causes = [cause for line in lines if (cause := refused(line.decode(errors="replace")))]
+            new, newest = new + len(causes), causes[-1] if causes else newest
+        if new and tick % _READS == 0:
+            total += new
+            report(f"{new} sessions refused within 1 s, {total} in all; the newest: {newest}")
+            new = 0

@@ -1,0 +1,161 @@
+"""The compliance c = 1 / k_d of the drive's spring with its error, from x_d' - x_s' = c F'; and v_s by force and position.
+
+An axis of unknown stiffness has an infinite sigma of c, so its force gives no velocity. An axis too stiff for its positions has
+c near 0 with a small absolute sigma, and its force gives v_s although k_d itself is never known.
+"""
+
+import math
+
+from bridge.kernel import kernel
+from bridge.layouts import ControllerMemory, ControllerParams
+from controller.estimate.windows import BINS, DRIVE, FEWEST, FORCE, SLIDE
+
+# Least rate of the force over its noise in a window that shows c. Smaller: the noise of the force makes c too small; at 6 by
+# 1 / 6^2 = 3 % at most.
+_SIGMAS = 6.0
+_GIVEN_SIGMA = 0.5  # relative sigma of a configured stiffness: a data sheet without bearings and couplings
+_VOUCHED_SIGMA = (
+    0.05  # the same without a slide position, where nothing corrects it: a stick is then 10 sigma from sliding
+)
+_STEADY_S = 0.05  # duration of constant v_d until a climbing force bounds c
+# Relative sigma of c in one window, at least: the mass of the slide and the lag of the sensors bend the law. Smaller: one fast
+# slip outweighs a hundred sticks.
+_OF_WINDOW = 0.05
+_LEAST_SIGMA = 0.01  # least relative sigma of c
+_FORGETS_S = 20.0  # time constant, of windows that show c, with which earlier windows are forgotten
+_LEARNT = 0.2  # largest relative sigma of a learnt c
+
+
+@kernel
+def begin_spring(p: ControllerParams, s: ControllerMemory) -> None:
+    """Start from the configured stiffness; without one, c is unknown."""
+    s.direction = 1
+    s.shown, s.shown_c, s.shown_square, s.shown_windows, s.stiffness_learnt = 0.0, 0.0, 0.0, 0.0, 0
+    if p.drive_stiffness_N_per_m > 0.0:
+        s.compliance_m_per_N = 1.0 / p.drive_stiffness_N_per_m
+        s.compliance_sigma = _GIVEN_SIGMA * s.compliance_m_per_N
+    else:
+        s.compliance_m_per_N, s.compliance_sigma = 0.0, math.inf
+
+
+@kernel
+def learn_compliance(p: ControllerParams, s: ControllerMemory, tick_s: float) -> None:
+    """Learn c from the window with the least error of c, from rates, so that offsets cancel."""
+    if p.use_force == 0:
+        return
+    if position_weight(p, s, 0) == 0.0:
+        _bound_compliance(p, s)
+        return
+    best, variance = -1, math.inf
+    for level in range(p.levels):
+        # over seconds the positions drift by more than the extrapolated white noise, which looks like a spring
+        if s.pushed[level] < 2 * BINS or (s.stiffness_learnt == 1 and s.differences[level] < FEWEST):
+            break
+        force, slide, drive = s.noise[FORCE, level], s.noise[SLIDE, level], s.noise[DRIVE, level]
+        rate = s.slope[FORCE, level]
+        # a slide position that never changes by a step is not connected, and would make every spring soft
+        if slide > 0.0 and math.fabs(rate) > _SIGMAS * force:
+            by_force = s.compliance_m_per_N * force
+            now = (slide * slide + drive * drive + by_force * by_force) / (rate * rate)
+            if now < variance:
+                best, variance = level, now
+    if best < 0:
+        return
+    c = (s.slope[DRIVE, best] - s.slope[SLIDE, best]) / s.slope[FORCE, best]
+    weight = 1.0 / (variance + _OF_WINDOW * _OF_WINDOW * c * c)
+    share = min(tick_s / p.window_s[best], 1.0)  # successive windows overlap
+    keep = 1.0 - tick_s / _FORGETS_S
+    s.shown = keep * s.shown + share * weight
+    s.shown_c = keep * s.shown_c + share * weight * c
+    s.shown_windows = keep * s.shown_windows + share
+    mean = s.shown_c / s.shown
+    s.shown_square = keep * s.shown_square + share * weight * (c - mean) * (c - mean)
+    wider = max(s.shown_square / s.shown_windows, 1.0)  # windows that scatter by more than their errors
+    sigma = max(math.sqrt(wider / s.shown), _LEAST_SIGMA * math.fabs(mean))
+    given = s.stiffness_learnt == 0 and math.isfinite(s.compliance_sigma) and p.drive_stiffness_N_per_m > 0.0
+    if s.shown_windows > 1.0 and (not given or sigma < _GIVEN_SIGMA * math.fabs(mean)):
+        s.compliance_m_per_N, s.compliance_sigma = max(mean, 0.0), sigma
+        s.stiffness_learnt = 1 if sigma < _LEARNT * mean else s.stiffness_learnt
+
+
+@kernel
+def _bound_compliance(p: ControllerParams, s: ControllerMemory) -> None:
+    """Without a slide position: lower c to the bound of a climbing force, as no force climbs faster than v_d / c."""
+    if s.moving == 0 or s.steady_s < _STEADY_S:
+        return
+    climbs_N_per_s = 0.0
+    for level in range(p.levels):
+        if s.pushed[level] < 2 * BINS or s.differences[level] < FEWEST:
+            break
+        surely_N_per_s = s.direction * s.slope[FORCE, level] - _SIGMAS * s.sigma[FORCE, level]
+        climbs_N_per_s = max(climbs_N_per_s, surely_N_per_s)
+    if climbs_N_per_s * s.compliance_m_per_N > math.fabs(s.drive_velocity_mps):
+        s.compliance_m_per_N = math.fabs(s.drive_velocity_mps) / climbs_N_per_s
+        s.compliance_sigma = min(s.compliance_sigma, _GIVEN_SIGMA * s.compliance_m_per_N)
+
+
+@kernel
+def least_compliance(s: ControllerMemory) -> float:
+    """A lower bound of c [m/N]; 0 while c is unknown."""
+    return max(s.compliance_m_per_N - s.compliance_sigma, 0.0)
+
+
+@kernel
+def spring_force(s: ControllerMemory, elongation_m: float) -> float:
+    """The elongation of the spring in place of its force, for a rig without a force sensor; N for a known c, else m.
+
+    The spring is assumed to be relaxed at the start; once the slide was dragged both ways, half-way between the largest
+    elongations of both directions, as friction is alike in both.
+    """
+    if s.stretched == 0:
+        s.shortest_m, s.longest_m, s.stretched = elongation_m, elongation_m, 1
+        s.relaxed_m = elongation_m
+    s.shortest_m, s.longest_m = min(s.shortest_m, elongation_m), max(s.longest_m, elongation_m)
+    if s.dragged[0] == 1 and s.dragged[1] == 1:
+        s.relaxed_m = 0.5 * (s.shortest_m + s.longest_m)
+    return (elongation_m - s.relaxed_m) / (s.compliance_m_per_N if s.compliance_m_per_N > 0.0 else 1.0)
+
+
+@kernel
+def elongation_m(p: ControllerParams, s: ControllerMemory, force_N: float) -> float:
+    """Elongation of the spring by a force [m]; by the error of c where it exceeds c, so infinite while c is unknown."""
+    if p.use_force == 0:
+        return math.fabs(force_N) * (s.compliance_m_per_N if s.compliance_m_per_N > 0.0 else 1.0)
+    return math.fabs(force_N) * max(s.compliance_m_per_N, s.compliance_sigma) if force_N != 0.0 else 0.0
+
+
+@kernel
+def slide_mps(p: ControllerParams, s: ControllerMemory, level: int, speed_mps: float) -> tuple[float, float]:
+    """v_s along the drive's direction and its sigma in a window [m/s], from position and force weighted by their errors.
+
+    Sigma is infinite without either. The velocity by force, v_d - c F', has the errors of F', c and v_d.
+    """
+    weight_x, weight_F = position_weight(p, s, level), force_weight(p, s, level)
+    weight = weight_x + weight_F
+    if weight == 0.0:
+        return 0.0, math.inf
+    place_mps = s.direction * s.slope[SLIDE, level]
+    force_mps = speed_mps - s.direction * s.compliance_m_per_N * s.slope[FORCE, level]
+    return (weight_x * place_mps + weight_F * force_mps) / weight, 1.0 / math.sqrt(weight)
+
+
+@kernel
+def position_weight(p: ControllerParams, s: ControllerMemory, level: int) -> float:
+    """Weight of v_s by the slide's position in a window: 1 over its variance; 0 without a position."""
+    noise_mps = s.noise[SLIDE, level]
+    return 1.0 / (noise_mps * noise_mps) if p.use_slide_position == 1 and noise_mps > 0.0 else 0.0
+
+
+@kernel
+def force_weight(p: ControllerParams, s: ControllerMemory, level: int) -> float:
+    """Weight of v_s by the force in a window: 1 over its variance; 0 without a force, or without any knowledge of c."""
+    noise_N_per_s, sigma_mps = s.noise[FORCE, level], s.drive_velocity_sigma_mps
+    if p.use_force == 0 or noise_N_per_s == 0.0 or not math.isfinite(s.compliance_sigma):
+        return 0.0
+    by_noise = s.compliance_m_per_N * noise_N_per_s
+    sigma_c = s.compliance_sigma
+    if position_weight(p, s, level) == 0.0:
+        sigma_c = min(sigma_c, _VOUCHED_SIGMA * s.compliance_m_per_N)
+    # sigma_c counts with the noise of F', too: else a force without a rate would show an exact velocity
+    by_compliance = sigma_c * max(math.fabs(s.slope[FORCE, level]), noise_N_per_s)
+    return 1.0 / max(by_noise * by_noise + by_compliance * by_compliance + sigma_mps * sigma_mps, 1e-24)
