@@ -85,6 +85,9 @@ def run(
         bus.serve_header(header)
         keeper = None if latch is None else Keeper(latch, RigFile(latch.rig, bus_config.endpoint))
         process = PlantProcess(node, bus, keeper, report, kept, warmth)
+        begun = threading.Event()
+        if log is not None:
+            ending.enter_context(refusals.reported(log, partial(process.event, "REFUSED"), begun))
         # Priority is claimed before the other processes see this one: later, links may lapse on busy cores (docs/method/rig.md).
         if lockstep:
             realtime.claim(realtime.core(bus_config.port), realtime.LOCKSTEP_PRIORITY)
@@ -98,8 +101,7 @@ def run(
         if wait_for and not stop.is_set():
             report("joined", " and ".join(wait_for))
         process.event("START", granted)
-        if log is not None:  # not before: an event without a recorder is lost
-            ending.enter_context(refusals.reported(log, partial(process.event, "REFUSED")))
+        begun.set()
         how_long = f"for {duration_s:g} s" if duration_s > 0 else "until Ctrl-C"
         report("running", f"rig {rig.name} at {bus_config.endpoint}, {how_long}; {granted}")
         if latch_problem:

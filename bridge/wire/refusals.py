@@ -59,10 +59,13 @@ def captured() -> int | None:
 
 
 @contextlib.contextmanager
-def reported(log: int, report: Callable[[str], object]) -> Generator[None]:
-    """Report the refused sessions in a log at most once a second in the body: their number and the newest cause."""
+def reported(log: int, report: Callable[[str], object], begun: threading.Event) -> Generator[None]:
+    """Report the refused sessions in a log at most once a second in the body: their number and the newest cause.
+
+    Before the run has `begun` they are only counted, as an event without a recorder is lost.
+    """
     over = threading.Event()
-    thread = threading.Thread(target=_count, args=(log, report, over), name="refusals", daemon=True)
+    thread = threading.Thread(target=_count, args=(log, report, begun, over), name="refusals", daemon=True)
     thread.start()
     try:
         yield
@@ -71,7 +74,7 @@ def reported(log: int, report: Callable[[str], object]) -> Generator[None]:
         thread.join()
 
 
-def _count(log: int, report: Callable[[str], object], over: threading.Event) -> None:
+def _count(log: int, report: Callable[[str], object], begun: threading.Event, over: threading.Event) -> None:
     rest = b""
     new = total = 0
     newest = ""
@@ -82,7 +85,7 @@ def _count(log: int, report: Callable[[str], object], over: threading.Event) -> 
             *lines, rest = (rest + os.read(log, _MOST_BYTES)).split(b"\n")
             causes = [cause for line in lines if (cause := refused(line.decode(errors="replace")))]
             new, newest = new + len(causes), causes[-1] if causes else newest
-        if new and tick % _READS == 0:
+        if new and tick % _READS == 0 and begun.is_set():
             total += new
-            report(f"{new} sessions refused within 1 s, {total} in all; the newest: {newest}")
+            report(f"{new} sessions refused since the last report, {total} in all; the newest: {newest}")
             new = 0

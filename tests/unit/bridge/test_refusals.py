@@ -38,16 +38,18 @@ def test_a_line_of_the_log_gives_the_cause(line: str, cause: str) -> None:
 def test_the_log_is_counted_and_stdout_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("RUST_LOG", raising=False)
     code = f"""
-import os, time
+import os, threading, time
 from bridge.wire import refusals
 log = refusals.captured()
 refusals._READS = 1
 lines = []
-with refusals.reported(log, lines.append):
+begun = threading.Event()
+begun.set()
+with refusals.reported(log, lines.append, begun):
     os.write(1, {(TLS + "peer sent no certificates. Hint: x" + chr(10)).encode()!r} * 3)
     while not lines:
         time.sleep(0.01)
 print(lines)
 """
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=60)
-    assert done.stdout == "['3 sessions refused within 1 s, 3 in all; the newest: peer sent no certificates']\n"
+    assert done.stdout == "['3 sessions refused since the last report, 3 in all; the newest: peer sent no certificates']\n"
