@@ -52,4 +52,6 @@ with refusals.reported(log, lines.append, begun):
 print(lines)
 """
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=60)
-    assert done.stdout == "['3 sessions refused since the last report, 3 in all; the newest: peer sent no certificates']\n"
+    assert (
+        done.stdout == "['3 sessions refused since the last report, 3 in all; the newest: peer sent no certificates']\n"
+    )
