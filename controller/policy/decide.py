@@ -50,6 +50,7 @@ from controller.policy.need import (
 )
 from controller.policy.trial import begin_trial, follow_trial, is_due
 from controller.trips.band import accept_weaker
+from controller.trips.doubts import CONTACT
 
 TWO_PI = 2.0 * math.pi
 ON_DEMAND, WHILE_MOVING = range(len(MODES))
@@ -63,19 +64,17 @@ _ABOVE_SLIDE = 1.1  # least v_a over v_s of a slide that slows down after its dr
 _TURNING_S = 0.05  # longest rest of a drive at a reversal
 _STARTING_S = 0.15  # first part of a vibration, in which slips do not count: they release the force stored before
 _LOOK_STEPS = 16  # steps between two selections of the windows in which the swing of v_s is measured
-_OF_SWING, _EXCITER_PERIODS = (
-    0.02,
-    2.0,
-)  # of these windows: largest noise of v_s over v_d, fewest periods of the exciter
+# Of these windows: largest noise of v_s over v_d, fewest periods of the exciter.
+_OF_SWING, _EXCITER_PERIODS = 0.02, 2.0
 _LEAST_SLIDING = 0.5  # least mean v_s over v_d; a slower slide gives no information on the swing of friction
 _EVEN = 0.1  # largest deviation of v_s from v_d, over v_d, of a slide that follows
 # Memory of a swing of friction: two periods of the slowest swing that the spring does not level out; 10 s at most, for energy.
 _PERIODS, _SHORTEST_S, _LONGEST_S = 2.0, 0.5, 10.0
-_REMEMBERED_S = 30.0  # time for which a slip at the exciter's end is reported
+_REMEMBERED_S = 30.0  # time after a slip under vibration until their count restarts
 _FEWEST = 3  # fewest slips or surges until they are reported: the first raise the ratio
 _USELESS_S, _STICKS = 2.0, 4.0  # least time, and number of expected sticks, without a slip until a v_a below v_d ends
 _AT_DRIVE = 1.1  # measured v_a over v_d up to which a stick shows a weak exciter
-_HELPLESS = 8  # slips at the exciter's end until a trial shows whether the vibration helps
+_HELPLESS = 8  # slips under vibration until a trial shows whether the vibration helps
 
 
 @kernel
@@ -179,6 +178,8 @@ def _watch(
         return
     if p.mode == WHILE_MOVING:
         excite(p, s, MOVING, p.v_ratio)
+    elif s.doubted & CONTACT:
+        excite(p, s, BLIND, p.v_ratio)
     elif is_needed(s, speed_mps):
         _begin(p, s, NEEDED_BEFORE, 0.0, force_N, speed_mps)
     elif needless_from_mps(s) > 0.0 and not steady:
@@ -238,7 +239,7 @@ def _hold(p: ControllerParams, s: ControllerMemory, way: int, force_N: float, sp
         begin_trial(p, s, force_N, speed_mps, 1)
     elif follows and s.calm_s > 2.0 * WINDOW_S and is_due(p, s, speed_mps):
         begin_trial(p, s, force_N, speed_mps, 0)
-    elif _is_useless(s) and follows and not is_needed(s, speed_mps):
+    elif _is_useless(s) and follows and not is_needed(s, speed_mps) and s.doubted & CONTACT == 0:
         # below v_d a vibration does not reduce friction that is the same at every speed, and the slide slides
         note_needless(s, speed_mps)
         enter(s, WATCH)
@@ -282,7 +283,7 @@ def _swing_level(p: ControllerParams, s: ControllerMemory, speed_mps: float) -> 
 
 @kernel
 def _more(p: ControllerParams, s: ControllerMemory, way: int, by: float) -> None:
-    """Respond to a vibration that is not enough: raise the ratio, or count the slip as one at the exciter's end."""
+    """Raise the ratio of a vibration that is not enough, if the exciter allows it."""
     if s.at_limit == 0 and s.ratio[way] < p.most_ratio:
         raise_ratio(p, s, by)
         return
@@ -304,5 +305,5 @@ def _note_failure(s: ControllerMemory) -> None:
 
 @kernel
 def slips_at_end(s: ControllerMemory) -> bool:
-    """Whether slips continue although the vibration cannot rise."""
+    """Whether slips or surges repeat under vibration."""
     return s.failed >= _FEWEST and s.failed_left_s > 0.0

@@ -11,6 +11,7 @@ from bridge.wire.stickslip_pb2 import PROBE, SMOOTH, STILL_NEEDED, WATCH
 from controller.in_force import is_judged
 from controller.policy.fall import WINDOW_S, has_fallen, restart_falls
 from controller.policy.need import STEADY_S, is_needed, note_needed, note_needless, settling_s, way_of
+from controller.trips.doubts import CONTACT
 
 # Vibrated time of motion until a trial at a speed that is not known to need the vibration. Shorter: more runs pay a slip. Longer:
 # an axis that needs no vibration has it for longer.
@@ -31,7 +32,9 @@ FIRST_RANDOM = _M // 2  # the first trial is due in the middle of the range
 
 @kernel
 def is_due(p: ControllerParams, s: ControllerMemory, speed_mps: float) -> bool:
-    """Whether a trial is due at this speed."""
+    """Whether a trial is due at this speed; a doubted force shows no fall, so it would end a vibration that is needed."""
+    if s.doubted & CONTACT:
+        return False
     jitter = 1.0 + _JITTER * (2.0 * s.random / _M - 1.0)
     if is_needed(s, speed_mps):
         return s.untried_s[way_of(s)] > jitter * p.trial_every_s
@@ -62,6 +65,8 @@ def begin_trial(p: ControllerParams, s: ControllerMemory, force_N: float, speed_
 def follow_trial(p: ControllerParams, s: ControllerMemory, force_N: float, speed_mps: float) -> bool:
     """Continue a trial at a force and a |v_d|; return whether the vibration begins again."""
     way = way_of(s)
+    if s.doubted & CONTACT:
+        return True
     if s.fade > 0.0:
         if s.steady_s < STEADY_S or not is_judged(s):
             return True

@@ -17,7 +17,7 @@ TLS = _LINE.format(" WARN", "link_tls::unicast")
     ("line", "cause"),
     [
         (
-            f"{ACCEPT}UsrPwd extension - Recv OpenSyn. Invalid password. at /root/x/usrpwd.rs:424.",
+            f"{ACCEPT}UsrPwd extension - Recv OpenSyn. Invalid password. at /x/usrpwd.rs:424.",
             "UsrPwd extension - Recv OpenSyn. Invalid password.",
         ),
         (
