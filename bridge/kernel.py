@@ -2,6 +2,7 @@
 
 import hashlib
 import importlib
+import math
 import os
 from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar
@@ -84,6 +85,12 @@ def unlocked_kernel(function: Callable[P, R]) -> Callable[P, R]:
     """As `kernel`, but without Python's lock (GIL), so that other threads run: for calls of 1 ms and more."""
     compiled: Any = function if _settings.DISABLE_JIT else Kernel(function, unlocked=True)
     return compiled
+
+
+@kernel
+def hypot(a: float, b: float) -> float:
+    """The root of a^2 + b^2. The last bit of `math.hypot` differs between compiled and interpreted kernels."""
+    return math.sqrt(a * a + b * b)
 
 
 def has_wide_vectors() -> bool:

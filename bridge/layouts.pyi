@@ -4,56 +4,42 @@ from typing import Any
 import numpy.typing as npt
 
 class ControllerParams:
-    accel_bandwidth_Hz:float; accel_range_mps2:float; amplitude_max_m:float; band_Hz:npt.NDArray[Any]; bands:int;
-    bin_s:float; bin_samples:int; bins_per_tick:int; block_s:float; broken_steps:int; candidate_Hz:npt.NDArray[Any];
-    candidates:int; confirm_level:int; drive_stiffness_N_per_m:float; enabled_from_ns:int; filter_share:float;
-    first_steps:int; follow_share:float; frequency_max_Hz:float; frequency_min_Hz:float; frozen_steps:int;
-    gain_band:float; gain_floor:float; grown_steps:int; high_steps:int; known_steps:int; learn_share:float;
-    least_feed_mps:float; least_ratio:float; levels:int; loud_steps:int; low_steps:int; mode:int; most_ratio:float;
-    passed_steps:int; sample_s:float; samples_per_block:int; settle_steps:int; silence_steps:int; slew_m_per_step:float;
-    slot_steps:int; slots:int; spike_bends:float; spring_level:int; ticks_per_block:int; told_gain:float;
-    travel_high_m:float; travel_low_m:float; trial_every_s:float; use_force:int; use_slide_position:int; v_ratio:float;
+    accel_bandwidth_Hz:float; amplitude_max_m:float; band_Hz:npt.NDArray[Any]; bands:int; bin_s:float; bin_samples:int;
+    bins_per_tick:int; block_s:float; configured_gain:float; drive_stiffness_N_per_m:float; enabled_from_ns:int;
+    filter_share:float; follow_share:float; frequency_Hz:float; frequency_max_Hz:float; frequency_min_Hz:float;
+    frozen_steps:int; gain_band:float; gain_floor:float; gain_leap:float; learn_share:float; least_feed_mps:float;
+    least_ratio:float; levels:int; mode:int; most_ratio:float; sample_s:float; samples_per_block:int;
+    slew_m_per_step:float; slot_steps:int; spring_level:int; ticks_per_block:int; travel_high_m:float;
+    travel_low_m:float; trial_every_s:float; use_force:int; use_slide_position:int; v_ratio:float;
     velocity_max_mps:float; window_s:npt.NDArray[Any]
 
 class ControllerMemory:
-    accepted_gain:npt.NDArray[Any]; agreed_mps:npt.NDArray[Any]; agreements:npt.NDArray[Any]; allowed_Hz:float;
-    allowed_m:float; announced_count:int; announced_from_ns:npt.NDArray[Any]; announced_mps:npt.NDArray[Any];
-    apart_by:int; apart_s:float; at_limit:int; banded:int; bend_m:float; bends:npt.NDArray[Any]; bent:int;
-    bins:npt.NDArray[Any]; blind:int; block:int; breakaway_N:npt.NDArray[Any]; broken_drive:int; broken_slide:int;
-    broken_steps:int; calm_s:float; candidate:int; checked_blocks:int; compares:int; compliance_m_per_N:float;
-    compliance_sigma:float; confirmed:float; contact:int; crest_N:float; crest_before_N:float;
-    crest_with_N:npt.NDArray[Any]; cut_steps:int; demodulated_Hz:float; differences:npt.NDArray[Any]; direction:int;
-    doubted:int; dragged:npt.NDArray[Any]; drive_velocity_mps:float; drive_velocity_sigma_mps:float; dropped:int;
-    drops:float; edge_held_s:npt.NDArray[Any]; edge_ratio:npt.NDArray[Any]; even_s:float; even_steps:int;
-    expected_mps:float; expected_stick_s:float; fade:float; fade_per_s:float; failed:int; failed_left_s:float;
-    fall_N:float; fall_s:float; fall_with_N:npt.NDArray[Any]; fall_without_N:float; fast_mps:float; fine_mps:float;
-    fine_sigma_mps:float; first_sample:npt.NDArray[Any]; first_seen:int; followed:int; followed_gain:float;
-    force_rate:float; free_steps:int; fresh:npt.NDArray[Any]; gain_known:npt.NDArray[Any]; gain_other_s:float;
-    grown_steps:int; growth:float; guard_state:int; heard_steps:int; held_mps:float; high_steps:int;
-    in_phase_mps2:float; jumped_s:float; jumps:float; kept_m_per_N:float; kept_mps:npt.NDArray[Any];
-    known_gain:npt.NDArray[Any]; known_steps:npt.NDArray[Any]; late_mps:float; law_mps:npt.NDArray[Any]; lead:float;
-    least_sent_mps:npt.NDArray[Any]; level:int; limit:int; listening:int; lively:npt.NDArray[Any];
-    log_gain:npt.NDArray[Any]; longest_m:float; looked:int; looks:npt.NDArray[Any]; loop_delay_steps:int;
-    loud_steps:int; low_steps:int; measured:int; missing_blocks:int; mode:int; mode_s:float; most_bend:npt.NDArray[Any];
-    most_sent_mps:npt.NDArray[Any]; most_wanted_mps:npt.NDArray[Any]; moved_s:float; moving:int;
-    needed_to_mps:npt.NDArray[Any]; needless_from_mps:npt.NDArray[Any]; noise:npt.NDArray[Any]; noise_mps:float;
-    noise_steps:int; noise_told_s:float; off_left_s:npt.NDArray[Any]; off_s:npt.NDArray[Any]; onset_steps:int;
-    outside:int; overruled:int; peak_N:float; phase_rad:float; proven:npt.NDArray[Any]; pushed:npt.NDArray[Any];
-    quadrature_mps2:float; quiet_s:float; random:int; ratio:npt.NDArray[Any]; ratio_now:float; relaxed_m:float;
-    resolution:npt.NDArray[Any]; rest_mps2_2:float; rest_steps:int; rested:int; rising_mps:float; run:int;
-    same_steps:npt.NDArray[Any]; seen_block:int; sent_m:npt.NDArray[Any]; settled_s:float; shaken_s:float;
-    shortest_m:float; shown:float; shown_c:float; shown_square:float; shown_windows:float; sigma:npt.NDArray[Any];
-    silent_steps:int; since_stick_s:float; slid_N:npt.NDArray[Any]; slide_accel_unread:int; sliding_N:npt.NDArray[Any];
-    sliding_mps:float; slip_began:int; slip_count:float; slip_from_N:float; slip_window_s:float; slipped_s:float;
-    slipping:int; slips:int; slips_wound:float; slope:npt.NDArray[Any]; slope_before:npt.NDArray[Any]; smooth_s:float;
-    spike:npt.NDArray[Any]; spike_at:npt.NDArray[Any]; spike_step:npt.NDArray[Any]; spiked:int; spring_level:int;
-    stale:int; stalling_s:float; steady_mps:float; steady_s:float; steps:int; stick_began:int; stick_s:float;
-    stiffest_m_per_N:float; stiffness_learnt:int; stood_s:float; stopped:int; stretched:int; surges:int; swing:float;
-    swing_N:npt.NDArray[Any]; swing_level:int; tail:npt.NDArray[Any]; time_to_slip_s:float; tone_Hz:npt.NDArray[Any];
-    tone_gain:npt.NDArray[Any]; top:float; tried_s:npt.NDArray[Any]; trip:int; tuned:int; unbelieved_s:float;
-    unseen_s:float; untried_s:npt.NDArray[Any]; vibration_velocity_mps:float; waiting_s:float; wanted_Hz:float;
-    wanted_m:float; wanted_speed_mps:float; wanted_velocity_mps:float; weak_s:float; went_m:npt.NDArray[Any]; why:int;
-    window_s:float; wound:int
+    accepted_share:float; agreed:int; agreed_mps:float; agreements:npt.NDArray[Any]; allowed_Hz:float; allowed_m:float;
+    announced_count:int; announced_from_ns:npt.NDArray[Any]; announced_mps:npt.NDArray[Any]; applied_mps:float;
+    at_limit:int; banded:int; bins:npt.NDArray[Any]; blind:int; block:int; block_sum:npt.NDArray[Any];
+    breakaway_N:npt.NDArray[Any]; changed:int; check_least:float; check_most:float; checked_blocks:int;
+    compliance_m_per_N:float; compliance_sigma:float; contact:int; crest_N:float; crest_before_N:float;
+    differences:npt.NDArray[Any]; direction:int; doubted:int; dragged:npt.NDArray[Any]; drive_unseen:int;
+    drive_velocity_mps:float; drive_velocity_sigma_mps:float; even_s:float; evidence_s:float; expected_stick_s:float;
+    fade:float; fade_per_s:float; failed:float; fall_N:float; fall_s:float; fall_with_N:npt.NDArray[Any];
+    far:npt.NDArray[Any]; fast_mps:float; followed_gain:float; force_rate:float; fresh:npt.NDArray[Any]; gain:float;
+    gain_off_s:float; grown_s:float; guard_state:int; held_mps:float; in_force_s:float; in_phase_mps2:float;
+    kept_mps:npt.NDArray[Any]; known_gain:float; last:npt.NDArray[Any]; law_mps:npt.NDArray[Any];
+    least_mps:npt.NDArray[Any]; level:int; limit:int; listened:int; longest_m:float; loop_delay_steps:int;
+    memory_s:float; missing_blocks:int; mode:int; mode_s:float; most_drive_mps:float; most_mps:npt.NDArray[Any];
+    moved_s:float; moving:int; needed_to_mps:npt.NDArray[Any]; needless_from_mps:npt.NDArray[Any];
+    noise:npt.NDArray[Any]; noise_mps:float; off:npt.NDArray[Any]; off_left_s:npt.NDArray[Any]; off_s:npt.NDArray[Any];
+    offset_m:float; outside:int; peak_N:float; phase_rad:float; proven:npt.NDArray[Any]; pushed:npt.NDArray[Any];
+    quadrature_mps2:float; rate:npt.NDArray[Any]; ratio:npt.NDArray[Any]; ratio_now:float; relaxed_m:float;
+    repeats:npt.NDArray[Any]; resolution:npt.NDArray[Any]; resonates:int; rising_mps:float; run:int;
+    scatter:npt.NDArray[Any]; shortest_m:float; shown:float; shown_c:float; shown_square:float; shown_windows:float;
+    sigma:npt.NDArray[Any]; silent_s:float; since_stick_s:float; slide_accel_unread:int; sliding_mps:float;
+    slip_began:int; slipped_s:float; slipping:int; slips:int; slope:npt.NDArray[Any]; slope_before:npt.NDArray[Any];
+    spikes:npt.NDArray[Any]; spring_level:int; stale:int; steady_mps:float; steady_s:float; stepped:int; steps:int;
+    stick_began:int; stiffness_learnt:int; stood_s:float; stopped:int; stretched:int; surges:int; swing:float;
+    time_to_slip_s:float; top:float; trials:int; tried_s:npt.NDArray[Any]; trip:int; unexplained:int; unheard:int;
+    unseen_s:float; untried_s:npt.NDArray[Any]; usual:npt.NDArray[Any]; vibration_velocity_mps:float; waiting_s:float;
+    wanted_m:float; wanted_speed_mps:float; wanted_velocity_mps:float; weak_s:float; why:int; window_s:float
 
 class GuardParams:
     abort:npt.NDArray[Any]; alarm:npt.NDArray[Any]; announced_keep:float; band_Hz:npt.NDArray[Any]; bands:int;

@@ -5,17 +5,17 @@ records        the derived numbers (`PARAMS`) and all memory (`STATE`)
 announced      the announced v_d
 estimate/      the motion of drive and slide, and the compliance of the drive, with their errors
 vibration      the measured v_a
+exciter        its gain, known and learnt, and the wanted amplitude
 policy/        when to vibrate, at which frequency, and the wanted v_a; the reported reason
-amplitude      the wanted amplitude, by the learnt gain and delay of the exciter
 trips/         faults of sensors and exciter, and the response to them
 limits         the allowed vibration
-in_force       time in which the rig vibrates as commanded; without it nothing is learnt or doubted, and no ratio changes
+in_force       time in which the rig vibrates as commanded; without it no ratio changes
 core           one step of the controller
 telemetry      the state for plots and the memory for replay
 node, app      the controller as a participant of the bus; the process
-freshness      whether blocks come in time; stalls of the controller itself
-replay         the controller on the frames of a log; replay_steps: comparison of its steps with the log
-message_faults faults of received messages; rig_header: whether the controller can control the rig
+freshness      whether blocks come in time, and their age; stalls of the controller itself
+replay         the controller on the frames of a log, compared with the log
+rig_header     whether the controller can control the rig
 
 `docs/explain/the-controller.md` has its rules on a page.
 

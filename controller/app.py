@@ -1,6 +1,7 @@
 """The controller process: blocks in, commands out. The command leaves first; all other messages follow."""
 
 import collections
+import json
 import math
 import threading
 from collections.abc import Callable
@@ -10,7 +11,7 @@ from bridge.plain import StepReport, no_report
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.clock import time
-from bridge.wire.complaints import FOREIGN
+from bridge.wire.complaints import BAD_MESSAGE, FLOOD, FOREIGN, Complaints
 from bridge.wire.event_codes import is_listed
 from bridge.wire.inbox import WAITING
 from bridge.wire.payloads import parsed
@@ -29,23 +30,17 @@ from bridge.wire.topics import (
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
 from controller.config import ControllerConfig
 from controller.freshness import Events, Freshness
-from controller.message_faults import MessageFaults
 from controller.node import ControllerNode
-from controller.rig_header import RigAgain, refuse_another_rig
+from controller.rig_header import for_rig, refuse_another_rig
 
-_PLANT_LOST_S = 1.0  # silence after which a plant that has left the bus counts as lost
-# Longest wait for the recorder after a cut of the link; in tests/system/test_restart.py it was back 0.4 s after this process.
-# Shorter: events miss the log. Longer: events of a loop without a recorder arrive later.
-_RECORDER_S = 1.0
+# Longest wait for another process: for the token and the header of a rig, each of which a rig without it delays by all of it; for
+# blocks of a rig that has left the bus, until it counts as lost; and for the recorder after a cut of the link. The recorder was
+# back 0.4 s after this process (tests/system/test_restart.py). Shorter: events miss the log. Longer: a rig is lost later.
+_WAIT_S = 1.0
 _MOST_WAITING = 1000  # most events that wait during a cut; the recorder reports older ones as GAP
 _GIVEN_UP_S = 30.0  # time without a rig after which this process ends; equals the wait for a rig at the start
-_HEADER_S = 1.0  # longest wait for the header of the rig; a rig without a header delays the start by all of it
-_TOKEN_WAIT_S = 1.0  # longest wait for the plant's liveliness token; a rig without one delays the start by all of it
 _AT_ONCE_S = 0.05  # time for a controller that starts at the same moment to appear, and period of checking again
-_ANSWER_EVERY_S = 0.4  # least time between two answers to a command, which is repeated every 0.5 s until answered
-_MOST_ANSWERS = 16  # most answers to operators in a second; further commands are applied without an answer
 _LONGEST_WHO = 200  # most letters of an operator's name in an answer
-_UNSEEN = "is its transducer at the end of its range, or loose? without v_d there is no vibration"
 # Wait for another controller to leave. Shorter: a frozen controller refuses this one, though its lease is about to end. Longer: a
 # second controller is refused later.
 _OTHER_GONE_S = LEASE_S + 0.2
@@ -69,11 +64,13 @@ def run(
     node.warm_up()
     report("waiting", f"for a rig at {bus_config.endpoint}, at most {bus_config.wait_s:g} s")
     with Bus(bus_config, "controller", lockstep, stop) as bus:
+        _refuse_a_second(bus, bus_config.endpoint)
+        config = for_rig(bus.headers(["plant"], _WAIT_S, stop).get("plant"), config)
+        node.reconfigure(config)
+        header.configuration = json.dumps(config.model_dump(mode="json"), sort_keys=True)  # a replay needs them
         bus.serve_header(header)
         process = ControllerProcess(config, node, bus, lockstep, report=report)
         process.prepare()
-        _refuse_a_second(bus, bus_config.endpoint)
-        refuse_another_rig(bus.headers(["plant"], _HEADER_S, stop).get("plant"), config)
         granted = ""
         if lockstep:
             # Plant and controller take turns: if they share a core, waking the other process takes a tenth of the time.
@@ -95,7 +92,7 @@ def _refuse_a_second(bus: Bus, endpoint: str) -> None:
     each other's claims: the controller with the higher claim ends.
     """
     mine, others = bus.claim()
-    bus.wait_for(["plant"], _TOKEN_WAIT_S)  # by then all others are known, except a controller that starts now
+    bus.wait_for(["plant"], _WAIT_S)  # by then all others are known, except a controller that starts now
     time.sleep(_AT_ONCE_S)
     since_s = time.monotonic()
     while (rivals := others()) or bus.alive("controller"):
@@ -128,28 +125,26 @@ class ControllerProcess:
         report: StepReport = no_report,
     ) -> None:
         self._report = report
+        self._config = config
         self._node = node
         self._bus = bus
         self._lockstep = lockstep
-        self._block_s = config.block_s
-        self._stale_after_s = config.limits.stale_after_s
         self._inbox = inbox or Inbox(WAITING)
         self._send: dict[str, Callable[[bytes], None]] = {}
         self._events = 0
-        self._doubts = MessageFaults(node, self._inbox, self.event)
-        self._reported_s: dict[str, float] = {}  # time of each answer to operators within the last second, by text
+        self._complaints = Complaints(self.event)
+        self._orders = Complaints(lambda code, text: self.event(code, text.replace(": ", " ", 1)))
+        node.note = self._complaints.note
+        self._dropped: dict[str, int] = {}  # number of published drops of the inbox, by topic
         self._end_sent_s: float | None = None
         self._restarts = 0
-        self._rig_again = RigAgain(self._rig_header, config)
+        self._refusal: Fault | None = None  # of a restarted rig, by its header
         self._rig_came = 0
         self._rig_lost = ""  # the reason, from RIG_LOST until blocks arrive
         self._rig_back_s = -math.inf  # time of the last RIG_BACK
         self._is_cut = False  # from RIG_LOST without a link until the recorder is back: events wait
         self._waiting = collections.deque[bytes](maxlen=_MOST_WAITING)
         self._blocks = Freshness(config.block_s, config.limits.stale_after_s)
-        self._unreadable = False  # whether NOT_FINITE was published, and no FRESH since
-        self._unreadable_reported_s = -1.0
-        self._numbers_again = 0  # number of successive blocks with finite samples only
 
     def prepare(self) -> None:
         """Open the publishers and listen to plant and operator."""
@@ -160,8 +155,12 @@ class ControllerProcess:
         for topic in (PLANT_EVENT, OPERATOR):
             self._bus.listen(topic, self._inbox.keep)
 
-    def _rig_header(self) -> wire.Header | None:
-        return self._bus.headers(["plant"], _HEADER_S, threading.Event()).get("plant")
+    def _read_header_again(self) -> None:
+        """Compare the header of a restarted rig, in a thread, as the loop must not wait for it."""
+        try:
+            refuse_another_rig(self._bus.headers(["plant"], _WAIT_S, threading.Event()).get("plant"), self._config)
+        except Fault as fault:
+            self._refusal = fault
 
     def event(self, code: str, text: str) -> None:
         """Publish an event with a code and a text."""
@@ -187,7 +186,8 @@ class ControllerProcess:
         finally:
             self._fade_out()
             self._publish(self._blocks.paused())
-            self._doubts.complaints.report_when_due(all_of_it=True)
+            for reports in (self._complaints, self._orders):
+                reports.report_when_due(all_of_it=True)
         node = self._node
         self._is_cut = False
         self.event("END", f"steps={node.steps} duplicates={node.duplicates} dropped={self._inbox.dropped}")
@@ -209,14 +209,17 @@ class ControllerProcess:
             if received is not None:
                 if self._consume(received):  # only a new block is fresh: a rig that hangs may repeat its last block
                     self._publish(blocks.heard(time.monotonic(), self._node.block_was_late))
+                    if self._node.unreadable:
+                        self._publish(blocks.unreadable(self._node.last_block))
                 if received.topic is SENSORS and not started:
                     started = True
                     self._report("running", granted or "in lockstep")
                     if not self._lockstep:
                         # only now: the plant sends its first block once the recorder listens, so the log holds this event
                         self.event("START", granted)
-                self._doubts.look()
-                self._rig_again.refuse()
+                self._report_drops()
+                if self._refusal is not None:
+                    raise self._refusal
             if realtime.was_paused(waited_until_s, waited_until_s):
                 blocks.heard_s = time.monotonic()
                 if not self._lockstep:
@@ -230,11 +233,20 @@ class ControllerProcess:
                 self._publish(events)
                 self._ramp(silent_blocks)
             else:
-                blocks.due_s = time.monotonic() + self._stale_after_s
+                blocks.due_s = time.monotonic() + self._config.limits.stale_after_s
 
     def _publish(self, events: Events) -> None:
         for code, text in events:
             self.event(code, text)
+
+    def _report_drops(self) -> None:
+        """Report messages that the inbox dropped, and faults that have waited for a second."""
+        for topic, dropped in list(self._inbox.dropped_of.items()):
+            if new := dropped - self._dropped.get(topic, 0):
+                self._dropped[topic] = dropped
+                self._complaints.note(FLOOD, topic, "more messages than can be answered: dropped", new)
+        self._complaints.report_when_due()
+        self._orders.report_when_due()
 
     def _ramp(self, silent_blocks: int) -> None:
         self._send[COMMAND.name](self._node.stale(silent_blocks).payload)
@@ -244,7 +256,7 @@ class ControllerProcess:
         """Ramp to zero before this process ends for any reason, as not every rig ends its last command by itself."""
         while self._node.amplitude_m > 0.0 and not (self._lockstep or self._ended):
             self._ramp(1)
-            time.sleep(self._block_s)
+            time.sleep(self._config.block_s)
 
     def _consume(self, received: Received) -> bool:
         """Take one message; return whether it was a block that got an answer. Unreadable messages are dropped and reported."""
@@ -253,7 +265,7 @@ class ControllerProcess:
         except Fault as fault:
             if fault.kind.code != "BAD_MESSAGE":
                 raise
-            self._doubts.unreadable(received.topic, fault)
+            self._complaints.note(BAD_MESSAGE, received.topic.name, f"{fault.line.partition(': ')[2]}: dropped")
             return False
 
     def _take(self, received: Received) -> bool:
@@ -279,29 +291,22 @@ class ControllerProcess:
     def _report_block(self, before: int) -> None:
         """Publish the events of the block that was just answered; `before` is the number of the block before it."""
         node = self._node
-        self._report_unreadable()
         self._publish(node.news())
-        if node.slide_accel_unread:
-            text = "a sample is not a number; the controller continues without this channel"
-            self._doubts.complaints.note("NOT_FINITE", f"{SENSORS.name} mass_accel_mps2", text)
-        if node.slipped_unmoved:
-            text = f"block {node.last_block}: a slip, but the drive position is constant: {_UNSEEN}"
-            self._doubts.complaints.note("DRIVE_UNSEEN", SENSORS.name, text)
         if node.restarts != self._restarts:
             self._restarts = node.restarts
             text = f"block {node.last_block} after block {before}: the controller continues with empty windows"
             self.event("RIG_RESTARTED", text)
-            self._rig_again.begin()
+            threading.Thread(target=self._read_header_again, name="rig again", daemon=True).start()
         if self._rig_lost:  # the event repeats the reason, as RIG_LOST may not have passed the broken link
             self._report("joined", "the rig again")
             self.event("RIG_BACK", f"blocks arrive again, from block {node.last_block} on; {self._rig_lost}")
             self._rig_lost, self._rig_back_s = "", time.monotonic()
-        if self._is_cut and (self._bus.alive("recorder") or time.monotonic() > self._rig_back_s + _RECORDER_S):
+        if self._is_cut and (self._bus.alive("recorder") or time.monotonic() > self._rig_back_s + _WAIT_S):
             self._is_cut = False
             self._send_events()
-        if self._end_sent_s is not None and time.monotonic() - self._end_sent_s > _PLANT_LOST_S:
+        if self._end_sent_s is not None and time.monotonic() - self._end_sent_s > _WAIT_S:
             self._end_sent_s = None
-            self._doubts.complaints.note(FOREIGN, PLANT_EVENT.name, "END, but the rig still runs: ignored")
+            self._complaints.note(FOREIGN, PLANT_EVENT.name, "END, but the rig still runs: ignored")
 
     def _take_rig_event(self, event: wire.Event) -> None:
         if event.code == "END":
@@ -310,36 +315,15 @@ class ControllerProcess:
             line = f"{PLANT_EVENT.name}: START {event.text!r}: must be 'lockstep', as a controller --lockstep waits"
             raise Fault("CONFIG", f"{line} for ever if blocks stop; remove --lockstep, or give it to the rig too")
 
-    def _report_unreadable(self) -> None:
-        """Report blocks with NaN or infinite samples, and FRESH once blocks were finite for `stale_after_s`."""
-        if self._node.unreadable:
-            self._numbers_again = 0
-            if not self._unreadable and time.monotonic() > self._unreadable_reported_s + 1.0:
-                self._unreadable, self._unreadable_reported_s = True, time.monotonic()
-                text = f"block {self._node.last_block} holds a sample that is not a number: ramping to zero"
-                self.event("NOT_FINITE", text)
-        elif self._unreadable:
-            self._numbers_again += 1
-            if self._numbers_again * self._block_s >= self._stale_after_s:
-                self._unreadable = False
-                self.event("FRESH", "every sample is a number again")
-
     def _apply(self, payload: bytes) -> None:
-        """Apply an operator's command; report it if the rig does not, repetitions at a limited rate. Raises Fault BAD_MESSAGE."""
+        """Apply an operator's command, and report it if the rig does not. Raises Fault BAD_MESSAGE."""
         command = parsed(wire.Operator, payload, OPERATOR.name)
         if command.action not in wire.Operator.Action.values():
             raise Fault("BAD_MESSAGE", f"{OPERATOR.name}: action = {command.action}: not known")
         self._node.operator(command.action)
-        if self._node.rig_reports and self._blocks.is_fresh:  # a rig with a guard reports the command itself
-            return
-        report = f"{wire.Operator.Action.Name(command.action)} by {command.who[:_LONGEST_WHO] or 'an unnamed operator'}"
-        now_s = time.monotonic()
-        if now_s - self._reported_s.get(report, -_ANSWER_EVERY_S) < _ANSWER_EVERY_S:
-            return
-        self._reported_s = {text: at_s for text, at_s in self._reported_s.items() if now_s - at_s < 1.0}
-        if len(self._reported_s) < _MOST_ANSWERS:
-            self._reported_s[report] = now_s
-            self.event("OPERATOR", report)
+        if not (self._node.rig_reports and self._blocks.is_fresh):  # a rig with a guard reports the command itself
+            sender = command.who[:_LONGEST_WHO] or "an unnamed operator"
+            self._orders.note("OPERATOR", wire.Operator.Action.Name(command.action), f"by {sender}")
 
     def _send_rest(self, arrival_ns: int) -> None:
         lateness_ns = time.perf_counter_ns() - arrival_ns if arrival_ns else 0
@@ -352,7 +336,7 @@ class ControllerProcess:
             self._rig_came = self._bus.came("plant")
             self._node.rig_was_away()
         silent_s = time.monotonic() - heard_s
-        if silent_s < _PLANT_LOST_S or self._bus.alive("plant"):
+        if silent_s < _WAIT_S or self._bus.alive("plant"):
             return
         why = "the rig left the bus" if self._bus.linked() else "the link to the rig is down"
         text = f"{why}; last block at {self._node.block_t_ns * 1e-9:.3f} s"

@@ -5,11 +5,12 @@ from typing import Annotated, Literal, get_args
 
 from pydantic import Field, model_validator
 
-from bridge.config import Strict, Two
+from bridge.config import Strict
+from bridge.guard import config as guard
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
-MOST_BANDS = 8  # most forbidden bands of frequency
+MOST_BANDS = 2 * guard.MOST_BANDS  # most forbidden bands of frequency: of the rig, and of the controller alone
 _FEWEST_SILENT_BLOCKS = 2  # fewest block periods in `stale_after_s`; with one, every block would be too late
 Mode = Literal["on-demand", "moving"]
 MODES: tuple[Mode, ...] = get_args(Mode)
@@ -88,7 +89,11 @@ class AmplitudeConfig(Strict):
 
 
 class LimitsConfig(Strict):
-    """Limits that no policy can exceed, and the set point of v_a / v_d."""
+    """Limits that no policy can exceed, and the set point of v_a / v_d.
+
+    Amplitude, velocity, slew and frequencies are the rig's, from its header; a given value must be tighter. The defaults hold for
+    a rig whose header states none.
+    """
 
     v_ratio: Annotated[float, Field(ge=1.05, le=3.0)] = Field(default=1.2, description="Set point of v_a / v_d.")
     amplitude_max_m: Positive = 1e-7
@@ -97,10 +102,10 @@ class LimitsConfig(Strict):
     frequency_min_Hz: Positive = 500.0
     frequency_max_Hz: Positive = 5000.0
     # the carrier of the displacement transducers is 4.8 kHz: a vibration near it beats with it
-    forbidden_Hz: Annotated[list[Two], Field(max_length=MOST_BANDS)] = Field(
+    forbidden_Hz: Annotated[list[guard.Span], Field(max_length=MOST_BANDS)] = Field(
         default=[(4600.0, 5000.0)], description="Bands [low, high] without vibration."
     )
-    travel_m: Two | None = Field(
+    travel_m: guard.Span | None = Field(
         default=None,
         description="Lowest and highest position of the drive at which the base may vibrate. Not given: any.",
     )
@@ -130,70 +135,79 @@ class ControllerConfig(Strict):
 
     @model_validator(mode="after")
     def _fits_together(self) -> "ControllerConfig":
-        limits = self.limits
-        if limits.frequency_max_Hz <= limits.frequency_min_Hz:
-            raise ValueError(
-                f"limits.frequency_max_Hz = {limits.frequency_max_Hz}: must be above "
-                f"limits.frequency_min_Hz = {limits.frequency_min_Hz}"
-            )
-        nyquist_Hz = 0.5 * self.samples_per_block / self.block_s
-        if limits.frequency_max_Hz >= nyquist_Hz:
-            raise ValueError(
-                f"limits.frequency_max_Hz = {limits.frequency_max_Hz}: must be below half the sample rate, {nyquist_Hz:g} Hz; "
-                f"lower it, or raise controller.samples_per_block and rig.solver.samples_per_block, both above "
-                f"{2.0 * limits.frequency_max_Hz * self.block_s:g}"
-            )
-        if limits.stale_after_s < _FEWEST_SILENT_BLOCKS * self.block_s:
-            raise ValueError(
-                f"limits.stale_after_s = {limits.stale_after_s:g}: must hold {_FEWEST_SILENT_BLOCKS} blocks of "
-                f"{self.block_s:g} s, or every block is too late; raise it"
-            )
-        if limits.travel_m is not None and limits.travel_m[1] <= limits.travel_m[0]:
-            raise ValueError(f"limits.travel_m = {list(limits.travel_m)}: the second must be above the first")
-        for low, high in limits.forbidden_Hz:
-            if high <= low:
-                raise ValueError(f"limits.forbidden_Hz: [{low}, {high}]: the second must be above the first")
-        lowest_Hz, from_where = _lowest_candidate(self)
-        step_Hz = _candidate_step_Hz(self)
-        above_Hz = step_Hz * math.ceil(lowest_Hz / step_Hz)
-        if above_Hz > limits.frequency_max_Hz:
-            raise ValueError(
-                f"limits.frequency_max_Hz = {limits.frequency_max_Hz:g}: no multiple of {step_Hz:g} Hz lies between "
-                f"{from_where} and it; raise it to {above_Hz:g} or more"
-            )
-        if not candidate_frequencies_Hz(self):
-            raise ValueError(
-                f"limits.forbidden_Hz: no frequency is left: every multiple of {step_Hz:g} Hz between {from_where} and "
-                f"limits.frequency_max_Hz = {limits.frequency_max_Hz:g} is forbidden; narrow the bands"
-            )
-        if not (self.estimator.use_force or self.estimator.use_slide_position):
-            raise ValueError(
-                "estimator.use_force = false: use_slide_position is false as well, so no channel shows a stick; set one to true"
-            )
-        if not self.estimator.use_slide_position and self.drive_stiffness_N_per_m is None:
-            raise ValueError(
-                "drive_stiffness_N_per_m: not given, and use_slide_position = false: the force alone shows sticks only by k_d; "
-                "give drive_stiffness_N_per_m"
-            )
+        _refuse_unfit(self)
         return self
 
 
-MOST_CANDIDATES = 64  # most frequencies to choose from; more: finer steps, more memory
+_STEP_HZ = 100.0  # between two candidates of the vibration's frequency
 # Lowest candidate over the contact resonance. Smaller: the v_a / v_d that stops stick-slip depends on the damping. Larger: fewer
 # frequencies are left. From about 2 up, v_a / v_d = 1.05 stops stick-slip for any damping.
 _ABOVE_RESONANCE = 2.2
-_LEAST_GAP_HZ = 2.0  # least gap between bands: a frequency in a band moves to 1 Hz outside, not into the next band
 
 
-def forbidden_bands_Hz(limits: LimitsConfig) -> list[tuple[float, float]]:
-    """The forbidden bands from low to high; bands that overlap, or are less than 2 Hz apart, are merged."""
-    bands: list[tuple[float, float]] = []
-    for low, high in sorted(limits.forbidden_Hz):
-        if bands and low < bands[-1][1] + _LEAST_GAP_HZ:
-            bands[-1] = (bands[-1][0], max(bands[-1][1], high))
-        else:
-            bands.append((low, high))
-    return bands
+def _refuse_unfit(config: ControllerConfig) -> None:
+    """Raise ValueError for values that do not fit together."""
+    limits = config.limits
+    nyquist_Hz = 0.5 * config.samples_per_block / config.block_s
+    if limits.frequency_max_Hz >= nyquist_Hz:
+        raise ValueError(
+            f"limits.frequency_max_Hz = {limits.frequency_max_Hz}: must be below half the sample rate, {nyquist_Hz:g} Hz; "
+            f"lower it, or raise controller.samples_per_block and rig.solver.samples_per_block, both above "
+            f"{2.0 * limits.frequency_max_Hz * config.block_s:g}"
+        )
+    if limits.stale_after_s < _FEWEST_SILENT_BLOCKS * config.block_s:
+        raise ValueError(
+            f"limits.stale_after_s = {limits.stale_after_s:g}: must hold {_FEWEST_SILENT_BLOCKS} blocks of "
+            f"{config.block_s:g} s, or every block is too late; raise it"
+        )
+    lowest_Hz, from_where = _lowest_candidate(config)
+    above_Hz = _STEP_HZ * math.ceil(lowest_Hz / _STEP_HZ)
+    if above_Hz > limits.frequency_max_Hz:
+        raise ValueError(
+            f"limits.frequency_max_Hz = {limits.frequency_max_Hz:g}: no multiple of {_STEP_HZ:g} Hz lies between "
+            f"{from_where} and it; raise it to {above_Hz:g} or more"
+        )
+    if not candidate_frequencies_Hz(config):
+        raise ValueError(
+            f"limits.forbidden_Hz: no frequency is left: every multiple of {_STEP_HZ:g} Hz between {from_where} and "
+            f"limits.frequency_max_Hz = {limits.frequency_max_Hz:g} is forbidden; narrow the bands"
+        )
+    if not (config.estimator.use_force or config.estimator.use_slide_position):
+        raise ValueError(
+            "estimator.use_force = false: use_slide_position is false as well, so no channel shows a stick; set one to true"
+        )
+    if not config.estimator.use_slide_position and config.drive_stiffness_N_per_m is None:
+        raise ValueError(
+            "drive_stiffness_N_per_m: not given, and use_slide_position = false: the force alone shows sticks only by k_d; "
+            "give drive_stiffness_N_per_m"
+        )
+
+
+def looser_limits(limits: LimitsConfig, rig: guard.VibrationLimits) -> dict[str, float]:
+    """The given limits that are looser than a rig's, with the rig's values; forbidden bands only add to the rig's."""
+    bounds = {name: value for name, value in rig._asdict().items() if isinstance(value, float)}
+    given = {name: getattr(limits, name) for name in bounds if name in limits.model_fields_set}
+    return {
+        name: bounds[name]
+        for name, value in given.items()
+        if (value < bounds[name] if name == "frequency_min_Hz" else value > bounds[name])
+    }
+
+
+def within(config: ControllerConfig, rig: guard.VibrationLimits) -> ControllerConfig:
+    """The configuration with a rig's limits in place of those that are not given. Raises ValueError for a looser one."""
+    limits = config.limits
+    for name, bound in looser_limits(limits, rig).items():
+        most = "at least" if name == "frequency_min_Hz" else "at most"
+        line = f"limits.{name} = {getattr(limits, name):g}: must be {most} {bound:g}, the limit of the rig"
+        raise ValueError(f"{line}; change it, or leave it out")
+    given = limits.model_fields_set
+    stated = {name: value for name, value in rig._asdict().items() if value is not None and name not in given}
+    stated["forbidden_Hz"] = guard.merged_bands_Hz([*limits.forbidden_Hz, *rig.forbidden_Hz])
+    # without a validation, which would count every value as given
+    made = config.model_copy(update={"limits": LimitsConfig.model_construct(given, **dict(limits) | stated)})
+    _refuse_unfit(made)
+    return made
 
 
 def _lowest_candidate(config: ControllerConfig) -> tuple[float, str]:
@@ -205,14 +219,22 @@ def _lowest_candidate(config: ControllerConfig) -> tuple[float, str]:
     return limits.frequency_min_Hz, f"limits.frequency_min_Hz = {limits.frequency_min_Hz:g}"
 
 
-def _candidate_step_Hz(config: ControllerConfig) -> float:
-    range_Hz = config.limits.frequency_max_Hz - _lowest_candidate(config)[0]
-    return 100.0 * max(1, math.ceil(range_Hz / (100.0 * (MOST_CANDIDATES - 1))))
-
-
 def candidate_frequencies_Hz(config: ControllerConfig) -> list[float]:
     """The allowed frequencies to choose from, lowest first [Hz]; above the contact resonance where the range allows."""
-    bands, step_Hz = forbidden_bands_Hz(config.limits), _candidate_step_Hz(config)
-    first = math.ceil(_lowest_candidate(config)[0] / step_Hz)
-    last = math.floor(config.limits.frequency_max_Hz / step_Hz)
-    return [step_Hz * n for n in range(first, last + 1) if not any(low <= step_Hz * n <= high for low, high in bands)]
+    bands = guard.merged_bands_Hz(config.limits.forbidden_Hz)
+    first = math.ceil(_lowest_candidate(config)[0] / _STEP_HZ)
+    last = math.floor(config.limits.frequency_max_Hz / _STEP_HZ)
+    return [_STEP_HZ * n for n in range(first, last + 1) if not any(low <= _STEP_HZ * n <= high for low, high in bands)]
+
+
+def cheapest_frequency_Hz(config: ControllerConfig) -> float:
+    """The allowed frequency whose v_a takes the least shares of the stroke and of the accelerometer's range [Hz].
+
+    The sum of their squares counts. It does not depend on v_a, as both shares grow by it.
+    """
+
+    def cost(frequency_Hz: float) -> float:
+        omega = math.tau * frequency_Hz
+        return (1.0 / (omega * config.limits.amplitude_max_m)) ** 2 + (omega / config.amplitude.accel_range_mps2) ** 2
+
+    return min(candidate_frequencies_Hz(config), key=cost)

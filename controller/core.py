@@ -5,27 +5,23 @@ import math
 from bridge.arrays import Records
 from bridge.kernel import kernel, shared_kernel
 from bridge.layouts import CommandRow, ControllerMemory, ControllerParams, SensorRow, TraceRow
-from bridge.wire.messages import BLOCK, LATE
-from controller.amplitude import FIRST_SHARE, amplitude, listen, note_sent
-from controller.estimate.compliance import begin_spring, learn_compliance, spring_force
+from bridge.wire.messages import BLOCK
+from controller.estimate.channels import bin_means, is_usable, means, note_resolution, watch_channels
+from controller.estimate.compliance import learn_compliance, spring_force
 from controller.estimate.contact import contact
-from controller.estimate.friction import forces
 from controller.estimate.motion import drive_velocity
-from controller.estimate.spikes import find_spikes, learn_bends, sum_without
-from controller.estimate.windows import BINS, DRIVE, FORCE, MOST_FRESH, SLIDE, clear_windows, note_steps, push
-from controller.in_force import is_judged, note_in_force
+from controller.estimate.windows import BINS, DRIVE, FORCE, MOST_FRESH, ROWS, SLIDE, clear_windows, push
+from controller.exciter import begin_gain, listen, note_applied, note_check, restart_gain, stroke
+from controller.in_force import note_in_force
 from controller.limits import allow
 from controller.policy.decide import decide
-from controller.policy.fall import note_fall
 from controller.policy.need import way_of
 from controller.policy.reason import reason_of
-from controller.policy.trial import FIRST_RANDOM
-from controller.trips.band import begin_known, note_check
-from controller.trips.doubts import end_trips
+from controller.policy.trial import note_fall
+from controller.trips.reset import begin_motion, begin_policy, end_trips
 from controller.trips.watch import restrain, watch
 from controller.vibration import measure, skip
 
-_STEPS_LOOK = 16  # steps between two measurements of resolution and noise of the samples
 _MOST_BRIDGED_BINS = 640  # most lost bins that a line replaces: after 64 ms the longer windows still know v_d
 
 
@@ -55,16 +51,18 @@ def step(
     s: ControllerMemory = state[0]
     if s.steps == 0:
         _begin(p, s)
-    end_trips(p, s, events)
-    note_in_force(p, s, events, gap_blocks, sensors[0])
+    end_trips(p, s, state, events)
+    restart_gain(p, s, events)
+    note_in_force(p, s, events, sensors[0])
     force_N = 0.0
     usable = True
     if events & BLOCK:
         block: SensorRow = sensors[0]
         s.block = block.sequence
         s.run, s.guard_state = block.run, block.guard_state
-        note_check(p, s, float(block.check_Hz), float(block.check_gain))
-        usable = find_spikes(p, s, block)
+        note_check(p, s, block)
+        note_applied(p, s, block)
+        usable = is_usable(p, s, block)
         s.missing_blocks += gap_blocks if usable else gap_blocks + 1
         if usable:
             if s.missing_blocks > 0:
@@ -72,16 +70,15 @@ def step(
                 skip(p, s, s.missing_blocks)
                 s.missing_blocks = 0
             measure(p, s, block.base_accel_mps2)
-            listen(p, s, events & LATE != 0)
+            listen(p, s)
             force_N = _look(p, s, block)
-            if not is_judged(s):
-                s.even_steps = 0  # soon after an interruption v_a does not follow the commands
+            watch_channels(p, s)
             watch(p, s, block)
             decide(p, s, t_ns, force_N, p.block_s)
-            restrain(p, s)
-            amplitude(p, s)
-    allow(p, s, events, s.wanted_Hz, s.wanted_m if usable else math.nan)
-    note_sent(p, s)
+            restrain(s)
+            stroke(p, s)
+    allow(p, s, events, p.frequency_Hz, s.wanted_m if usable else math.nan)
+    s.silent_s = s.silent_s + p.block_s if s.allowed_m == 0.0 else 0.0
 
     c: CommandRow = command[0]
     c.sequence = s.steps
@@ -105,15 +102,13 @@ def step(
     t.reason = c.reason
     t.limit = s.limit
     t.slips = s.slips
-    t.score = 0.0
     t.force_rate = s.force_rate
     t.drive_force_N = force_N if p.use_force == 1 or s.compliance_m_per_N > 0.0 else 0.0
-    t.burst_mps2 = 0.0
     t.drive_velocity_mps = s.drive_velocity_mps
     t.vibration_velocity_mps = s.vibration_velocity_mps
     t.wanted_velocity_mps = s.wanted_velocity_mps
     t.wanted_amplitude_m = s.wanted_m
-    t.wanted_frequency_Hz = s.wanted_Hz
+    t.wanted_frequency_Hz = p.frequency_Hz
     t.time_to_slip_s = s.time_to_slip_s
     way = way_of(s)
     t.surges = s.surges
@@ -124,9 +119,8 @@ def step(
     t.drive_stiffness_N_per_m = 1.0 / s.compliance_m_per_N if known else 0.0
     t.drive_stiffness_sigma = s.compliance_sigma / s.compliance_m_per_N if known else 1.0
     t.breakaway_force_N = s.breakaway_N[way]
-    t.sliding_force_N = s.sliding_N[way]
-    t.loop_delay_s = max(s.loop_delay_steps, 0) * p.block_s
-    t.exciter_gain = math.exp(s.log_gain[s.candidate])
+    t.loop_delay_s = s.loop_delay_steps * p.block_s
+    t.exciter_gain = s.gain
     t.announcements = s.announced_count
     s.steps += 1
 
@@ -134,39 +128,10 @@ def step(
 @kernel
 def _begin(p: ControllerParams, s: ControllerMemory) -> None:
     """Set all memory whose initial value is not zero."""
-    begin_spring(p, s)
-    begin_known(p, s)
-    s.followed, s.confirmed, s.went_m[:] = -1, 1.0, -1.0
-    s.listening, s.onset_steps, s.loop_delay_steps = 1, -1, -1
-    s.silent_steps = p.silence_steps  # the base counts as at rest, as no vibration was ever commanded
-    s.level, s.swing_level = -1, -1
-    s.growth, s.quiet_s, s.settled_s, s.slipped_s = FIRST_SHARE, math.inf, math.inf, math.inf
-    s.demodulated_Hz, s.random = 0.0, FIRST_RANDOM
-    s.tail[:, :], s.spike_at[:] = math.nan, -1
-    for way in range(2):
-        s.ratio[way] = p.v_ratio
-
-
-@kernel
-def _mean(
-    p: ControllerParams, s: ControllerMemory, block: SensorRow, first: int, samples: int
-) -> tuple[float, float, float]:
-    """Means of force [N], slide and drive position [m] over some samples; without a force sensor, the spring's force."""
-    force_N, slide_m, drive_m = 0.0, 0.0, 0.0
-    for i in range(first, first + samples):
-        drive_m += float(block.drive_position_m[i])
-        if p.use_force == 1:
-            force_N += float(block.drive_force_N[i])
-        if p.use_slide_position == 1:
-            slide_m += float(block.mass_position_m[i])
-    if s.spiked == 1:
-        drive_m = sum_without(s, DRIVE, block.drive_position_m, first, samples)
-        force_N = sum_without(s, FORCE, block.drive_force_N, first, samples) if p.use_force == 1 else 0.0
-        slide_m = sum_without(s, SLIDE, block.mass_position_m, first, samples) if p.use_slide_position == 1 else 0.0
-    force_N, slide_m, drive_m = force_N / samples, slide_m / samples, drive_m / samples
-    if p.use_force == 0:
-        force_N = spring_force(s, drive_m - slide_m)
-    return force_N, slide_m, drive_m
+    begin_motion(p, s)
+    begin_policy(p, s)
+    begin_gain(p, s)
+    s.in_force_s, s.silent_s = math.inf, math.inf
 
 
 @kernel
@@ -177,51 +142,46 @@ def _bridge(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> None:
         clear_windows(s)
         return
     # from the mean of the last window to the mean of as many samples, as the noise of single samples would bend the windows
-    force_N, slide_m, drive_m = 0.0, 0.0, 0.0
-    for i in range(BINS):
-        force_N += s.bins[FORCE, 0, i] / BINS
-        slide_m += s.bins[SLIDE, 0, i] / BINS
-        drive_m += s.bins[DRIVE, 0, i] / BINS
     samples = min(BINS * p.bin_samples, p.samples_per_block)
-    next_N, next_slide_m, next_drive_m = _mean(p, s, block, 0, samples)
     apart = bins + 0.5 * BINS + 0.5 * samples / p.bin_samples
-    for i in range(bins):
-        share = (i + 0.5 + 0.5 * BINS) / apart
-        s.fresh[FORCE, 0] = force_N + share * (next_N - force_N)
-        s.fresh[SLIDE, 0] = slide_m + share * (next_slide_m - slide_m)
-        s.fresh[DRIVE, 0] = drive_m + share * (next_drive_m - drive_m)
+    means(p, s, block, 0, samples, 1)
+    if p.use_force == 0:
+        s.fresh[FORCE, 1] = spring_force(s, s.fresh[DRIVE, 1] - s.fresh[SLIDE, 1])
+    for row in range(ROWS):
+        s.last[row] = 0.25 * (s.bins[row, 0, 0] + s.bins[row, 0, 1] + s.bins[row, 0, 2] + s.bins[row, 0, 3])
+        s.rate[row] = (s.fresh[row, 1] - s.last[row]) / apart
+        s.last[row] += 0.5 * (BINS - 1) * s.rate[row]
+    for _ in range(bins):
+        for row in range(ROWS):
+            s.last[row] += s.rate[row]
+            s.fresh[row, 0] = s.last[row]
         push(p, s, 1, False)
 
 
 @kernel
 def _look(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> float:
     """Estimate motion and contact, tick by tick; return the mean force of the block [N]."""
-    if s.steps % _STEPS_LOOK == 0:
-        note_steps(s, FORCE, block.drive_force_N)
-        note_steps(s, SLIDE, block.mass_position_m)
-        note_steps(s, DRIVE, block.drive_position_m)
-        learn_bends(p, s, s.steps // _STEPS_LOOK, block)
+    note_resolution(s, FORCE, block.drive_force_N)
+    note_resolution(s, SLIDE, block.mass_position_m)
+    note_resolution(s, DRIVE, block.drive_position_m)
     tick_s = p.bins_per_tick * p.bin_s
     total_N, at = 0.0, 0
     slip_began, stick_began = 0, 0
     for _ in range(p.ticks_per_block):
-        tick_N, fresh = 0.0, 0
-        for i in range(p.bins_per_tick):
-            force_N, slide_m, drive_m = _mean(p, s, block, at, p.bin_samples)
-            at += p.bin_samples
-            s.fresh[FORCE, fresh], s.fresh[SLIDE, fresh], s.fresh[DRIVE, fresh] = force_N, slide_m, drive_m
-            fresh += 1
-            tick_N += force_N
-            note_fall(p, s, force_N)
-            if fresh == MOST_FRESH or i == p.bins_per_tick - 1:
-                push(p, s, fresh, True)
-                fresh = 0
+        tick_N, left = 0.0, p.bins_per_tick
+        while left > 0:
+            bins = min(left, MOST_FRESH)
+            bin_means(p, s, block, at, bins)
+            for i in range(bins):
+                tick_N += s.fresh[FORCE, i]
+                note_fall(p, s, s.fresh[FORCE, i])
+            push(p, s, bins, True)
+            at, left = at + bins * p.bin_samples, left - bins
         tick_N /= p.bins_per_tick
         total_N += tick_N
         drive_velocity(p, s, tick_s)
         contact(p, s, tick_N, tick_s)
         learn_compliance(p, s, tick_s)
-        forces(s, tick_N, tick_s)
         slip_began, stick_began = slip_began | s.slip_began, stick_began | s.stick_began
     s.slip_began, s.stick_began = slip_began, stick_began
     return total_N / p.ticks_per_block

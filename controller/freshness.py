@@ -1,14 +1,20 @@
-"""Whether blocks arrive in time: when the command ramps down without them, and the events STALE, PAUSED and FRESH."""
+"""Whether blocks arrive in time: when the command ramps down without them, the events STALE, PAUSED and FRESH, and their age."""
 
+import math
 from enum import Enum
 
 Events = list[tuple[str, str]]  # codes and texts
+MARGIN_NS = 15_000_000  # largest additional delay of the loop: v_a then stays within 4 %
+HOLD_NS = 200_000_000  # time for which blocks are older until LATE is published; a single stall is shorter
+_DRIFT = 2e-4  # largest relative drift of two clocks
+_AGAIN_S = 1.0  # least time between two reports of samples that are not finite
 
 
 class _State(Enum):
     FRESH = 0  # blocks arrive in time
     STALLED = 1  # this process stalled: blocks may be queued, and the rig is silent only if a further block is missing
     STALE = 2  # STALE was published
+    UNREADABLE = 3  # NOT_FINITE was published
 
 
 class Freshness:
@@ -26,6 +32,7 @@ class Freshness:
         self._state = _State.FRESH
         self._silent = False  # whether the last step of the controller was made without a block
         self._in_time = 0  # number of successive blocks in time
+        self._unreadable_s = -math.inf  # time of the last NOT_FINITE
         self._stalled_s = 0.0  # total stall of this process that is not published yet
 
     @property
@@ -42,6 +49,14 @@ class Freshness:
         self._state = _State.FRESH
         return [*self.paused(), ("FRESH", f"blocks arrive again, {self._in_time} in time")]
 
+    def unreadable(self, block: int) -> Events:
+        """Process a block with a sample of NaN or infinity, after `heard`; published at most once a second."""
+        self._in_time = 0
+        if self._state is _State.UNREADABLE or self.heard_s < self._unreadable_s + _AGAIN_S:
+            return []
+        self._state, self._unreadable_s = _State.UNREADABLE, self.heard_s
+        return [("NOT_FINITE", f"block {block} holds a sample that is not a number: ramping to zero")]
+
     def stalled(self, seconds: float) -> None:
         """Store a stall of this process; it is published with FRESH, as the link may be down until then."""
         self._state, self._in_time = _State.STALLED, 0
@@ -50,7 +65,7 @@ class Freshness:
     def missing(self, now_s: float) -> tuple[int, Events]:
         """Process a missing block; return the block periods by which the command ramps down, and events."""
         blocks = 1 if self._silent else round(self._stale_after_s / self._block_s)
-        new = self._state is _State.FRESH or (self._state is _State.STALLED and self._silent)
+        new = self._state is not _State.STALE and (self._state is not _State.STALLED or self._silent)
         # the slew limit counts steps: a step each block period ramps as fast as with blocks
         self._silent, self._in_time, self.due_s = True, 0, now_s + self._block_s
         if not new:
@@ -63,3 +78,41 @@ class Freshness:
         stalled_s, self._stalled_s = self._stalled_s, 0.0
         text = f"this controller stalled for {stalled_s:.2f} s; the rig had no command during that time"
         return [("PAUSED", text)] if stalled_s else []
+
+
+class Age:
+    """Age of the blocks when they are answered, over the least age: it grows if the computer, the link or the rig became slow.
+
+    Rig and controller have two clocks. Their drift is removed, and with it a delay that lasts for minutes.
+    """
+
+    def __init__(self) -> None:
+        self.late_ns = 0  # age of the last block minus the least age
+        self._youngest_ns = 0.0
+        self._last_ns: int | None = None
+        self._since_ns: int | None = None
+
+    @property
+    def is_late(self) -> bool:
+        """Whether every block of the last HOLD_NS was older than the margin."""
+        return self._since_ns is not None and self._last_ns is not None and self._last_ns - self._since_ns >= HOLD_NS
+
+    def note(self, answered_ns: int, t_ns: int) -> None:
+        """Process a block: the time of the answer by the controller's clock, and the block's time by the rig's clock."""
+        if answered_ns <= 0:  # a run in one process has no clock
+            return
+        age_ns = float(answered_ns - t_ns)
+        if self._last_ns is None:
+            self._youngest_ns = age_ns
+        else:
+            self._youngest_ns = min(age_ns, self._youngest_ns + _DRIFT * (answered_ns - self._last_ns))
+        self._last_ns = answered_ns
+        self.late_ns = round(age_ns - self._youngest_ns)
+        if self.late_ns <= MARGIN_NS:
+            self._since_ns = None
+        elif self._since_ns is None:
+            self._since_ns = answered_ns
+
+    def forget(self) -> None:
+        """Start again after a jump or restart of the rig's clock."""
+        self._last_ns = self._since_ns = None

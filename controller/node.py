@@ -1,11 +1,12 @@
 """The controller as a participant of the bus: sensor blocks in; command, trace, state and snapshots out."""
 
+from collections.abc import Callable
 from typing import Any
 
 from bridge.faults import Fault
 from bridge.kernel_cache import compile_once
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.block_numbers import BlockNumbers, NumberCheck
+from bridge.wire.complaints import CLOCK, FOREIGN, BlockNumbers, NumberCheck
 from bridge.wire.messages import ANNOUNCE as ANNOUNCE_LAYOUT
 from bridge.wire.messages import ANNOUNCED, BLOCK, GAP, LATE, RESET, STALE, STOP, has_checksum, is_whole, sensor_block
 from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
@@ -15,17 +16,19 @@ from bridge.wire.topics import ANNOUNCE, COMMAND, SENSORS, SNAPSHOT, STATE, TRAC
 from controller.announced import take_announcement
 from controller.config import ControllerConfig
 from controller.core import step
+from controller.freshness import MARGIN_NS, Age
 from controller.in_force import SETTLED_S
 from controller.records import build
 from controller.telemetry import SNAPSHOT_EVERY, STATE_EVERY, plotted, snapshot
-from controller.trips.age import MARGIN_NS, Age
 from controller.trips.trip_events import TripEvents
 
-_RESTART_BLOCKS = 1024  # blocks that count as lost when a rig restarts, so that every window is emptied
-_MOST_GAP_BLOCKS = 1 << 20  # most lost blocks that are counted at once; more do not fit into a trace
+# Most lost blocks that are counted at once; more do not fit into a trace. A restart of the rig counts as many, so that every
+# window is emptied.
+_MOST_GAP_BLOCKS = 1 << 20
 # Number of successive blocks of the same wrong length that show a wrong block_s of the rig; fewer are jumps of the clock
 _WRONG_LENGTHS = 3
 _FASTEST_MPS = 100.0  # largest announced velocity of a drive that is accepted
+_SECOND = "dropped; is a second rig on this prefix?"
 
 
 class ControllerNode:
@@ -40,9 +43,9 @@ class ControllerNode:
     """
 
     def __init__(self, config: ControllerConfig, lockstep: bool = False) -> None:
+        self.note: Callable[..., object] = lambda *_: None  # publishes a fault of the blocks, as `Complaints.note`
         self.duplicates = 0  # number of repeated blocks, and of late blocks that were counted as a gap
         self.restarts = 0  # number of restarts of the rig
-        self.clock_jump_ns = 0  # t_ns of the last block minus the time by its number; 0 if about equal
         self.steps = 0
         self.t_ns = 0  # time of the last frame
         self._params, self._state = build(config)
@@ -62,8 +65,7 @@ class ControllerNode:
         self._trip_events = TripEvents()
         self.age = Age()
         self._lockstep = lockstep
-        self.slide_accel_unread = False  # whether samples of the slide's accelerometer are NaN or infinite
-        self.slipped_unmoved = False  # whether a slip began in the last step at a constant drive position
+        self._clock_jump_ns = 0  # t_ns of the last block minus the time by its number; 0 if about equal
 
     @property
     def amplitude_m(self) -> float:
@@ -84,11 +86,6 @@ class ControllerNode:
     def unreadable(self) -> bool:
         """Whether the last block held a sample of NaN or infinity."""
         return int(self._trace[0]["limit"]) == wire.NOT_FINITE
-
-    @property
-    def strays(self) -> int:
-        """Number of blocks that belong to another rig, by their block number."""
-        return self._numbers.strays
 
     @property
     def last_block(self) -> int:
@@ -147,23 +144,26 @@ class ControllerNode:
         if self._seals or has_checksum(payload):
             self._refuse_changed(payload)
         sequence, t_ns = sequence_and_time(payload, SENSORS.message)
-        expected = self._numbers.expected
+        expected, strays = self._numbers.expected, self._numbers.strays
         verdict = self._numbers.judge(sequence, arrival_ns)
+        if strays := self._numbers.strays - strays:
+            text = f"blocks with numbers far from the last block {self.last_block}: {_SECOND}"
+            self.note(FOREIGN, SENSORS.name, text, strays)
         if verdict is NumberCheck.AGAIN:
             self.duplicates += 1  # late or repeated: the controller has counted this block as a gap already
+            self.note("REPEATED", SENSORS.name, f"repeated or late blocks: {_SECOND}")
             return None
         if verdict is NumberCheck.STRAY:
             return None
         if verdict is NumberCheck.ANEW:
             self.restarts += 1
-            gap_blocks, self.clock_jump_ns = _RESTART_BLOCKS, 0
+            self.age.forget()
+            gap_blocks, self._clock_jump_ns = _MOST_GAP_BLOCKS, 0
         else:
             lost = sequence - expected if expected is not None and self.steps else 0
             gap_blocks = min(lost, _MOST_GAP_BLOCKS)
             if expected is not None:
                 self._check_clock(t_ns - self.block_t_ns, lost)
-        if verdict is NumberCheck.ANEW or self.clock_jump_ns:
-            self.age.forget()
         if not self._lockstep:
             self.age.note(answered_ns, t_ns)
         self.block_t_ns = self.t_ns = t_ns
@@ -184,11 +184,13 @@ class ControllerNode:
         Raises Fault CONFIG for blocks of another length: rates, filters and slopes count in blocks.
         """
         off_ns = apart_ns - (lost + 1) * self._block_ns
-        self.clock_jump_ns = off_ns if 100 * abs(off_ns) > self._block_ns else 0
+        self._clock_jump_ns = off_ns if 100 * abs(off_ns) > self._block_ns else 0
+        if self._clock_jump_ns:
+            self.age.forget()
         if self._length_checked or lost:
             return
-        self._wrong_lengths_ns = [*self._wrong_lengths_ns, apart_ns][-_WRONG_LENGTHS:] if self.clock_jump_ns else []
-        self._length_checked = not self.clock_jump_ns
+        self._wrong_lengths_ns = [*self._wrong_lengths_ns, apart_ns][-_WRONG_LENGTHS:] if self._clock_jump_ns else []
+        self._length_checked = not self._clock_jump_ns
         if len(self._wrong_lengths_ns) >= _WRONG_LENGTHS and len(set(self._wrong_lengths_ns)) == 1 and apart_ns > 0:
             line = f"{SENSORS.name}: blocks are {apart_ns * 1e-6:g} ms apart: must be block_s = {self._block_ns * 1e-9:g} s"
             raise Fault("CONFIG", f"{line}; set block_s of rig and controller alike")
@@ -201,20 +203,25 @@ class ControllerNode:
     def _step(self, sensors: Any, events: int, gap_blocks: int) -> Outgoing:
         events |= self._announced
         self._operator_events = self._announced = 0
-        state: Any = self._state[0]
-        slips_before = int(state.slips)
         step(
             self._params, self._state, sensors, events, gap_blocks, self.t_ns,
             self._command, self._trace,
         )  # fmt: skip
         self.steps += 1
-        self.slipped_unmoved = state.slips > slips_before and state.moving == 0
-        self.slide_accel_unread = bool(state.slide_accel_unread)
         return Outgoing(COMMAND, self._command.tobytes())
 
     def news(self) -> list[tuple[str, str]]:
-        """Codes and texts of trips and limits that the last step began, or ended."""
-        return self._trip_events.news(self._trace[0], bool(self._state[0]["quiet_s"] < SETTLED_S))
+        """Codes and texts of trips and limits that the last step began or ended; notes faults of the last block."""
+        if self._clock_jump_ns:
+            text = f"t_ns is {self._clock_jump_ns * 1e-6:g} ms off the time that the block number gives"
+            self.note(CLOCK, SENSORS.name, f"block {self.last_block}: {text}; trace and log keep the rig's times")
+        if self.age.is_late:
+            text = f"blocks arrive {self.age.late_ns * 1e-6:.0f} ms later than before"
+            self.note("LATE", SENSORS.name, f"{text}: v_a oscillates more than it should")
+        if self._state[0]["slide_accel_unread"]:
+            text = "a sample is not a number; the controller continues without this channel"
+            self.note("NOT_FINITE", f"{SENSORS.name} mass_accel_mps2", text)
+        return self._trip_events.news(self._trace[0], bool(self._state[0]["in_force_s"] < SETTLED_S))
 
     def rest(self, lateness_ns: int) -> list[Outgoing]:
         """The messages after the command: the trace, and at lower rates the plotted state and a snapshot of the memory."""

@@ -3,12 +3,10 @@
 Inputs are fed, outputs are compared; no output is copied from the log. The only field that is not compared is the lateness in
 the trace, which comes from a clock and has no effect on a command.
 
-A log is replayed piece by piece. A step is replayed once its block, its command and its announcements have been read, and is then
-dropped, so that the memory does not grow with the log.
+A log in order is replayed piece by piece. A step is replayed once its block, its command and its announcements have been read,
+and is then dropped, so that the memory does not grow with the log. A log that lacks messages is replayed as a whole.
 """
 
-from collections import deque
-from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -16,26 +14,21 @@ import numpy.typing as npt
 
 from bridge.arrays import Records
 from bridge.faults import Fault
+from bridge.kernel import Record, unlocked_kernel
+from bridge.layouts import ControllerMemory, TraceRow
 from bridge.log.logfile import RunData
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import ANNOUNCE, BLOCK, COMMAND, TRACE, sensor_block
+from controller.announced import take_announcement
 from controller.config import ControllerConfig
+from controller.core import step
 from controller.records import LAYOUT_ID, STATE, build
-from controller.replay_steps import (
-    AGAIN,
-    BLOCK_MISSING,
-    DIFFERS,
-    GAP,
-    LACKS_ANNOUNCEMENT,
-    LACKS_COMMAND,
-    ReplayDifference,
-    StepComparer,
-)
 
-# Largest delay of a message in the log [steps], 10 s of blocks of 1 ms; a later message counts as lost. Larger: a log that lacks
-# messages needs more memory. Smaller: a log with a step farther from its block is read a second time, as a whole. Not swept.
+# Largest delay of a message in the log [steps], 10 s of blocks of 1 ms. Larger: a replay in pieces needs more memory. Smaller: a
+# log with a step farther from its block is read a second time, as a whole. Not swept.
 WINDOW: Final = 10_000
-_DEFAULT_SAMPLES = 20
+_BLOCK = sensor_block(20)  # layout of the blocks before the first has come
+_OF_A_CLOCK = "lateness_ns"  # field of the trace that comes from a clock and is not compared
 
 
 class Change(NamedTuple):
@@ -43,6 +36,18 @@ class Change(NamedTuple):
 
     t_ns: int
     config: ControllerConfig
+
+
+class ReplayDifference(NamedTuple):
+    """The first place where a replay differs from the log."""
+
+    table: str  # command or trace
+    step: int
+    block: int
+    t_s: float
+    field: str
+    logged: float
+    replayed: float
 
 
 class Replay(NamedTuple):
@@ -59,46 +64,36 @@ class Replay(NamedTuple):
 
 
 class OutOfOrder(Exception):
-    """A message follows in the log after steps that needed it: the log can only be replayed as a whole."""
+    """Messages are missing or not in order: the log can only be replayed as a whole."""
 
 
-class _Waiting:
-    """Messages of a topic that no step has used so far, in order of their sequence."""
-
-    def __init__(self, empty: Records) -> None:
-        self._parts = [empty]
-        self.passed = -1  # largest sequence of dropped messages, which no later step uses
-        self.lacked: list[npt.NDArray[np.uint64]] = []  # sequences that replayed steps lacked
-
-    def add(self, records: Records) -> None:
-        """Add messages, in the order of the log."""
-        if len(records):
-            self._parts.append(records)
-
-    def records(self) -> Records:
-        """All waiting messages by sequence; messages with equal sequences are in the order of the log."""
-        if len(self._parts) > 1:
-            parts = [part for part in self._parts if len(part)]
-            dtype = parts[0].dtype
-            raw = f"V{dtype.itemsize}"  # joined and moved as bytes: numpy would drop the tags between the fields
-            joined = parts[0] if len(parts) == 1 else np.concatenate([part.view(raw) for part in parts]).view(dtype)
-            sequence = joined["sequence"]
-            if not (sequence[1:] > sequence[:-1]).all():
-                joined = joined.view(raw)[np.argsort(sequence, kind="stable")].view(dtype)
-            self._parts = [joined]
-        return self._parts[0]
-
-    def forget(self, count: int) -> None:
-        """Drop the first `count` messages."""
-        if count:
-            records = self.records()
-            self.passed = max(self.passed, int(records["sequence"][count - 1]))
-            self._parts = [records[count:]]
-
-    def forget_until(self, sequence: int) -> None:
-        """Drop all messages up to a sequence, including messages that follow later."""
-        self.forget(int(np.searchsorted(self.records()["sequence"], np.uint64(sequence), "right")))
-        self.passed = max(self.passed, sequence)
+@unlocked_kernel
+def _steps(
+    params: Records,
+    params_from_ns: npt.NDArray[np.int64],
+    state: Records,
+    frames: Records,
+    sensors: Records,
+    places: npt.NDArray[np.int64],
+    announce: Records,
+    command: Records,
+    trace: Records,
+) -> None:
+    """Replay the steps of `frames`, traces of a log, into `command` and `trace`; `places` are the rows of their blocks."""
+    s: ControllerMemory = state[0]
+    for i in range(frames.shape[0]):
+        t: TraceRow = frames[i]
+        # same types as in the process: other types would make Numba compile the step again
+        events: Any = np.int64(t.events)
+        gap_blocks: Any = np.int64(t.gap_blocks)
+        while s.announced_count < min(np.int64(t.announcements), announce.shape[0]):
+            announced: Record = announce[s.announced_count]
+            take_announcement(s, announced.holds_from_ns, announced.drive_velocity_mps)
+        change = params.shape[0] - 1
+        while change > 0 and t.t_ns < params_from_ns[change]:
+            change -= 1
+        settings, block = params[change : change + 1], sensors[places[i] : places[i] + 1]
+        step(settings, state, block, events, gap_blocks, t.t_ns, command[i : i + 1], trace[i : i + 1])
 
 
 class Replayer:
@@ -107,40 +102,46 @@ class Replayer:
     Args:
         changes: configurations in order of time; the first holds from the start.
         from_s: only steps from this time on are compared. The replay starts at the last snapshot before, or at the run's start.
-        whole: whether all of the log is read into memory first; it may then be in any order.
+        whole: whether all of the log is added before `result`; it may then be in any order.
 
     """
 
     def __init__(self, changes: list[Change], from_s: float = 0.0, whole: bool = False) -> None:
         built = [build(change.config) for change in changes]
-        params, from_ns = np.concatenate([pair[0] for pair in built]), np.array([change.t_ns for change in changes])
-        self._from_s, self._from_ns = from_s, round(from_s * 1e9)
-        self._whole = whole
+        self._params = np.concatenate([params for params, _ in built]).view(built[0][0].dtype)
+        self._params_from_ns = np.array([change.t_ns for change in changes])
         self._memory = built[0][1]
-        self._comparer = StepComparer(params.view(built[0][0].dtype), from_ns, self._memory, from_s)
-        self._trace, self._sensors, self._command, self._announce = (
-            _Waiting(layout.blank(0)) for layout in (TRACE, sensor_block(_DEFAULT_SAMPLES), COMMAND, ANNOUNCE)
-        )
-        self._tables = {
-            "trace": self._trace, "sensors": self._sensors, "command": self._command, "announce": self._announce,
+        self._from_ns = round(from_s * 1e9)
+        self._whole = whole
+        # messages that no step has used so far, by sequence
+        self._tables: dict[str, Records] = {
+            "trace": TRACE.blank(0), "sensors": _BLOCK.blank(0),
+            "command": COMMAND.blank(0), "announce": ANNOUNCE.blank(0),
         }  # fmt: skip
-        self._snapshots: deque[wire.Snapshot] = deque()
-        self._before: wire.Snapshot | None = None  # last snapshot before `from_s`
-        self._newest_step = -1  # step of the newest snapshot
-        self._phase: Callable[[int], bool] = self._start
-        self._lost_from = 0  # step from which the memory is lost, until a snapshot at or after it
-        self._compared = self._skipped = 0
+        self._dropped = dict.fromkeys(self._tables, -1)  # largest sequence of dropped messages
+        self._snapshots: list[wire.Snapshot] = []  # of the memory after the present step
         self._newest = 0  # number of steps in the newest piece, whose blocks and commands may follow
+        self._begun = False
+        self._lost_from: int | None = None  # step from which the memory is lost, until a snapshot at or after it
+        self._compared = self._skipped = 0
+        self._difference: ReplayDifference | None = None
 
     def add(self, topic: str, records: Records) -> None:
         """Add messages of a streaming topic; messages of other topics are skipped."""
-        waiting = self._tables.get(topic)
-        if waiting is None or not len(records):
+        table = self._tables.get(topic)
+        if table is None or not len(records):
             return
-        if not self._whole:
-            records = self._in_time(topic, waiting, records)
-            self._newest = len(records) if topic == "trace" else self._newest
-        waiting.add(records)
+        if topic == "trace":
+            self._newest = len(records)
+        raw = f"V{records.dtype.itemsize}"  # joined and moved as bytes: numpy would drop the tags between the fields
+        if len(table):
+            records = np.concatenate([table.view(raw), records.view(raw)]).view(records.dtype)
+        sequence = records["sequence"]
+        if self._whole:
+            records = records.view(raw)[np.argsort(sequence, kind="stable")].view(records.dtype)
+        elif int(sequence[0]) <= self._dropped[topic] or not (sequence[1:] > sequence[:-1]).all():
+            raise OutOfOrder
+        self._tables[topic] = records
         if not self._whole:
             self._advance(end=False)
 
@@ -148,144 +149,170 @@ class Replayer:
         """Add a snapshot of the controller's memory; a snapshot of another version is skipped."""
         if snapshot.layout != LAYOUT_ID:
             return
-        early = snapshot.t_ns < self._from_ns
         if not self._whole:
-            if snapshot.step <= self._newest_step or (early and self._phase != self._start):
+            early = snapshot.t_ns < self._from_ns
+            if (early and self._begun) or (self._snapshots and snapshot.step <= self._snapshots[-1].step):
                 raise OutOfOrder
-            self._newest_step = snapshot.step
-            if early:
+            if early:  # the replay begins after it, or after a later snapshot
                 self._snapshots.clear()
+                self._pass_over(int(np.searchsorted(self._tables["trace"]["sequence"], np.uint64(snapshot.step + 1))))
+            elif self._begun and self._lost_from is None:
+                return
         self._snapshots.append(snapshot)
-        if early:
-            self._before = snapshot
-            if not self._whole:
-                self._pass_over(int(np.searchsorted(self._trace.records()["sequence"], np.uint64(snapshot.step + 1))))
 
     def result(self) -> Replay:
         """The result, at the end of the log. Raises Fault BAD_LOG where two controllers answered, as their steps are mixed."""
+        sequence = self._tables["trace"]["sequence"]
+        twice = np.flatnonzero(sequence[1:] == sequence[:-1])
+        if len(twice):
+            _refuse_two(self._tables["trace"][twice[0]], self._tables["trace"][twice[0] + 1])
+        self._snapshots.sort(key=lambda snapshot: snapshot.step)
         self._advance(end=True)
-        return Replay(self._compared, self._skipped, self._comparer.difference)
-
-    def _in_time(self, topic: str, waiting: _Waiting, records: Records) -> Records:
-        """The messages that can still be used; repetitions of a message are skipped."""
-        sequence = records["sequence"]
-        if topic == "announce":  # steps refer to announcements by their number
-            steps = np.diff(sequence, prepend=waiting.records()["sequence"][-1:]).astype(np.int64)
-            if waiting.lacked or (steps <= 0).any():
-                raise OutOfOrder
-            return records
-        late = sequence <= np.uint64(max(waiting.passed, 0))
-        if waiting.passed < 0 or not late.any():
-            return records
-        if topic == "trace" or any(np.isin(sequence[late], lacked).any() for lacked in waiting.lacked):
-            raise OutOfOrder
-        return records.view(f"V{records.dtype.itemsize}")[~late].view(records.dtype)
+        return Replay(self._compared, self._skipped, self._difference)
 
     def _advance(self, end: bool) -> None:
         """Replay every complete step; with `end` all steps, as no message follows."""
-        while len(trace := self._trace.records()):
-            sequence = trace["sequence"]
-            twice = np.flatnonzero(sequence[1:] == sequence[:-1])
-            if len(twice):
-                if not self._whole:
-                    raise OutOfOrder
-                self._refuse_two(trace[twice[0]], trace[twice[0] + 1])
-            if not self._phase(len(trace) if end else max(len(trace) - max(WINDOW, self._newest), 0)):
+        while count := len(self._tables["trace"]):
+            # number of steps whose messages have all been read
+            sure = count if end else max(count - max(WINDOW, self._newest), 0)
+            if not (self._begun or self._begin(bool(sure))):
                 break
-        for waiting in (self._sensors, self._command):  # drops old blocks and commands that no step used
-            waiting.forget(max(len(waiting.records()) - 2 * WINDOW, 0) if not self._whole else 0)
+            if self._lost_from is not None and not self._restore(sure, end):
+                break
+            if not self._take(sure):
+                break
+        for topic in ("sensors", "command") if not self._whole else ():  # messages that no step used
+            if (old := len(table := self._tables[topic]) - 2 * WINDOW) > 0:
+                self._drop(topic, int(table["sequence"][old - 1]))
 
-    @staticmethod
-    def _refuse_two(first: Any, second: Any) -> None:
-        at_s, again_s = 1e-9 * int(first["t_ns"]), 1e-9 * int(second["t_ns"])
-        line = f"/trace: step {first['sequence']} is recorded at {at_s:.3f} s and again at {again_s:.3f} s"
-        why = "the controller was started again, or two controllers answered"
-        raise Fault("BAD_LOG", f"{line}: {why}; record every controller in a separate log")
-
-    # each phase takes the number of steps whose messages have all been read, and returns whether another phase follows
-
-    def _start(self, sure: int) -> bool:
-        """Find the step at which the replay begins."""
-        first = int(self._trace.records()["sequence"][0])
-        if not sure and (first or self._from_ns > 0):
+    def _begin(self, sure: bool) -> bool:
+        """Find the step at which the replay begins; False while later messages decide it, which is not `sure`."""
+        first = int(self._tables["trace"]["sequence"][0])
+        if (first or self._from_ns) and not sure:
             return False
-        if self._before is not None:
-            self._snapshots.appendleft(self._before)
-            self._lost_from = self._before.step
-            self._phase = self._lost
-        elif first == 0:
-            self._phase = self._run
-        else:
-            self._lost_from = first
-            self._phase = self._lost
+        self._begun = True
+        early = [snapshot.step for snapshot in self._snapshots if snapshot.t_ns < self._from_ns]
+        if first or early:
+            self._lost_from = early[-1] if early else first
         return True
 
-    def _run(self, sure: int) -> bool:
-        """Replay the steps from the memory on, up to a step that cannot be replayed, and drop them."""
-        trace, sensors, command, announce = (waiting.records() for waiting in self._tables.values())
-        if not len(sensors) and self._sensors.passed < 0 and not sure:
-            return False  # the first block, which shows the number of samples, may follow
-        known_from = [0, 0] if self._whole else [self._sensors.passed + 1, self._command.passed + 1]
-        taken = self._comparer.take((trace, sensors, command, announce), sure, *known_from)
-        if taken.why == AGAIN:
-            raise OutOfOrder
-        self._compared += taken.compared
-        steps = trace["sequence"][: taken.steps]
-        if taken.lacks & LACKS_COMMAND:
-            self._command.lacked.append(np.setdiff1d(steps, command["sequence"]))
-        if taken.lacks & LACKS_ANNOUNCEMENT:
-            self._announce.lacked.append(steps[-1:].copy())
-        if taken.why in {GAP, BLOCK_MISSING}:
-            self._lost_from = int(trace["sequence"][taken.steps])
-            self._phase = self._lost
-        if taken.steps:
-            step = int(steps[-1])
-            self._sensors.forget(taken.blocks)
-            self._command.forget_until(step)
-            self._trace.forget(taken.steps)
-            while self._snapshots and self._snapshots[0].step <= step:
-                self._snapshots.popleft()
-        if taken.why == BLOCK_MISSING:
-            block = trace["block"][taken.steps : taken.steps + 1].copy()
-            self._sensors.lacked.append(block)
-            self._sensors.forget_until(int(block[0]))
-        return taken.why in {GAP, BLOCK_MISSING, DIFFERS}
-
-    def _lost(self, sure: int) -> bool:
-        """Skip steps until a snapshot restores the memory."""
-        sequence = self._trace.records()["sequence"]
+    def _restore(self, sure: int, end: bool) -> bool:
+        """Skip steps up to a snapshot with a step after it, and continue there; False while messages are missing."""
+        sequence = self._tables["trace"]["sequence"]
         while self._snapshots:
             snapshot = self._snapshots[0]
-            following = snapshot.step + 1
-            if snapshot.step >= self._lost_from:
-                if not self._whole and following <= self._trace.passed:
-                    raise OutOfOrder
-                place = int(np.searchsorted(sequence, np.uint64(following)))
-                if place < len(sequence) and int(sequence[place]) == following:
-                    self._snapshots.popleft()
-                    self._pass_over(place)
-                    self._memory[:] = np.frombuffer(snapshot.memory, STATE)
-                    self._phase = self._run
-                    return True
-                if sure <= place and sure < len(sequence):  # the step after the snapshot may still follow
-                    break
-                if snapshot is self._before and place < len(sequence):
-                    self._lost_from = int(sequence[place])
-            self._snapshots.popleft()
+            place = int(np.searchsorted(sequence, np.uint64(snapshot.step + 1)))
+            if place >= sure and not end:
+                return False
+            self._snapshots.pop(0)
+            follows = place < len(sequence) and int(sequence[place]) == snapshot.step + 1
+            if follows and snapshot.step >= (self._lost_from or 0):
+                self._pass_over(place)
+                self._memory[:] = np.frombuffer(snapshot.memory, STATE)
+                self._lost_from = None
+                return True
         self._pass_over(sure)
         return False
 
+    def _take(self, sure: int) -> bool:
+        """Replay, compare and drop the steps with all their messages; return whether others may follow at once."""
+        trace = writable(self._tables["trace"][: 10 * WINDOW])
+        sensors, command, announce = (writable(self._tables[topic]) for topic in ("sensors", "command", "announce"))
+        sequence = trace["sequence"]
+        of_block, has_block = _places(sensors["sequence"], trace["block"])
+        of_command, has_command = _places(command["sequence"], sequence)
+        follows = sequence == np.uint64(self._memory[0]["steps"]) + np.arange(len(trace), dtype=np.uint64)
+        complete = follows & (has_block | (trace["events"] & BLOCK == 0))
+        if not self._whole:
+            complete &= has_command & (trace["announcements"] <= len(announce))
+        count = len(trace) if complete.all() else int(np.argmin(complete))
+        if count:
+            frames, answers, traces = trace[:count], COMMAND.blank(count), TRACE.blank(count)
+            if not len(sensors):  # no step has a block
+                sensors = _BLOCK.blank()
+            _steps(
+                self._params, self._params_from_ns, self._memory, frames, sensors, of_block[:count], announce, answers, traces,
+            )  # fmt: skip
+            traces[_OF_A_CLOCK] = frames[_OF_A_CLOCK]
+            late = frames["t_ns"] >= self._from_ns
+            self._compared += int(late.sum())
+            if self._difference is None:
+                logged = command[of_command[:count]] if len(command) else COMMAND.blank(count)
+                pairs = ("trace", frames, traces, late), ("command", logged, answers, late & has_command[:count])
+                self._difference = _first_difference(pairs, traces)
+            self._drop_steps(frames)
+        if count == len(trace):
+            return True
+        if count >= sure:
+            return False  # the messages may follow
+        if not self._whole:
+            raise OutOfOrder
+        self._lost_from = int(sequence[count])
+        return True
+
     def _pass_over(self, count: int) -> None:
         """Drop the first steps, which cannot be replayed."""
-        steps = self._trace.records()[:count]
+        steps = self._tables["trace"][:count]
+        self._skipped += int((steps["t_ns"] >= self._from_ns).sum())
+        self._drop_steps(steps)
+
+    def _drop_steps(self, steps: Records) -> None:
+        """Drop steps with their commands, and all blocks up to the last that they used."""
         if not len(steps):
             return
-        self._skipped += int((steps["t_ns"] >= self._from_s * 1e9).sum())
-        consumed = steps["block"][steps["events"] & BLOCK != 0]
-        if len(consumed):
-            self._sensors.forget_until(int(consumed.max()))
-        self._command.forget_until(int(steps["sequence"][-1]))
-        self._trace.forget(count)
+        blocks = steps["block"][steps["events"] & BLOCK != 0]
+        if len(blocks):
+            self._drop("sensors", int(blocks.max()))
+        for topic in ("command", "trace"):
+            self._drop(topic, int(steps["sequence"][-1]))
+
+    def _drop(self, topic: str, until: int) -> None:
+        """Drop all messages up to a sequence, which no later step uses."""
+        table = self._tables[topic]
+        self._tables[topic] = table[np.searchsorted(table["sequence"], np.uint64(until), "right") :]
+        self._dropped[topic] = max(self._dropped[topic], until)
+
+
+def _places(known: npt.NDArray[np.uint64], wanted: npt.NDArray[np.uint64]) -> tuple[Any, Any]:
+    """The first row of each wanted number in a sorted column, and whether it is present; row 0 if not."""
+    places = np.searchsorted(known, wanted)
+    present = np.zeros(len(wanted), bool)
+    inside = places < len(known)
+    present[inside] = known[places[inside]] == wanted[inside]
+    return np.where(present, places, 0), present
+
+
+def _first_difference(pairs: Any, traces: Records) -> ReplayDifference | None:
+    """The first bit that differs, in pairs of a name, logged and replayed messages, and the rows that are compared."""
+    places: list[tuple[int, int, str, str, float, float]] = []
+    for number, (table, logged, replayed, rows) in enumerate(pairs):
+        if logged.tobytes() == replayed.tobytes():
+            continue
+        for name in (field.name for field in (TRACE, COMMAND)[number].message.DESCRIPTOR.fields):
+            bits = f"u{logged.dtype[name].itemsize}"
+            was, now = (np.ascontiguousarray(part[name]) for part in (logged, replayed))
+            row = int(np.argmax(differs := rows & (was.view(bits) != now.view(bits))))
+            if differs[row]:
+                places.append((row, number, table, name, float(was[row]), float(now[row])))
+    if not places:
+        return None
+    row, _, table, name, logged, replayed = min(places, key=lambda place: place[:2])
+    at = traces[row]
+    return ReplayDifference(
+        table, int(at["sequence"]), int(at["block"]), float(at["t_ns"]) * 1e-9, name, logged, replayed
+    )
+
+
+def _refuse_two(first: Any, second: Any) -> None:
+    at_s, again_s = 1e-9 * int(first["t_ns"]), 1e-9 * int(second["t_ns"])
+    line = f"/trace: step {first['sequence']} is recorded at {at_s:.3f} s and again at {again_s:.3f} s"
+    why = "the controller was started again, or two controllers answered"
+    raise Fault("BAD_LOG", f"{line}: {why}; record every controller in a separate log")
+
+
+def writable(records: Records) -> Records:
+    """The messages in writable memory: Numba would compile kernels again for read-only arrays."""
+    return records if records.flags.writeable else np.frombuffer(bytearray(records.tobytes()), records.dtype)
 
 
 def replay(run: RunData, changes: list[Change], from_s: float = 0.0) -> Replay:

@@ -1,63 +1,58 @@
-"""Checks from the rig's header, before the first block, that this controller fits the rig."""
+"""The rig's header, read before the first block: whether this controller fits the rig, and the limits of the rig."""
 
 import contextlib
 import json
-import threading
-from collections.abc import Callable
 from typing import Any
 
+from pydantic import TypeAdapter, ValidationError
+
 from bridge.faults import Fault
+from bridge.guard.config import VibrationLimits
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.payloads import refuse_other_schema
-from controller.config import ControllerConfig
+from controller.config import ControllerConfig, within
+
+_LIMITS = TypeAdapter(VibrationLimits)
 
 
-def refuse_another_rig(header: wire.Header | None, config: ControllerConfig) -> None:
-    """Raise Fault if a rig's blocks do not match the controller's configuration.
+def for_rig(header: wire.Header | None, config: ControllerConfig) -> ControllerConfig:
+    """The configuration with the limits of the rig's header.
 
-    BAD_MESSAGE: another schema version; CONFIG: blocks of another length or number of samples. A rig without a header is
-    accepted; its blocks are checked as they arrive.
+    Raises Fault BAD_MESSAGE for another schema version, CONFIG for blocks of another length or number of samples, for unreadable
+    limits, and for a given limit that is looser. The blocks of a rig without a header are checked as they arrive.
     """
     if header is None:
-        return
+        return config
     refuse_other_schema(header)
-    solver: Any = None
-    with contextlib.suppress(ValueError, TypeError, KeyError, RecursionError):
-        solver = json.loads(header.configuration)["rig"]["solver"]
-    if not isinstance(solver, dict):
-        return
+    table: Any = None
+    with contextlib.suppress(ValueError, RecursionError):
+        table = json.loads(header.configuration)
+    if not isinstance(table, dict):
+        return config
+    rig = table.get("rig")
+    solver = rig.get("solver") if isinstance(rig, dict) else None
     for name in ("block_s", "samples_per_block"):
+        if not isinstance(solver, dict):
+            break
         theirs, ours = solver.get(name), getattr(config, name)
         if isinstance(theirs, int | float) and abs(theirs - ours) > 0.01 * ours:
             line = f"header/plant: rig.solver.{name} = {theirs:g}: must be controller.{name} = {ours:g}"
             raise Fault("CONFIG", f"{line}; set both to the same number")
+    if "limits" not in table:
+        return config
+    try:
+        return within(config, _LIMITS.validate_python(table["limits"]))
+    except ValidationError as error:
+        problem = error.errors()[0]
+        place = ".".join(map(str, problem["loc"]))
+        line = f"header/plant: limits.{place} = {problem['input']!r}: {problem['msg']}"
+        raise Fault("CONFIG", f"{line}; see bridge/wire/PROTOCOL.md for its fields") from None
+    except ValueError as error:
+        raise Fault("CONFIG", f"controller.{error}") from None
 
 
-class RigAgain:
-    """Reads the header of a restarted rig in a thread, as the loop must not wait.
-
-    Args:
-        ask: requests the rig's header, which may take a second; returns None without an answer.
-        config: configuration of the controller.
-
-    """
-
-    def __init__(self, ask: Callable[[], wire.Header | None], config: ControllerConfig) -> None:
-        self._ask = ask
-        self._config = config
-        self._refusal: Fault | None = None
-
-    def begin(self) -> None:
-        """Start reading the header; `refuse` reports the result."""
-        threading.Thread(target=self._compare, name="rig again", daemon=True).start()
-
-    def refuse(self) -> None:
-        """Raise the Fault of `refuse_another_rig` once the header shows it."""
-        if self._refusal is not None:
-            raise self._refusal
-
-    def _compare(self) -> None:
-        try:
-            refuse_another_rig(self._ask(), self._config)
-        except Fault as fault:
-            self._refusal = fault
+def refuse_another_rig(header: wire.Header | None, config: ControllerConfig) -> None:
+    """Raise Fault if the header of a restarted rig does not match the configuration; CONFIG also for other limits."""
+    if for_rig(header, config) != config:
+        line = "header/plant: limits: differ from those before the rig was restarted: must stay the same"
+        raise Fault("CONFIG", f"{line}; start this controller again")

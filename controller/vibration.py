@@ -2,10 +2,8 @@
 
 import math
 
-from bridge.kernel import Record, kernel
+from bridge.kernel import Record, hypot, kernel
 from bridge.layouts import ControllerMemory, ControllerParams
-
-TWO_PI = 2.0 * math.pi
 
 
 @kernel
@@ -42,35 +40,18 @@ def measure(p: ControllerParams, s: ControllerMemory, base_accel_mps2: Record) -
         base_accel_mps2: [samples].
 
     """
-    frequency_Hz = s.allowed_Hz if s.allowed_Hz > 0.0 else p.candidate_Hz[0]
-    step_rad = TWO_PI * frequency_Hz * p.sample_s
+    frequency_Hz = s.allowed_Hz if s.allowed_Hz > 0.0 else p.frequency_Hz
+    step_rad = math.tau * frequency_Hz * p.sample_s
     a, b = _fit(base_accel_mps2, step_rad, s.phase_rad)
-    s.phase_rad = (s.phase_rad + step_rad * p.samples_per_block) % TWO_PI
-    if s.demodulated_Hz != frequency_Hz:
-        s.demodulated_Hz = frequency_Hz
-        s.in_phase_mps2, s.quadrature_mps2 = a, b
+    s.phase_rad = (s.phase_rad + step_rad * p.samples_per_block) % math.tau
     s.in_phase_mps2 += p.filter_share * (a - s.in_phase_mps2)
     s.quadrature_mps2 += p.filter_share * (b - s.quadrature_mps2)
-    s.vibration_velocity_mps = _velocity(p, frequency_Hz, s.in_phase_mps2, s.quadrature_mps2)
-    s.fast_mps = _velocity(p, frequency_Hz, a, b)
-
-
-@kernel
-def _velocity(p: ControllerParams, frequency_Hz: float, in_phase_mps2: float, quadrature_mps2: float) -> float:
-    """v_a [m/s] of an acceleration's two parts, corrected for the accelerometer's roll-off."""
-    rolled_off = frequency_Hz / p.accel_bandwidth_Hz
-    amplitude_mps2 = math.sqrt(in_phase_mps2 * in_phase_mps2 + quadrature_mps2 * quadrature_mps2)
-    return amplitude_mps2 * math.sqrt(1.0 + rolled_off * rolled_off) / (TWO_PI * frequency_Hz)
-
-
-@kernel
-def velocity_of(p: ControllerParams, frequency_Hz: float, samples: Record) -> float:
-    """v_a of one block of samples of an accelerometer, without a low-pass [m/s]."""
-    a, b = _fit(samples, TWO_PI * frequency_Hz * p.sample_s, 0.0)
-    return _velocity(p, frequency_Hz, a, b)
+    per_mps2 = hypot(1.0, frequency_Hz / p.accel_bandwidth_Hz) / (math.tau * frequency_Hz)
+    s.vibration_velocity_mps = per_mps2 * hypot(s.in_phase_mps2, s.quadrature_mps2)
+    s.fast_mps = per_mps2 * hypot(a, b)
 
 
 @kernel
 def skip(p: ControllerParams, s: ControllerMemory, blocks: int) -> None:
     """Advance the demodulator's phase over lost blocks, during which the exciter continued."""
-    s.phase_rad = (s.phase_rad + TWO_PI * s.allowed_Hz * p.block_s * blocks) % TWO_PI
+    s.phase_rad = (s.phase_rad + math.tau * s.allowed_Hz * p.block_s * blocks) % math.tau

@@ -41,7 +41,7 @@ _FAULTS_INTRO = (
 )
 _WORDS_INTRO = """\
 Meaning of the numbers in the columns `mode`, `state`, `reason` and `limit` of a log and of its tables.
-`stickslip explain reason` prints a column, `stickslip explain PIEZO_WEAK` a word."""
+`stickslip explain reason` prints a column, `stickslip explain EXCITER_END` a word."""
 _EVENTS_INTRO = """\
 Events that plant, controller and recorder publish on the bus and in a log. The severity follows NAMUR NE 107: failure (data
 were lost, or a part does not work), out of specification, check (an operator's action, or a test), maintenance, or news.

@@ -160,7 +160,7 @@ class PlantProcess:
         self._kept, self._accepted_gain = kept, node.accepted_gain
         self._report_step = report
         self._keeper = keeper
-        self._guard_events = GuardEvents()
+        self._guard_events = GuardEvents(lambda: self._node.gain_report)
         self._operator_orders, self._fault_orders = Inbox(16), Inbox(16)
         self._bus = bus
         self._complaints = Complaints(self.event)
@@ -267,8 +267,7 @@ class PlantProcess:
     def _publish_events(self) -> None:
         applied = self._node.applied
         for code, text in self._guard_events.news(applied):
-            measured = f"{self._node.gain_report}; " if code in ("GAIN_CHANGED", "GAIN_UNEXPECTED") else ""
-            self.event(code, f"{measured}{text}")
+            self.event(code, text)
             if code == "GUARD" and (kept := self._kept) is not None and self._accepted_gain != self._node.accepted_gain:
                 self._accepted_gain = self._node.accepted_gain
                 lost = "the next run of this rig has no gain to compare with"

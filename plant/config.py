@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from bridge.config import Strict, in_short
-from bridge.guard.config import GuardConfig
+from bridge.guard.config import GuardConfig, VibrationLimits
 from plant.drive_config import DriveConfig, NotNegative, Positive
 from plant.effects.library import checked
 from plant.effects.sensors import LONGEST_DELAY
@@ -157,6 +157,19 @@ class RigConfig(Strict):
     loop: LoopConfig = LoopConfig()
     guard: GuardConfig = GuardConfig()
     effects: dict[str, dict[str, float | str]] = Field({}, description="[effects.NAME]; without any: the ideal rig.")
+
+    @property
+    def vibration_limits(self) -> VibrationLimits:
+        """The limits that the header states and a controller must keep."""
+        guard, piezo = self.guard, self.piezo
+        return VibrationLimits(
+            guard.stroke_m.alarm if guard.stroke_m else piezo.amplitude_max_m,
+            guard.velocity_mps.alarm if guard.velocity_mps else None,
+            piezo.amplitude_slew_m_per_s or None,
+            piezo.frequency_min_Hz,
+            piezo.frequency_max_Hz,
+            guard.forbidden_Hz,
+        )
 
     # checked before pydantic, which gives two errors for a value that is neither a number nor a string
     @model_validator(mode="before")

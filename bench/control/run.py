@@ -74,7 +74,7 @@ def judge(
 
     """
     rig, bank = scenario.rig, scenario.bank
-    limits: dict[str, Any] = scenario.table["controller"]["limits"]
+    limits: dict[str, Any] = scenario.table["controller"].get("limits", {})
     enabled_from_s = scenario.enabled_from_s
     velocity_max_mps = float(limits.get("velocity_max_mps", 5e-3))
     forbidden = [(float(low), float(high)) for low, high in limits.get("forbidden_Hz", [(4600.0, 5000.0)])]

@@ -131,18 +131,9 @@ def changed(scenario: BankScenario, name: str, duration_s: float, table: dict[st
 
 def _controller_table(rig: RigConfig, assumed: AssumedConfig) -> dict[str, Any]:
     """The controller's table that follows from the rig."""
-    piezo = rig.piezo
-    limits = {
-        "amplitude_max_m": piezo.amplitude_max_m,
-        "frequency_min_Hz": piezo.frequency_min_Hz,
-        "frequency_max_Hz": piezo.frequency_max_Hz,
-    }
-    if piezo.amplitude_slew_m_per_s > 0.0:
-        limits["slew_m_per_s"] = piezo.amplitude_slew_m_per_s
     stiffness_N_per_m = rig.drive.stiffness_N_per_m * assumed.drive_stiffness_ratio
     return ({"drive_stiffness_N_per_m": stiffness_N_per_m} if assumed.drive_stiffness_given else {}) | {
         "block_s": rig.solver.block_s,
         "samples_per_block": rig.solver.samples_per_block,
         "contact_resonance_Hz": math.sqrt(rig.contact.stiffness_N_per_m / rig.slide.mass_kg) / (2.0 * math.pi),
-        "limits": limits,
     }

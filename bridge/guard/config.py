@@ -1,17 +1,51 @@
 """The table `[guard]` of a rig file: limits for the exciter that no controller can exceed. No limit can be raised online."""
 
-from typing import Annotated
+from collections.abc import Sequence
+from typing import Annotated, NamedTuple
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from bridge.config import Strict, Two
 
-Positive = Annotated[float, Field(gt=0)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _LONGEST_S = 1e9  # longest time: 30 years; a far longer one overflows the count of blocks
 HoldTime = Annotated[float, Field(ge=0, le=_LONGEST_S)]
 Share = Annotated[float, Field(gt=0, le=1)]
 MOST_BANDS = 8  # most forbidden bands
+
+
+def _rising(ends: tuple[float, float]) -> tuple[float, float]:
+    if ends[1] <= ends[0]:
+        raise ValueError(f"[{ends[0]:g}, {ends[1]:g}]: the second must be above the first")
+    return ends
+
+
+Span = Annotated[Two, AfterValidator(_rising)]
+Bands = Annotated[list[Span], Field(max_length=MOST_BANDS)]
 _TONES = 5  # tones of a loop check without `check_Hz`
+_LEAST_GAP_HZ = 2.0  # least gap between bands: a frequency in a band moves to 1 Hz outside, not into the next band
+
+
+class VibrationLimits(NamedTuple):
+    """The limits that guard and controller share, with the names of the controller's keys; None: not stated by the rig."""
+
+    amplitude_max_m: Positive
+    velocity_max_mps: Positive | None
+    slew_m_per_s: Positive | None
+    frequency_min_Hz: Positive
+    frequency_max_Hz: Positive
+    forbidden_Hz: Bands
+
+
+def merged_bands_Hz(bands: Sequence[Two]) -> list[tuple[float, float]]:
+    """Forbidden bands from low to high; bands that overlap, or are less than 2 Hz apart, are merged."""
+    merged: list[tuple[float, float]] = []
+    for low, high in sorted(bands):
+        if merged and low < merged[-1][1] + _LEAST_GAP_HZ:
+            merged[-1] = (merged[-1][0], max(merged[-1][1], high))
+        else:
+            merged.append((low, high))
+    return merged
 
 
 class Level(Strict):
@@ -68,9 +102,7 @@ class GuardConfig(Strict):
     loud_ratio: Level = Field(
         Level(alarm=3.0, abort=4.0, hold_s=0.1), description="Measured v_a over the drive's velocity."
     )
-    forbidden_Hz: Annotated[list[Two], Field(max_length=MOST_BANDS)] = Field(
-        [], description="Bands [low, high] without vibration."
-    )
+    forbidden_Hz: Bands = Field([], description="Bands [low, high] without vibration.")
     band_hold_s: HoldTime = Field(0.2, description="Time of commands at forbidden frequencies until the guard trips.")
     duty: Level = Field(Level(alarm=1.0, abort=1.0), description="Share of the time with vibration; 1: no limit.")
     duty_window_s: Positive = Field(60.0, description="Time constant of the duty.")
@@ -96,9 +128,6 @@ class GuardConfig(Strict):
 
     @model_validator(mode="after")
     def _in_order(self) -> "GuardConfig":
-        for low, high in self.forbidden_Hz:
-            if high <= low:
-                raise ValueError(f"forbidden_Hz: [{low:g}, {high:g}]: the second must be above the first")
         if sorted(set(self.check_Hz)) != self.check_Hz:
             raise ValueError(f"check_Hz = {self.check_Hz}: must rise")
         return self

@@ -4,7 +4,7 @@ import math
 
 from bridge.guard.check import check_tone, enable_off, follow_check
 from bridge.guard.estimates import see_drive, see_vibration
-from bridge.guard.limits import held, held_by_drive, watch
+from bridge.guard.limits import held, held_by_drive, slewed_m, watch
 from bridge.guard.states import enter, note_vibration
 from bridge.kernel import kernel
 from bridge.layouts import CommandRow, GuardMemory, GuardParams, SensorRow
@@ -67,10 +67,9 @@ def allow(p: GuardParams, s: GuardMemory, command_block: int, frequency_Hz: floa
         target_m = 0.0
     if target_m > 0.0:
         s.frequency_Hz = target_Hz  # a fading vibration keeps its frequency
-    slewed_m = min(max(target_m, s.amplitude_m - p.slew_m_per_block), s.amplitude_m + p.slew_m_per_block)
-    if slewed_m != target_m and s.limit == wire.NO_CAUSE:
+    s.amplitude_m = slewed_m(s.amplitude_m, target_m, p.slew_m_per_block)
+    if s.amplitude_m != target_m and s.limit == wire.NO_CAUSE:
         s.limit = wire.SLEW_RATE
-    s.amplitude_m = slewed_m
     note_vibration(s)
     s.toggle = 1 - s.toggle
     proof = s.state == wire.CHECKING and enable_off(p, s)

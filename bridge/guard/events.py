@@ -1,5 +1,6 @@
 """Events of a rig's guard: each change of state with its reason, missing commands, active limits."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,22 +12,22 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.words import words
 
 _AGAIN_S = 1.0  # shortest time between two reports of the same limit
-_WATCHED = ("guard_state", "guard_limit", "fallback")
 
 
-def changes(applied: Records) -> npt.NDArray[np.int64]:
-    """Rows of `Applied` that may hold an event: the first, and each that differs from the row before."""
-    new = np.zeros(len(applied), bool)
+def changes(records: Records, *fields: str) -> npt.NDArray[np.int64]:
+    """Rows that may hold an event: the first, and each that differs in a field from the row before; by default of `Applied`."""
+    new = np.zeros(len(records), bool)
     new[:1] = True
-    for name in _WATCHED:
-        new[1:] |= applied[name][1:] != applied[name][:-1]
+    for name in fields or ("guard_state", "guard_limit", "fallback"):
+        new[1:] |= records[name][1:] != records[name][:-1]
     return np.flatnonzero(new)
 
 
 class GuardEvents:
-    """Turns the records of `Applied` into events, block by block."""
+    """Turns the records of `Applied` into events, block by block; `gain_report` gives the gains of the last loop check."""
 
-    def __init__(self) -> None:
+    def __init__(self, gain_report: Callable[[], str] = str) -> None:
+        self._gain_report = gain_report
         self._help = {(word.column, word.number): f"{word.word}: {word.help}" for word in words()}
         self._state = -1
         self._limit = 0
@@ -53,9 +54,8 @@ class GuardEvents:
             tripped = state == wire.FAULT and int(applied.cause) not in (wire.STOP_BY_PERSON, wire.STOP_KEPT)
             events.append(("FAULT" if tripped else "GUARD", text))
             if state == wire.READY:
-                events.append(
-                    (wire.Cause.Name(applied.cause), self._help[("cause", int(applied.cause))].partition(": ")[2])
-                )
+                text = self._help[("cause", int(applied.cause))].partition(": ")[2]
+                events.append((wire.Cause.Name(applied.cause), f"{self._gain_report()}; {text}"))
         t_s = int(applied.t_ns) * 1e-9
         if limit != self._limit and limit in LIMITS and t_s - self._reported_s.get(limit, -_AGAIN_S) >= _AGAIN_S:
             self._reported_s[limit] = t_s

@@ -5,7 +5,7 @@ import math
 from bridge.guard.records import FIRST
 from bridge.guard.states import trip
 from bridge.kernel import kernel
-from bridge.layouts import GuardMemory, GuardParams
+from bridge.layouts import ControllerParams, GuardMemory, GuardParams
 from bridge.wire.stickslip_pb2 import (
     ACTIVE,
     ARMED,
@@ -55,17 +55,30 @@ def exciter_gain(p: GuardParams, s: GuardMemory, frequency_Hz: float) -> float:
 
 
 @kernel
-def _inside(p: GuardParams, frequency_Hz: float) -> bool:
-    inside = p.frequency_min_Hz <= frequency_Hz <= p.frequency_max_Hz
-    for i in range(p.bands):
-        inside = inside and not p.band_Hz[i, 0] <= frequency_Hz <= p.band_Hz[i, 1]
-    return inside
+def nearest_allowed_Hz(p: GuardParams | ControllerParams, frequency_Hz: float) -> float:
+    """The nearest frequency inside the range and outside every forbidden band, upwards first; also for the controller."""
+    result = min(max(frequency_Hz, p.frequency_min_Hz), p.frequency_max_Hz)
+    for i in range(p.bands):  # the bands are 2 Hz or more apart, so 1 Hz outside of a band is not in the next
+        low, high = p.band_Hz[i, 0], p.band_Hz[i, 1]
+        if low <= result <= high:
+            if high < p.frequency_max_Hz:
+                return min(high + 1.0, p.frequency_max_Hz)
+            return max(low - 1.0, p.frequency_min_Hz)
+    return result
+
+
+@kernel
+def slewed_m(before_m: float, target_m: float, most_m: float) -> float:
+    """The amplitude that is nearest to the target and at most `most_m` from the amplitude before; also for the controller."""
+    return min(max(target_m, before_m - most_m), before_m + most_m)
 
 
 @kernel
 def held(p: GuardParams, s: GuardMemory, frequency_Hz: float, amplitude_m: float) -> float:
     """The commanded amplitude, held at the absolute limits [m]."""
-    if not passes(p, s, BAND, 0.0 if amplitude_m == 0.0 or _inside(p, frequency_Hz) else 1.0):
+    if not passes(
+        p, s, BAND, 0.0 if amplitude_m == 0.0 or nearest_allowed_Hz(p, frequency_Hz) == frequency_Hz else 1.0
+    ):
         return 0.0
     result_m = amplitude_m
     if not passes(p, s, OVERTRAVEL, amplitude_m):

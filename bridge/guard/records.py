@@ -7,7 +7,7 @@ import numpy as np
 
 from bridge.arrays import Records
 from bridge.faults import Fault
-from bridge.guard.config import MOST_BANDS, GuardConfig, Level
+from bridge.guard.config import MOST_BANDS, GuardConfig, Level, merged_bands_Hz
 from bridge.kernel import record
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.channels import CHANNELS
@@ -131,9 +131,10 @@ def build(
     p.check_m = config.check_share * stroke.alarm
     p.timeout_blocks = round(exciter.command_timeout_s / exciter.block_s)
     p.window_blocks = min(max(round(DRIVE_WINDOW_S / exciter.block_s), 2), RING - 1)
-    p.bands = len(config.forbidden_Hz)
-    for i, (low, high) in enumerate(config.forbidden_Hz):
-        p.band_Hz[i] = low, high
+    bands_Hz = merged_bands_Hz(config.forbidden_Hz)
+    p.bands = len(bands_Hz)
+    for i, ends_Hz in enumerate(bands_Hz):
+        p.band_Hz[i] = ends_Hz
     try:
         tones = config.tones_Hz(exciter.frequency_min_Hz, exciter.frequency_max_Hz)
     except ValueError as error:

@@ -2,8 +2,7 @@
 
 from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.block_numbers import BlockNumbers, NumberCheck
-from bridge.wire.complaints import BAD_MESSAGE, FOREIGN, Complaints
+from bridge.wire.complaints import BAD_MESSAGE, FOREIGN, BlockNumbers, Complaints, NumberCheck
 from bridge.wire.inbox import Received
 from bridge.wire.payloads import parsed, sequence_and_time
 

@@ -9,7 +9,7 @@ zenoh_link, inbox                publishers, presence and bounded inboxes over Z
 bus_config, session              endpoint and prefix of the bus; settings of a session, permissions of each role
 loopback_users, certificates     credentials of each role
 refusals                         sessions that the rig refused, counted
-complaints, block_numbers        reports of bad messages, at a limited rate; checks of sequence numbers
+complaints                       reports of bad messages, at a limited rate; checks of sequence numbers
 realtime, clock                  priority and core of a real-time process; its clock, which may be simulated
 pauses, core_timer               stalls of the computer, by a timer on each core
 """

@@ -28,7 +28,8 @@ def folders() -> list[Path]:
     cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     if os.path.isabs(cache):
         places.append(Path(cache) / _FOLDER / "run")
-    places.append(Path(tempfile.gettempdir()) / f"{_FOLDER}-{os.getuid()}")
+    # not `tempfile.gettempdir`, which fails on a full disk: a stop must not
+    places.append(Path(os.environ.get("TMPDIR") or "/tmp") / f"{_FOLDER}-{os.getuid()}")  # noqa: S108 (a private folder in it)
     return places
 
 
@@ -55,17 +56,22 @@ def make(endpoint: str) -> Path:
 
     Raises Fault NOT_SECURE if no folder is safe from other users.
     """
+    problems: list[str] = []
     for path in _files(endpoint):
-        with contextlib.suppress(OSError):
+        try:
             path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            if not is_private_folder(path.parent):
-                continue
-            if not _is_whole(path):
-                _write(path)
-            os.utime(path)
-            return path
-    places = ", ".join(str(folder) for folder in folders())
-    line = f"{endpoint}: no folder for its password is private: one of {places} must belong to this user, mode 0700"
+            if is_private_folder(path.parent):
+                if not _is_whole(path):
+                    _write(path)
+                os.utime(path)
+                return path
+            problems.append(f"{path.parent} (not private)")
+        except OSError as error:
+            problems.append(f"{path.parent} ({error.strerror})")
+    places = ", ".join(problems)
+    line = (
+        f"{endpoint}: no folder can hold its password: one of {places} must belong to this user, mode 0700, with room"
+    )
     raise Fault("NOT_SECURE", f"{line}; set XDG_RUNTIME_DIR to such a folder, or use a tls/ endpoint")
 
 

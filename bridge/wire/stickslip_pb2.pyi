@@ -118,6 +118,7 @@ class Reason(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     GAIN_OTHER: _ClassVar[Reason]
     EXCITER_END: _ClassVar[Reason]
     TRIAL: _ClassVar[Reason]
+    DRIVE_UNSEEN: _ClassVar[Reason]
 DISABLED: Mode
 WATCH: Mode
 EXCITE: Mode
@@ -212,6 +213,7 @@ LOOSE: Reason
 GAIN_OTHER: Reason
 EXCITER_END: Reason
 TRIAL: Reason
+DRIVE_UNSEEN: Reason
 
 class SensorBlock(_message.Message):
     __slots__ = ("sequence", "t_ns", "drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m", "run", "guard_state", "check_Hz", "check_gain", "checksum", "applied_Hz", "applied_m", "applied_block", "fallback", "guard_limit")

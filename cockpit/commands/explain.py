@@ -58,7 +58,7 @@ def explain(
     code: Annotated[
         str,
         typer.Argument(
-            help="For example ENDPOINT_BUSY, an exit status, PIEZO_WEAK, GAP, or a column of a log: mode, state, reason, limit, "
+            help="For example ENDPOINT_BUSY, an exit status, EXCITER_END, GAP, or a column of a log: mode, state, reason, limit, "
             "event; lists all if left out.",
             autocompletion=_codes,
         ),

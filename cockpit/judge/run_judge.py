@@ -44,8 +44,8 @@ from cockpit.judge.watches import FrozenWatch, LatencyWatch, Losses, RigWatch, S
 from cockpit.judge.window import LAYOUTS, HasMoved, WaitingRows, Window, reduced
 from diagnosis.slips import Cycles
 
-# Events left out of the findings: the judge counts them from blocks and steps, and DRIVE_UNSEEN also occurs at sound turns.
-_COUNTED_ELSEWHERE = {"NOT_FINITE", "DRIVE_UNSEEN", *WEAK_REASONS}
+# Events left out of the findings: the judge counts them from blocks and steps.
+_COUNTED_ELSEWHERE = {"NOT_FINITE", *WEAK_REASONS}
 # Severity before the text of a cause, a letter in older logs: removed, as each line is marked as trip or warning.
 _SEVERITY = re.compile(rf"(^|: )({'|'.join([*filter(None, SEVERITIES), *SEVERITIES.values()])}): ")
 
@@ -206,6 +206,7 @@ class RunJudge:
         not_watched = events.not_watched if latency is not None else ""
         damaged = [f"{finding.kind}: {finding.text}" for finding in damage_findings(damage, self._path)]
         faults, others = self._lines(charge, gaps.fallbacks(), damaged, checksums, foreign)
+        others += steps.other_stiffness(setup.stiffness_N_per_m)
         ratio = windows.ratio.result() if windows.checked else None
         slips_s = self.cycles.breakaway_t_s if self.cycles is not None else np.empty(0)
         judged_s = apart((setup.settled_from_s, seconds), gaps.all(is_last=True))

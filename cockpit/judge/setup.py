@@ -27,6 +27,7 @@ class Setup(NamedTuple):
     known_gain: bool  # the configuration declares the exciter's gain as verified
     v_ratio: float  # configured set point of v_a / v_d; infinite if unknown
     duration_s: float  # planned length of the run, by the plant's configuration; 0: unlimited or unknown
+    stiffness_N_per_m: float = 0.0  # k_d of the controller's configuration; 0: not given
 
     @property
     def settled_from_s(self) -> float:
@@ -78,6 +79,7 @@ def setup_of(headers: Metadata, path: Path, period_ns: float) -> Setup:
         known_gain=bool(value_at(controller, "amplitude.known_gain")),
         v_ratio=_number(controller, "limits.v_ratio", math.inf),
         duration_s=_number(plant, "duration_s", 0.0),
+        stiffness_N_per_m=_number(controller, "drive_stiffness_N_per_m", 0.0),
     )
 
 

@@ -148,7 +148,8 @@ def stop_rig(by_bus: Callable[[], CommandOutcome], orders: list[StopOrder]) -> C
     began_s = time.monotonic()
     try:
         return by_bus()
-    except Fault as fault:
+    except (Fault, OSError) as error:
+        fault = error if isinstance(error, Fault) else Fault("NO_PEER", f"the bus failed: {error}; {_CUT_AMPLIFIER}")
         problems = "; ".join(order.problem for order in orders if order.problem)
         if not confirmed(orders, _BY_FILE_S):
             unconfirmed = "; the stop file of the rig is set, but the rig did not confirm it"

@@ -16,8 +16,7 @@ from bridge.log.watches.event_watch import CORE_PAUSE, PAUSE
 from bridge.plain import plain
 from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.block_numbers import WINDOW
-from bridge.wire.complaints import Complaints
+from bridge.wire.complaints import WINDOW, Complaints
 from bridge.wire.event_codes import FAILURE, SEVERITIES, TRIPS, WEAK_REASONS, event_code, harms
 from bridge.wire.messages import APPLIED, TRACE
 from bridge.wire.payloads import parsed

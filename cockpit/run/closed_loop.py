@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bridge.arrays import Floats, Records
+from bridge.guard.check import gain_report
 from bridge.guard.states import apply_order
 from bridge.kernel import kernel, unlocked_kernel
 from bridge.kernel_cache import compile_once
@@ -134,6 +135,12 @@ class ClosedLoop:
     def controller_state(self) -> Records:
         """The controller's memory."""
         return self._controller[1]
+
+    @property
+    def gain_report(self) -> str:
+        """The measured and the expected gain at each tone of the last loop check, as text."""
+        params, state = self._guard
+        return gain_report(params[0], state[0])
 
     def reconfigure(self, config: ControllerConfig) -> None:
         """Continue with another configuration of the controller and its present memory."""

@@ -27,7 +27,7 @@ from cockpit.run.scenario import Scenario, header
 from controller.node import obeyed
 from controller.replay import Change
 from controller.telemetry import SNAPSHOT_EVERY, STATE_EVERY, plotted, snapshot
-from controller.trips import trip_events as trips
+from controller.trips.trip_events import TripEvents
 from plant.node import no_number
 from plant.records import wide_limits
 
@@ -94,6 +94,7 @@ def run_onboard(
                 made = loop.advance(min(ends) - loop.block, events)
                 if written is not None:
                     written.result()
+                publish.gain_report = loop.gain_report  # after the last stretch was written
                 written = writer.submit(
                     _write, log, publish, loop.block, loop.block_ns, made, loop.controller_state.copy()
                 )
@@ -136,7 +137,8 @@ class _Events:
     def __init__(self, log: RunLog, judge: "RunJudge | None") -> None:
         self._log, self.judge = log, judge
         self._sequence = {"plant": 0, "controller": 0}
-        self._guard, self._trips = GuardEvents(), trips.TripEvents()
+        self.gain_report = ""  # of the last loop check
+        self._guard, self._trips = GuardEvents(lambda: self.gain_report), TripEvents()
 
     def __call__(self, source: str, t_ns: int, code: str, text: str) -> None:
         topic = PLANT_EVENT if source == "plant" else CONTROLLER_EVENT
@@ -152,7 +154,7 @@ class _Events:
         for row in changes(made.applied):
             block = int(made.applied["sequence"][row])
             events.setdefault(block, []).extend(("plant", *event) for event in self._guard.news(made.applied[row]))
-        for row in trips.changes(made.trace):
+        for row in changes(made.trace, "reason"):
             block = int(made.applied["sequence"][row])
             events.setdefault(block, []).extend(("controller", *event) for event in self._trips.news(made.trace[row]))
         return {block: news for block, news in events.items() if news}

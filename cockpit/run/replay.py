@@ -17,8 +17,9 @@ from bridge.log.metadata import configuration_of, table_of, texts_of
 from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import RESET, STOP
-from controller.config import ControllerConfig
+from controller.config import ControllerConfig, looser_limits
 from controller.replay import Change, OutOfOrder, Replay, ReplayDifference, Replayer, replay
+from plant.config import RigConfig
 
 if TYPE_CHECKING:
     from cockpit.run.in_process import TimedAction
@@ -288,6 +289,12 @@ def closed_loop(path: Path, settings: list[str], log: Path) -> Compared:
     # a rig without a guard counts as armed
     table["arm"] = int(run.sensors["guard_state"][0]) in {wire.NO_GUARD, wire.ARMED, wire.ACTIVE}
     table["controller"] = changes[0].config.model_dump(mode="json")
+    if (
+        "limits" not in plant
+    ):  # a log before the controller took the rig's limits, which held its vibration then as well
+        rig = validate(RigConfig, plant["rig"], path.name)
+        for name in looser_limits(changes[0].config.limits, rig.vibration_limits):
+            del table["controller"]["limits"][name]
     scenario = validate(Scenario, table, path.name)
     about = about_run(scenario, lockstep=True) | {
         "closed_loop_of": str(path),

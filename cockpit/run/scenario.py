@@ -17,7 +17,7 @@ from bridge.wire.payloads import SCHEMA_VERSION
 from bridge.wire.zenoh_link import BusConfig
 from cockpit.run.scenario_file import RIG_FILE, find, rig_table, with_rig
 from cockpit.run.sensor_needs import refuse_blind_sensors, refuse_out_of_travel
-from controller.config import ControllerConfig, candidate_frequencies_Hz
+from controller.config import ControllerConfig, within
 from plant.config import RigConfig
 from plant.config_limits import refuse_what_no_rig_does
 from plant.faults.kinds import PROCESS
@@ -71,32 +71,15 @@ class Scenario(Strict):
             of_rig, of_controller = getattr(solver, name), getattr(controller, name)
             if of_rig != of_controller:
                 raise ValueError(f"controller.{name} = {of_controller}: must equal rig.solver.{name} = {of_rig}")
-        # beyond its limits the rig would vibrate at another frequency than the controller commands and measures v_a at
-        candidates_Hz, piezo = candidate_frequencies_Hz(controller), self.rig.piezo
-        lowest_Hz, highest_Hz = candidates_Hz[0], candidates_Hz[-1]
-        for name, commanded_Hz, beyond in (
-            ("frequency_min_Hz", lowest_Hz, lowest_Hz < piezo.frequency_min_Hz),
-            ("frequency_max_Hz", highest_Hz, highest_Hz > piezo.frequency_max_Hz),
-        ):
-            rig_Hz, limit_Hz = getattr(piezo, name), getattr(controller.limits, name)
-            if beyond:
-                raise ValueError(
-                    f"controller.limits.{name} = {limit_Hz:g}: the controller would command {commanded_Hz:g} Hz, beyond "
-                    f"rig.piezo.{name} = {rig_Hz:g}; set it to {rig_Hz:g} as well"
-                )
-        for low_Hz, high_Hz in self.rig.guard.forbidden_Hz:
-            for candidate_Hz in candidates_Hz:
-                if low_Hz <= candidate_Hz <= high_Hz:
-                    raise ValueError(
-                        f"controller.limits.forbidden_Hz: the controller would command {candidate_Hz:g} Hz, which "
-                        f"rig.guard.forbidden_Hz = [{low_Hz:g}, {high_Hz:g}] ends in FAULT; forbid it to the controller as well"
-                    )
         refuse_out_of_travel(self.rig, self.duration_s)
         for table in self.fault:
             if 0.0 < self.duration_s <= table.from_s:
                 line = f"fault: {table.in_words()}: from_s = {table.from_s:g}: must be before the end of the run"
                 raise ValueError(f"{line}, duration_s = {self.duration_s:g}; begin it earlier, or run longer")
-        return self
+        try:
+            return self.model_copy(update={"controller": within(controller, self.rig.vibration_limits)})
+        except ValueError as error:
+            raise ValueError(f"controller.{error}") from None
 
 
 class _Runnable(Scenario):
@@ -186,6 +169,7 @@ def header(scenario: Scenario, role: str, lockstep: bool) -> wire.Header:
             "seed": scenario.seed,
             "duration_s": scenario.duration_s,
             "lockstep": lockstep,
+            "limits": scenario.rig.vibration_limits._asdict(),
         }
         if scenario.fault:
             configuration["fault"] = [table.model_dump(mode="json") for table in scenario.fault]

@@ -6,24 +6,20 @@ c near 0 with a small absolute sigma, and its force gives v_s although k_d itsel
 
 import math
 
-from bridge.kernel import kernel
+from bridge.kernel import hypot, kernel
 from bridge.layouts import ControllerMemory, ControllerParams
-from controller.estimate.windows import BINS, DRIVE, FEWEST, FORCE, SLIDE
+from controller.estimate.windows import DRIVE, FEWEST, FORCE, SLIDE
 
 # Least rate of the force over its noise in a window that shows c. Smaller: the noise of the force makes c too small; at 6 by
 # 1 / 6^2 = 3 % at most.
 _SIGMAS = 6.0
 _GIVEN_SIGMA = 0.5  # relative sigma of a configured stiffness: a data sheet without bearings and couplings
-_VOUCHED_SIGMA = (
-    0.05  # the same without a slide position, where nothing corrects it: a stick is then 10 sigma from sliding
-)
-_STEADY_S = 0.05  # duration of constant v_d until a climbing force bounds c
-# Relative sigma of c in one window, at least: the mass of the slide and the lag of the sensors bend the law. Smaller: one fast
-# slip outweighs a hundred sticks.
-_OF_WINDOW = 0.05
-_LEAST_SIGMA = 0.01  # least relative sigma of c
+# Least relative sigma of c, and of c in one window: the mass of the slide and the lag of the sensors bend the law. A configured
+# stiffness has it where only the force shows the slide. Smaller: one fast slip outweighs a hundred sticks.
+_LEAST_SIGMA = 0.05
+_STUCK = 0.1  # largest v_s / v_d of a stuck slide
 _FORGETS_S = 20.0  # time constant, of windows that show c, with which earlier windows are forgotten
-_LEARNT = 0.2  # largest relative sigma of a learnt c
+_LEARNT = 0.1  # largest relative sigma of a learnt c
 
 
 @kernel
@@ -41,28 +37,28 @@ def begin_spring(p: ControllerParams, s: ControllerMemory) -> None:
 @kernel
 def learn_compliance(p: ControllerParams, s: ControllerMemory, tick_s: float) -> None:
     """Learn c from the window with the least error of c, from rates, so that offsets cancel."""
-    if p.use_force == 0:
-        return
-    if position_weight(p, s, 0) == 0.0:
-        _bound_compliance(p, s)
+    if p.use_force == 0 or p.use_slide_position == 0:
         return
     best, variance = -1, math.inf
     for level in range(p.levels):
-        # over seconds the positions drift by more than the extrapolated white noise, which looks like a spring
-        if s.pushed[level] < 2 * BINS or (s.stiffness_learnt == 1 and s.differences[level] < FEWEST):
+        # drift over seconds, and hum in windows of about its period, exceed the extrapolated white noise and look like a spring
+        if s.differences[level] < FEWEST:
             break
         force, slide, drive = s.noise[FORCE, level], s.noise[SLIDE, level], s.noise[DRIVE, level]
-        rate = s.slope[FORCE, level]
-        # a slide position that never changes by a step is not connected, and would make every spring soft
-        if slide > 0.0 and math.fabs(rate) > _SIGMAS * force:
+        rate, drive_mps, slide_mps = s.slope[FORCE, level], s.slope[DRIVE, level], s.slope[SLIDE, level]
+        # hum of the force in windows that show no motion would make every spring stiff; a slide position that never changes by a
+        # step is not connected, and would make every spring soft
+        moves = math.fabs(drive_mps) > _SIGMAS * drive or math.fabs(slide_mps) > _SIGMAS * slide
+        if slide > 0.0 and moves and math.fabs(rate) > _SIGMAS * force:
             by_force = s.compliance_m_per_N * force
             now = (slide * slide + drive * drive + by_force * by_force) / (rate * rate)
             if now < variance:
                 best, variance = level, now
-    if best < 0:
+    if best < 0 or (s.stiffness_learnt == 1 and not _is_stuck(s, best)):
         return
     c = (s.slope[DRIVE, best] - s.slope[SLIDE, best]) / s.slope[FORCE, best]
-    weight = 1.0 / (variance + _OF_WINDOW * _OF_WINDOW * c * c)
+    least = _LEAST_SIGMA * max(math.fabs(c), s.compliance_m_per_N)
+    weight = 1.0 / (variance + least * least)
     share = min(tick_s / p.window_s[best], 1.0)  # successive windows overlap
     keep = 1.0 - tick_s / _FORGETS_S
     s.shown = keep * s.shown + share * weight
@@ -71,7 +67,7 @@ def learn_compliance(p: ControllerParams, s: ControllerMemory, tick_s: float) ->
     mean = s.shown_c / s.shown
     s.shown_square = keep * s.shown_square + share * weight * (c - mean) * (c - mean)
     wider = max(s.shown_square / s.shown_windows, 1.0)  # windows that scatter by more than their errors
-    sigma = max(math.sqrt(wider / s.shown), _LEAST_SIGMA * math.fabs(mean))
+    sigma = hypot(math.sqrt(wider / s.shown), _LEAST_SIGMA * mean)
     given = s.stiffness_learnt == 0 and math.isfinite(s.compliance_sigma) and p.drive_stiffness_N_per_m > 0.0
     if s.shown_windows > 1.0 and (not given or sigma < _GIVEN_SIGMA * math.fabs(mean)):
         s.compliance_m_per_N, s.compliance_sigma = max(mean, 0.0), sigma
@@ -79,25 +75,10 @@ def learn_compliance(p: ControllerParams, s: ControllerMemory, tick_s: float) ->
 
 
 @kernel
-def _bound_compliance(p: ControllerParams, s: ControllerMemory) -> None:
-    """Without a slide position: lower c to the bound of a climbing force, as no force climbs faster than v_d / c."""
-    if s.moving == 0 or s.steady_s < _STEADY_S:
-        return
-    climbs_N_per_s = 0.0
-    for level in range(p.levels):
-        if s.pushed[level] < 2 * BINS or s.differences[level] < FEWEST:
-            break
-        surely_N_per_s = s.direction * s.slope[FORCE, level] - _SIGMAS * s.sigma[FORCE, level]
-        climbs_N_per_s = max(climbs_N_per_s, surely_N_per_s)
-    if climbs_N_per_s * s.compliance_m_per_N > math.fabs(s.drive_velocity_mps):
-        s.compliance_m_per_N = math.fabs(s.drive_velocity_mps) / climbs_N_per_s
-        s.compliance_sigma = min(s.compliance_sigma, _GIVEN_SIGMA * s.compliance_m_per_N)
-
-
-@kernel
-def least_compliance(s: ControllerMemory) -> float:
-    """A lower bound of c [m/N]; 0 while c is unknown."""
-    return max(s.compliance_m_per_N - s.compliance_sigma, 0.0)
+def _is_stuck(s: ControllerMemory, level: int) -> bool:
+    """Whether the slide sticks on a moving drive: only this refines a learnt c, as a wrong position would soften it."""
+    drive_mps = math.fabs(s.slope[DRIVE, level])
+    return drive_mps > _SIGMAS * s.noise[DRIVE, level] and math.fabs(s.slope[SLIDE, level]) < _STUCK * drive_mps
 
 
 @kernel
@@ -149,13 +130,12 @@ def position_weight(p: ControllerParams, s: ControllerMemory, level: int) -> flo
 @kernel
 def force_weight(p: ControllerParams, s: ControllerMemory, level: int) -> float:
     """Weight of v_s by the force in a window: 1 over its variance; 0 without a force, or without any knowledge of c."""
-    noise_N_per_s, sigma_mps = s.noise[FORCE, level], s.drive_velocity_sigma_mps
-    if p.use_force == 0 or noise_N_per_s == 0.0 or not math.isfinite(s.compliance_sigma):
+    noise_N_per_s, sigma_c = s.noise[FORCE, level], s.compliance_sigma
+    if p.use_force == 0 or noise_N_per_s == 0.0 or not math.isfinite(sigma_c):
         return 0.0
-    by_noise = s.compliance_m_per_N * noise_N_per_s
-    sigma_c = s.compliance_sigma
-    if position_weight(p, s, level) == 0.0:
-        sigma_c = min(sigma_c, _VOUCHED_SIGMA * s.compliance_m_per_N)
+    if position_weight(p, s, level) == 0.0:  # nothing else shows the slide
+        sigma_c = min(sigma_c, _LEAST_SIGMA * s.compliance_m_per_N)
     # sigma_c counts with the noise of F', too: else a force without a rate would show an exact velocity
     by_compliance = sigma_c * max(math.fabs(s.slope[FORCE, level]), noise_N_per_s)
-    return 1.0 / max(by_noise * by_noise + by_compliance * by_compliance + sigma_mps * sigma_mps, 1e-24)
+    sigma_mps = hypot(by_compliance, s.drive_velocity_sigma_mps)
+    return 1.0 / max(sigma_mps * sigma_mps + (s.compliance_m_per_N * noise_N_per_s) ** 2, 1e-24)

@@ -7,15 +7,13 @@ The noise of a level is measured: the slopes of three successive windows lie on 
 deviation), so it contains hum, drift and quantisation as well as white noise, but not a swing that is slow against the window.
 The scale is the lower quartile of the deviations, which a minority of disturbances by slips and re-sticks changes little.
 
-A slide that swings with about the period of the windows bends their slopes as noise does, but in force and position alike, by
-the spring's law x_d' - x_s' = F' / k_d. So the deviation from this law and the drive's noise together bound the noise from above.
+A vibrated slide that swings with about the period of the windows bends their slopes as noise does, but in force and position
+alike, by the spring's law x_d' - x_s' = c F'. So the deviation from this law and the drive's noise together bound the noise.
 """
 
 import math
 
-import numpy as np
-
-from bridge.kernel import Record, kernel
+from bridge.kernel import hypot, kernel
 from bridge.layouts import ControllerMemory, ControllerParams
 
 BINS = 4  # bins in a window; a power of 2
@@ -25,16 +23,14 @@ FORCE, SLIDE, DRIVE = 0, 1, 2  # rows: drive force [N], slide position [m], driv
 ROWS = 3
 _OF_BEND = 6.0**-0.5  # sigma of a slope over the sigma of a - 2 b + c of three successive slopes
 _QUARTILE = 0.3186  # lower quartile of |d| of a normal distribution, over its sigma
-_WHITE = 2.0**-1.5  # noise of a slope over the noise at half the window, for white noise
-# Differences until the level's measured noise is used; before, the noise of shorter windows is extrapolated as white noise.
+WHITE = 2.0**-1.5  # noise of a slope over the noise at half the window, for white noise
+# Differences until the level's measured noise is used, and at which it counts twice; before, the noise of shorter windows is
+# extrapolated as white noise. Smaller: with 7 a resting drive moves once in the first second of one run of eight. Larger: the
+# start of a run is seen later, by 5 ms from 7 to 10.
 FEWEST = 10
 WELL_KNOWN = 40  # differences after which the error of a level's noise is only some per cent
-_CARRIED = 1.3  # factor of extrapolated noise: ten differences have an error of 20 %, and no noise is quite white
-_FIRST_SHARE, _LEAST_SHARE = 4.0, 0.005  # change of log sigma: first, and least, at which sigma scatters by 6 %
-_LEAST_SHARE_OF_LAW = 0.02  # least change for the deviation from the spring's law, whose stiffness is still learnt
-# Factors of sigma at the least changes, and the number of differences after which they apply.
-_UP, _MANY = math.exp(0.25 * _LEAST_SHARE), round(_FIRST_SHARE / _LEAST_SHARE)
-_UP_OF_LAW, _MANY_OF_LAW = math.exp(0.25 * _LEAST_SHARE_OF_LAW), round(_FIRST_SHARE / _LEAST_SHARE_OF_LAW)
+_LEAST_STEP = 0.00125  # least relative change of sigma by a difference, at which it scatters by 6 %
+SIGMAS = 6.0  # detection limit of every window: error rate of 1e-9, one in 100 hours of windows of 1 ms at most
 # A quantisation step q causes an error of a slope of at most q / W in a window W; its sigma is 0.29 of that.
 OF_STEP = 0.29
 
@@ -80,32 +76,34 @@ def _note_window(p: ControllerParams, s: ControllerMemory, level: int, learn: bo
     """Use the slopes of a window that begins at the end of the last window: their differences give the noise."""
     slope, before, sigma = s.slope, s.slope_before, s.sigma
     if learn:
-        both = p.use_force == 1 and p.use_slide_position == 1 and s.stiffness_learnt == 1
+        has_law = p.use_force == 1 and p.use_slide_position == 1 and s.stiffness_learnt == 1
         s.differences[level] += 1
-        count = s.differences[level]
-        up = _UP if count >= _MANY else math.exp(0.25 * max(_FIRST_SHARE / count, _LEAST_SHARE))
         law_mps = 0.0
         for row in range(ROWS):
             bend = slope[row, level] - 2.0 * before[row, level, 0] + before[row, level, 1]
             law_mps += bend * (s.compliance_m_per_N if row == FORCE else 1.0 if row == SLIDE else -1.0)
-            sigma[row, level] = _moved(sigma[row, level], math.fabs(bend) * _OF_BEND, up, count)
-        if both:
+            sigma[row, level] = _moved(sigma[row, level], math.fabs(bend), s.differences[level])
+        if has_law:
             s.agreements[level] += 1
-            count = s.agreements[level]
-            up = _UP_OF_LAW if count >= _MANY_OF_LAW else math.exp(0.25 * _FIRST_SHARE / count)
-            s.law_mps[level] = _moved(s.law_mps[level], math.fabs(law_mps) * _OF_BEND, up, count)
-        _note_noise(p, s, level, both)
+            s.law_mps[level] = _moved(s.law_mps[level], math.fabs(law_mps), s.agreements[level])
+        _note_noise(p, s, level)
+        if has_law and s.allowed_m > 0.0:  # without vibration the swing after a slip would count as further slips
+            off_mps = hypot((1.0 + FEWEST / s.agreements[level]) * s.law_mps[level], s.noise[DRIVE, level])
+            s.noise[FORCE, level] = min(s.noise[FORCE, level], off_mps / s.compliance_m_per_N)
+            s.noise[SLIDE, level] = min(s.noise[SLIDE, level], off_mps)
     for row in range(ROWS):
         before[row, level, 1] = before[row, level, 0]
         before[row, level, 0] = slope[row, level]
 
 
 @kernel
-def _moved(sigma: float, apart: float, up: float, count: int) -> float:
-    """The scale after a further difference `apart`: a step `up`, or three steps down; balanced at the lower quartile."""
-    if count <= 4 or sigma == 0.0:  # the scale begins as the mean of the first four
-        return sigma + (1.25 * apart - sigma) / min(count, 4)
-    return sigma / (up * up * up) if apart < _QUARTILE * sigma else sigma * up
+def _moved(sigma: float, bend: float, count: int) -> float:
+    """Sigma after difference number `count`: a step up, or three steps down, which are balanced at the lower quartile."""
+    bend *= _OF_BEND
+    if count <= 4 or sigma == 0.0:  # sigma begins as the mean of the first four
+        return sigma + (1.25 * bend - sigma) / min(count, 4)
+    up = 1.0 + max(1.0 / count, _LEAST_STEP)
+    return sigma * up if bend > _QUARTILE * sigma else sigma / (up * up * up)
 
 
 @kernel
@@ -116,35 +114,14 @@ def clear_windows(s: ControllerMemory) -> None:
 
 
 @kernel
-def _note_noise(p: ControllerParams, s: ControllerMemory, level: int, both: bool) -> None:
+def _note_noise(p: ControllerParams, s: ControllerMemory, level: int) -> None:
     """Set the noise of the slopes of a level, and of longer windows whose noise is not measured yet."""
-    for row in range(ROWS):
-        for i in range(level, p.levels):
-            if s.differences[i] >= FEWEST:
-                if i > level:
-                    break
-                measured = s.sigma[row, i]
-            elif i > 0 and s.noise[row, i - 1] > 0.0:
-                measured = s.noise[row, i - 1] * _WHITE * (_CARRIED if s.differences[i - 1] >= FEWEST else 1.0)
-            else:
-                break
+    for i in range(level, p.levels):
+        count = s.differences[i]
+        if i > level and count >= FEWEST:
+            return
+        for row in range(ROWS):
+            extrapolated = WHITE * s.noise[row, i - 1] if i > 0 else 0.0
+            known = s.sigma[row, i] * (1.0 + FEWEST / count) if count >= FEWEST else extrapolated
             step = OF_STEP * s.resolution[row] / p.window_s[i]
-            s.noise[row, i] = math.sqrt(measured * measured + step * step)
-    # only under vibration: without it the swing after a slip would count as further slips
-    if both and s.allowed_m > 0.0 and s.agreements[level] >= WELL_KNOWN:
-        off_mps = math.sqrt(s.law_mps[level] * s.law_mps[level] + s.noise[DRIVE, level] * s.noise[DRIVE, level])
-        s.noise[FORCE, level] = min(s.noise[FORCE, level], off_mps / s.compliance_m_per_N)
-        s.noise[SLIDE, level] = min(s.noise[SLIDE, level], off_mps)
-
-
-@kernel
-def note_steps(s: ControllerMemory, row: int, samples: Record) -> None:
-    """Learn the quantisation step of a row: the smallest change from sample to sample."""
-    last = np.float64(samples[0])
-    for i in range(1, samples.shape[0]):
-        value = np.float64(samples[i])
-        change = math.fabs(value - last)
-        # float32 in a message rounds each value by 1e-7, so smaller changes are not steps
-        if change > 2e-7 * math.fabs(value) and (s.resolution[row] == 0.0 or change < s.resolution[row]):
-            s.resolution[row] = change
-        last = value
+            s.noise[row, i] = math.sqrt(known * known + step * step) if known > 0.0 or count >= FEWEST else 0.0

@@ -1,7 +1,7 @@
 """When to vibrate, and how strongly. A wrong policy does no harm, as `limits` bounds the vibration.
 
 WATCH   no vibration; a stick or a slip leads to EXCITE at once: an early release is a small slip, a late release a large slip
-EXCITE  hold v_a at a ratio to v_d that falls step by step to the least that is needed, and rises at every stick, slip or surge
+EXCITE  hold v_a at a ratio to v_d that follows the swing of friction, and rises at every slip or surge
 PROBE   a trial without vibration: `controller.policy.trial`
 """
 
@@ -9,140 +9,102 @@ import math
 
 from bridge.kernel import kernel
 from bridge.layouts import ControllerMemory, ControllerParams
-from bridge.wire.stickslip_pb2 import (
-    ACTIVE,
-    ARMED,
-    BLIND,
-    DISABLED,
-    EXCITE,
-    MOVING,
-    NEEDED_BEFORE,
-    NO_GUARD,
-    PROBE,
-    SMOOTH,
-    STICK,
-    STICK_SEEN,
-    STOPPED,
-    WATCH,
-)
+from bridge.wire import stickslip_pb2 as wire
 from controller.announced import announced_ahead
 from controller.config import MODES
-from controller.estimate.compliance import slide_mps
-from controller.estimate.windows import BINS
+from controller.exciter import accept_weaker
 from controller.in_force import is_settled
-from controller.policy.fall import WINDOW_S, has_fallen
-from controller.policy.modes import enter, excite
-from controller.policy.need import (
+from controller.policy.need import is_needed, is_needless, note_needed, note_needless, way_of
+from controller.policy.ratio import follow_swing, note_swing, raise_ratio, settling_s, swing_held
+from controller.policy.trial import (
+    AT_END,
+    HELPLESS,
     STEADY_S,
-    follow_swing,
-    grows,
-    is_needed,
-    is_needless,
-    is_wound_up,
-    largest_ratio,
-    needless_from_mps,
-    note_needed,
-    note_needless,
-    raise_ratio,
-    settling_s,
-    swing_held,
-    way_of,
+    WINDOW_S,
+    begin_trial,
+    calm_s,
+    follow_trial,
+    has_fallen,
+    is_due,
+    length_s,
 )
-from controller.policy.trial import begin_trial, follow_trial, is_due
-from controller.trips.band import accept_weaker
 from controller.trips.doubts import CONTACT
 
 TWO_PI = 2.0 * math.pi
-ON_DEMAND, WHILE_MOVING = range(len(MODES))
+WHILE_MOVING = MODES.index("moving")
 
-_STICK_STEP, _SLIP_STEP = 0.08, 0.4  # rise of the ratio at a stick, and at a slip or a surge
-# Duration of the start of a move; force over sliding force from which the spring is wound up; factor on the ratio until then.
-_STARTS_S, _WOUND, _AHEAD = 0.2, 0.5, 1.25
-_BEGINS_S = 0.02  # first part of a move, in which the spring's force decides whether it is wound up
-_RISING = 1.05  # `held_mps` over measured |v_d| above which the drive slows down
-_ABOVE_SLIDE = 1.1  # least v_a over v_s of a slide that slows down after its drive
+_STEP = 0.4  # rise of the ratio at a slip or a surge
+# Factor on `v_ratio` until the slide follows a v_d that changes, as at a reversal: the measured v_d lags, and v_a must exceed v_d
+# at the breakaway. 1.0: slips at three of four starts of a stiff axis. For all of each start: surges of a wound-up spring.
+_AHEAD = 1.25
 _TURNING_S = 0.05  # longest rest of a drive at a reversal
-_STARTING_S = 0.15  # first part of a vibration, in which slips do not count: they release the force stored before
-_LOOK_STEPS = 16  # steps between two selections of the windows in which the swing of v_s is measured
-# Of these windows: largest noise of v_s over v_d, fewest periods of the exciter.
-_OF_SWING, _EXCITER_PERIODS = 0.02, 2.0
-_LEAST_SLIDING = 0.5  # least mean v_s over v_d; a slower slide gives no information on the swing of friction
-_EVEN = 0.1  # largest deviation of v_s from v_d, over v_d, of a slide that follows
-# Memory of a swing of friction: two periods of the slowest swing that the spring does not level out; 10 s at most, for energy.
-_PERIODS, _SHORTEST_S, _LONGEST_S = 2.0, 0.5, 10.0
-_REMEMBERED_S = 30.0  # time after a slip under vibration until their count restarts
-_FEWEST = 3  # fewest slips or surges until they are reported: the first raise the ratio
-_USELESS_S, _STICKS = 2.0, 4.0  # least time, and number of expected sticks, without a slip until a v_a below v_d ends
-_AT_DRIVE = 1.1  # measured v_a over v_d up to which a stick shows a weak exciter
-_HELPLESS = 8  # slips under vibration until a trial shows whether the vibration helps
+# Loop delays that are added to STEADY_S after the vibration began, and after each rise of the ratio: slips in this time do not
+# count, as they release force that was stored before.
+_DELAYS = 12.0
+_REMEMBERED_S = 30.0  # time constant with which the count of slips under vibration decays
 
 
 @kernel
 def decide(p: ControllerParams, s: ControllerMemory, t_ns: int, force_N: float, block_s: float) -> None:
     """Set the mode, and the wanted vibration velocity amplitude [m/s]."""
-    s.mode_s += block_s
-    way = way_of(s)
-    for i in range(2):
-        s.off_left_s[i] = max(s.off_left_s[i] - block_s, 0.0)
-    s.failed_left_s = max(s.failed_left_s - block_s, 0.0)
     speed_mps = math.fabs(s.drive_velocity_mps)
     ahead_mps = announced_ahead(s, t_ns, t_ns + round(1e9 * _look_ahead_s(p, s)))
     s.wanted_speed_mps = max(speed_mps, s.rising_mps, math.fabs(ahead_mps))
-    sliding_mps = _still_sliding_mps(s)
     if s.moving == 0 and ahead_mps != 0.0:
         s.direction = 1 if ahead_mps > 0.0 else -1
-        way = way_of(s)
-    if s.moving == 1 and s.steady_s > STEADY_S and s.allowed_m == 0.0 and has_fallen(p, s):
+    way, even = way_of(s), s.moving == 1 and s.steady_s > STEADY_S
+    s.mode_s += block_s
+    s.waiting_s = max(s.waiting_s - block_s, 0.0)
+    if s.mode != wire.PROBE:  # a trial reads this count at its end
+        s.failed *= 1.0 - block_s / _REMEMBERED_S
+    for i in range(2):
+        s.off_left_s[i] = max(s.off_left_s[i] - block_s, 0.0)
+    if even and s.allowed_m == 0.0 and has_fallen(p, s):
         note_needed(s, speed_mps)
+    rests = s.moving == 0 and s.stood_s > _TURNING_S and ahead_mps == 0.0
     if s.stopped == 1:
-        enter(s, STOPPED)
-    elif s.guard_state not in (NO_GUARD, ARMED, ACTIVE) or t_ns < p.enabled_from_ns:
-        enter(s, DISABLED)
-    elif s.mode in (DISABLED, STOPPED) or (
-        s.moving == 0 and s.measured == 1 and s.stood_s > _TURNING_S and ahead_mps == 0.0
-    ):
-        enter(s, WATCH)
+        enter(p, s, wire.STOPPED)
+    elif s.guard_state not in (wire.NO_GUARD, wire.ARMED, wire.ACTIVE) or t_ns < p.enabled_from_ns:
+        enter(p, s, wire.DISABLED)
+    elif s.mode in (wire.DISABLED, wire.STOPPED) or rests:
+        enter(p, s, wire.WATCH)
 
-    if s.mode == WATCH:
-        _watch(p, s, way, force_N, speed_mps, ahead_mps)
-    elif s.mode == EXCITE:
-        _hold(p, s, way, force_N, speed_mps, block_s)
-    elif s.mode == PROBE and s.moving == 1 and follow_trial(p, s, force_N, speed_mps):
-        excite(p, s, s.why, p.v_ratio)
+    if s.mode == wire.WATCH:
+        why = _why(p, s, way, even, speed_mps if s.moving == 1 else math.fabs(ahead_mps))
+        if why != wire.NO_REASON:
+            s.why = why
+            if p.mode == WHILE_MOVING or not is_due(p, s, speed_mps):
+                enter(p, s, wire.EXCITE)
+            elif s.moving == 1:
+                begin_trial(p, s, force_N, speed_mps)
+    elif s.mode == wire.EXCITE:
+        _hold(p, s, way, even, force_N, speed_mps, block_s)
+    elif s.mode == wire.PROBE and s.moving == 1:
+        enter(p, s, follow_trial(p, s, force_N, speed_mps))
     s.ratio_now = 0.0
-    if s.mode == EXCITE:
-        s.ratio_now = _held_ratio(p, s, way, force_N, speed_mps)
-    elif s.mode == PROBE:
+    if s.mode == wire.EXCITE:
+        least = 1.0 if even else p.v_ratio * _AHEAD if s.contact != wire.SMOOTH else p.v_ratio
+        s.ratio_now = max(s.ratio[way], least)
+    elif s.mode == wire.PROBE:
         s.ratio_now = s.fade
     s.wanted_velocity_mps = s.ratio_now * s.wanted_speed_mps
-    if s.mode == EXCITE:
-        s.wanted_velocity_mps = max(s.wanted_velocity_mps, _ABOVE_SLIDE * sliding_mps)
 
 
 @kernel
-def _still_sliding_mps(s: ControllerMemory) -> float:
-    """Velocity of a slide that still slows down after its drive: v_a must not fall below it, or the slide sticks.
-
-    Only a decrease counts: the vibration releases a slide that speeds up, and more v_a would release it more.
-    """
-    if s.steady_s > STEADY_S or s.mode != EXCITE or s.mode_s < STEADY_S:
-        s.late_mps = math.inf
-        return 0.0
-    s.late_mps = min(s.late_mps, s.held_mps if s.level < 0 else min(math.fabs(s.sliding_mps), s.held_mps))
-    return s.late_mps
+def enter(p: ControllerParams, s: ControllerMemory, mode: int) -> None:
+    """Set the mode; a change restarts its times, and a vibration holds the swing of friction that its ratio holds."""
+    if s.mode == mode:
+        return
+    s.mode, s.mode_s = mode, 0.0
+    s.even_s, s.top = 0.0, -1.0
+    if mode == wire.EXCITE:
+        s.swing = max(s.swing, swing_held(s.ratio[way_of(s)]))
+        s.waiting_s = _releases_s(p, s)
 
 
 @kernel
-def _held_ratio(p: ControllerParams, s: ControllerMemory, way: int, force_N: float, speed_mps: float) -> float:
-    """The ratio in EXCITE. The measured v_d lags by a window, so a drive that speeds up needs a larger ratio."""
-    if s.steady_s > STEADY_S or s.held_mps > _RISING * speed_mps:
-        return s.ratio[way]
-    # more v_a only until the spring is wound up; after that the slide would run ahead
-    if s.moved_s <= _BEGINS_S:
-        s.wound = 1 if s.direction * force_N >= _WOUND * s.slid_N[way] else 0
-    starts = s.moved_s < _STARTS_S and s.wound == 0
-    ahead = max(s.ratio[way], p.v_ratio) * (_AHEAD if starts else 1.0)
-    return max(s.ratio[way], min(ahead, largest_ratio(p, s, way)))
+def _releases_s(p: ControllerParams, s: ControllerMemory) -> float:
+    return STEADY_S + _DELAYS * s.loop_delay_steps * p.block_s
 
 
 @kernel
@@ -151,159 +113,81 @@ def _look_ahead_s(p: ControllerParams, s: ControllerMemory) -> float:
 
     For a moving drive it is the loop delay alone, as an early v_a would release a slide that a smaller v_a holds.
     """
-    delay_s = (max(s.loop_delay_steps, 0) + 1) * p.block_s
+    delay_s = (s.loop_delay_steps + 1) * p.block_s
     if s.moving == 1:
         return delay_s
-    largest_m = (
-        min(p.amplitude_max_m, p.velocity_max_mps / (TWO_PI * s.wanted_Hz)) if s.tuned == 1 else p.amplitude_max_m
-    )
+    largest_m = min(p.amplitude_max_m, p.velocity_max_mps / (TWO_PI * p.frequency_Hz))
     return delay_s + largest_m / p.slew_m_per_step * p.block_s
 
 
 @kernel
-def _watch(
-    p: ControllerParams,
-    s: ControllerMemory,
-    way: int,
-    force_N: float,
-    speed_mps: float,
-    ahead_mps: float,
-) -> None:
+def _why(p: ControllerParams, s: ControllerMemory, way: int, even: bool, speed_mps: float) -> int:
+    """The reason for which a vibration begins at a |v_d|, present or announced; NO_REASON: none begins."""
     if s.moving == 0:
-        if ahead_mps != 0.0 and (p.mode == WHILE_MOVING or is_needed(s, math.fabs(ahead_mps))):
-            _begin(p, s, NEEDED_BEFORE, 0.0, force_N, math.fabs(ahead_mps))
-        return
-    steady = s.steady_s > STEADY_S
+        needed = speed_mps > 0.0 and (p.mode == WHILE_MOVING or is_needed(s, speed_mps))
+        return wire.NEEDED_BEFORE if needed else wire.NO_REASON
     if s.off_left_s[way] > 0.0:
-        return
+        return wire.NO_REASON
     if p.mode == WHILE_MOVING:
-        excite(p, s, MOVING, p.v_ratio)
-    elif s.doubted & CONTACT:
-        excite(p, s, BLIND, p.v_ratio)
-    elif is_needed(s, speed_mps):
-        _begin(p, s, NEEDED_BEFORE, 0.0, force_N, speed_mps)
-    elif needless_from_mps(s) > 0.0 and not steady:
-        pass  # a pair that needs no vibration may stick while the drive speeds up or slows down
-    elif is_needless(s, speed_mps):
-        pass  # a fall of the force ends this result
-    elif s.blind == 1:
-        _begin(p, s, BLIND, p.v_ratio, force_N, speed_mps)
-    elif s.slip_began == 1 or s.contact == STICK:
-        _begin(p, s, STICK_SEEN, p.v_ratio, force_N, speed_mps)
+        return wire.MOVING
+    if s.doubted & CONTACT:
+        return wire.BLIND
+    if is_needed(s, speed_mps):
+        return wire.NEEDED_BEFORE
+    # a pair that needs no vibration may stick while v_d changes; a fall of the force ends this result
+    if is_needless(s, speed_mps if even else math.inf):
+        return wire.NO_REASON
+    if s.blind == 1:
+        return wire.BLIND
+    return wire.STICK_SEEN if s.slip_began == 1 or s.contact == wire.STICK else wire.NO_REASON
 
 
 @kernel
-def _begin(p: ControllerParams, s: ControllerMemory, why: int, ratio: float, force_N: float, speed_mps: float) -> None:
-    """Begin the vibration of a move, or its trial without vibration if one is due."""
-    if p.mode == WHILE_MOVING or not is_due(p, s, speed_mps):
-        excite(p, s, why, ratio)
-    elif s.moving == 1:
-        begin_trial(p, s, force_N, speed_mps, 0)
-
-
-@kernel
-def _hold(p: ControllerParams, s: ControllerMemory, way: int, force_N: float, speed_mps: float, block_s: float) -> None:
-    starting_s = _STARTING_S + 12.0 * max(s.loop_delay_steps, 0) * block_s
-    s.waiting_s = max(s.waiting_s - block_s, 0.0)
-    changed = s.steady_s < STEADY_S  # the slide may still lag behind a change of the drive
-    # before its first even sliding a slide may stick because its spring still winds up, except at the exciter's limit
-    sticks = s.stick_began == 1 and (s.even_s > 0.0 or s.at_limit == 1)
-    settled = is_settled(s, 0.0)
-    begun = (s.slip_began == 1 or sticks) and not changed and settled
-    late = s.vibration_velocity_mps < _AT_DRIVE * speed_mps
-    if (s.slip_began == 1 or s.stick_began == 1) and s.banded == 1 and late and settled:
+def _hold(
+    p: ControllerParams, s: ControllerMemory, way: int, even: bool, force_N: float, speed_mps: float, block_s: float
+) -> None:
+    """Adapt the ratio of a vibration, and begin its trials."""
+    judged = is_settled(s, 0.0)
+    begun = s.slip_began == 1 or s.stick_began == 1
+    if judged and begun and s.banded == 1 and s.vibration_velocity_mps < p.least_ratio * speed_mps:
         accept_weaker(p, s)
-    if s.mode_s > starting_s and begun and s.waiting_s == 0.0:
-        if s.slip_began == 1:
-            note_needed(s, speed_mps)
-            s.proven[way] = 1
-            _note_failure(s)
-        s.waiting_s = max(0.05, 3.0 * s.window_s, 2.0 * max(s.loop_delay_steps, 0) * block_s)
-        _more(p, s, way, _SLIP_STEP if s.slip_began == 1 else _STICK_STEP)
-    if changed:
+    if judged and s.slip_began == 1 and even and s.waiting_s == 0.0:
+        note_needed(s, speed_mps)
+        s.failed += 1.0
+        s.waiting_s = _releases_s(p, s)
+        if s.at_limit == 0:
+            raise_ratio(p, s, _STEP)
+    if not even:
         s.swing = max(s.swing, swing_held(p.v_ratio))  # at a new speed the ratio falls from the set point
-        s.even_s, s.lead, s.top = 0.0, 0.0, -1.0
+        s.even_s, s.top = 0.0, -1.0
     settle_s = settling_s(p, s, force_N, speed_mps)
-    s.lead *= max(1.0 - block_s / settle_s, 0.0)
-    settled = is_settled(s, settle_s)
-    if s.level >= 0 and s.mode_s > starting_s and not changed and s.waiting_s == 0.0 and settled:
-        _note_swing(p, s, force_N, speed_mps, block_s, settle_s)
-    if s.contact == SMOOTH and s.mode_s > starting_s and s.at_limit == 0 and settled:
-        follow_swing(p, s, block_s, settle_s)
+    if even and s.waiting_s == 0.0 and is_settled(s, settle_s):
+        if s.level >= 0:
+            note_swing(p, s, speed_mps, block_s, settle_s)
+        if s.contact == wire.SMOOTH and s.at_limit == 0:
+            follow_swing(p, s, block_s, settle_s)
     if p.mode == WHILE_MOVING or s.moving == 0:
         return
     s.untried_s[way] += block_s
-    follows = (s.contact == SMOOTH or s.blind == 1) and s.steady_s > STEADY_S and s.slip_began == 0
-    if s.failed >= _HELPLESS and not changed and s.untried_s[way] > s.off_s[way]:
-        s.failed = _FEWEST
-        begin_trial(p, s, force_N, speed_mps, 1)
-    elif follows and s.calm_s > 2.0 * WINDOW_S and is_due(p, s, speed_mps):
-        begin_trial(p, s, force_N, speed_mps, 0)
-    elif _is_useless(s) and follows and not is_needed(s, speed_mps) and s.doubted & CONTACT == 0:
-        # below v_d a vibration does not reduce friction that is the same at every speed, and the slide slides
+    follows = even and (s.contact == wire.SMOOTH or s.blind == 1)
+    helpless = even and s.failed > HELPLESS and s.untried_s[way] > s.off_s[way]
+    if helpless or (follows and calm_s(s) > 2.0 * WINDOW_S and is_due(p, s, speed_mps)):
+        begin_trial(p, s, force_N, speed_mps)
+    # below v_d a vibration does not reduce friction that is the same at every speed, and the slide slides; at first it did, where
+    # v_a reached v_d
+    elif (
+        follows
+        and min(calm_s(s), s.weak_s) > length_s(s)
+        and s.vibration_velocity_mps < speed_mps
+        and min(s.mode_s, s.steady_s) < s.weak_s + WINDOW_S
+        and s.doubted & CONTACT == 0
+        and not is_needed(s, speed_mps)
+    ):
         note_needless(s, speed_mps)
-        enter(s, WATCH)
-
-
-@kernel
-def _note_swing(
-    p: ControllerParams, s: ControllerMemory, force_N: float, speed_mps: float, block_s: float, settle_s: float
-) -> None:
-    """Update the swing of friction from the swing of v_s, without the swing caused by the ratio."""
-    share = min(block_s / min(max(_PERIODS * TWO_PI * settle_s, _SHORTEST_S), _LONGEST_S), 1.0)
-    if s.steps % _LOOK_STEPS == 0 or s.swing_level < 0:
-        s.swing_level = _swing_level(p, s, speed_mps)
-    if s.swing_level < 0:
-        return
-    sliding_mps, sigma_mps = slide_mps(p, s, s.swing_level, speed_mps)
-    off, noise = sliding_mps / speed_mps - 1.0 - s.lead, 3.0 * sigma_mps / speed_mps
-    if is_wound_up(s, settle_s):
-        s.swing *= 1.0 - share
-    if math.fabs(off) < _EVEN + noise:
-        s.even_s += block_s
-        s.slid_N[way_of(s)] = s.direction * force_N
-    s.top = max(s.top * (1.0 - share) if s.top > 0.0 else s.top, off)
-    beyond, middle = max(off, 0.5 * (s.top - off)) - noise, 1.0 + 0.5 * (s.top + off)
-    if beyond > 0.0 and middle > _LEAST_SLIDING:
-        at_slide = max(s.ratio_now / middle, p.least_ratio)
-        s.swing = max(s.swing, beyond / middle * grows(at_slide))
-
-
-@kernel
-def _swing_level(p: ControllerParams, s: ControllerMemory, speed_mps: float) -> int:
-    """The level of the shortest windows that show the swing of v_s; -1: no level."""
-    for level in range(p.levels):
-        if s.pushed[level] < BINS:
-            return -1
-        shows = p.window_s[level] * s.allowed_Hz >= _EXCITER_PERIODS
-        if shows and slide_mps(p, s, level, speed_mps)[1] <= _OF_SWING * speed_mps:
-            return level
-    return -1
-
-
-@kernel
-def _more(p: ControllerParams, s: ControllerMemory, way: int, by: float) -> None:
-    """Raise the ratio of a vibration that is not enough, if the exciter allows it."""
-    if s.at_limit == 0 and s.ratio[way] < p.most_ratio:
-        raise_ratio(p, s, by)
-        return
-    s.calm_s = 0.0
-
-
-@kernel
-def _is_useless(s: ControllerMemory) -> bool:
-    """Whether v_a has been below v_d since the vibration began, for a time in which several sticks were expected."""
-    return s.weak_s > max(_USELESS_S, _STICKS * s.expected_stick_s, s.mode_s - _USELESS_S)
-
-
-@kernel
-def _note_failure(s: ControllerMemory) -> None:
-    """Count a slip or surge under vibration; the first raises the ratio, and further ones show that this is not enough."""
-    s.failed = s.failed + 1 if s.failed_left_s > 0.0 else 1
-    s.failed_left_s = _REMEMBERED_S
+        enter(p, s, wire.WATCH)
 
 
 @kernel
 def slips_at_end(s: ControllerMemory) -> bool:
     """Whether slips or surges repeat under vibration."""
-    return s.failed >= _FEWEST and s.failed_left_s > 0.0
+    return s.failed > AT_END

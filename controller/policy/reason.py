@@ -4,32 +4,10 @@ import math
 
 from bridge.kernel import kernel
 from bridge.layouts import ControllerMemory
-from bridge.wire.stickslip_pb2 import (
-    ACTIVE,
-    ARMED,
-    BLIND,
-    CANNOT_HELP,
-    DISABLED,
-    DRIVE_STANDS,
-    EXCITE,
-    EXCITER_END,
-    GAIN_OTHER,
-    JUMPED,
-    NO_GUARD,
-    NOISE,
-    NOT_ARMED,
-    NOT_ENABLED,
-    NOT_NEEDED,
-    NOTHING_TO_DO,
-    PROBE,
-    RESONANCE,
-    STOPPED,
-    TRAVEL_END,
-    TRIAL,
-)
+from bridge.wire import stickslip_pb2 as wire
+from controller.estimate.channels import has_jumped, is_noisy
 from controller.policy.decide import slips_at_end
 from controller.policy.need import is_needless, way_of
-from controller.trips.delivered import is_loud
 
 WEAK_S = 0.05  # time of too small a v_a at the exciter's end until it is reported
 
@@ -40,26 +18,28 @@ def reason_of(s: ControllerMemory) -> int:
     if s.trip > 0:
         return s.trip
     if s.outside == 1:
-        return TRAVEL_END
-    if is_loud(s):
-        return RESONANCE
-    if s.jumped_s > 0.0:
-        return JUMPED
-    if s.gain_other_s > 0.0:
-        return GAIN_OTHER
-    if s.noise_told_s > 0.0 or s.unbelieved_s > 0.0:
-        return NOISE
-    if s.mode in (DISABLED, STOPPED):
-        armed = s.guard_state in (NO_GUARD, ARMED, ACTIVE)
-        return NOT_ENABLED if armed or s.mode == STOPPED else NOT_ARMED
-    if s.mode == PROBE:
-        return TRIAL
-    if s.mode == EXCITE:
-        if s.weak_s > WEAK_S or slips_at_end(s):
-            return EXCITER_END
-        return BLIND if s.blind == 1 else s.why
+        return wire.TRAVEL_END
+    if s.resonates == 1:
+        return wire.RESONANCE
+    if is_noisy(s):
+        return wire.NOISE
+    if has_jumped(s):
+        return wire.JUMPED
+    if s.mode in (wire.DISABLED, wire.STOPPED):
+        armed = s.guard_state in (wire.NO_GUARD, wire.ARMED, wire.ACTIVE)
+        return wire.NOT_ENABLED if armed or s.mode == wire.STOPPED else wire.NOT_ARMED
+    if s.mode == wire.PROBE:
+        return wire.TRIAL
+    if s.mode == wire.EXCITE and (s.weak_s > WEAK_S or slips_at_end(s)):
+        return wire.EXCITER_END
+    if s.drive_unseen == 1:
+        return wire.DRIVE_UNSEEN
+    if s.blind == 1 and (s.mode == wire.EXCITE or s.moving == 0):
+        return wire.BLIND
+    if s.mode == wire.EXCITE:
+        return s.why
     if s.moving == 0:
-        return BLIND if s.blind == 1 else DRIVE_STANDS
+        return wire.DRIVE_STANDS
     if s.off_left_s[way_of(s)] > 0.0:
-        return CANNOT_HELP
-    return NOT_NEEDED if is_needless(s, math.fabs(s.drive_velocity_mps)) else NOTHING_TO_DO
+        return wire.CANNOT_HELP
+    return wire.NOT_NEEDED if is_needless(s, math.fabs(s.drive_velocity_mps)) else wire.NOTHING_TO_DO

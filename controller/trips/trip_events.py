@@ -2,24 +2,12 @@
 
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
-from bridge.arrays import Records
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.event_codes import TRIPS, WEAK_REASONS
 from bridge.wire.words import help_of, word_of
 
 _STALLED = "; the computer or the link stalled within the last 0.15 s: check this cause first"
 _AGAIN_S = 1.0  # least time between two reports of the same code
-
-
-def changes(trace: Records) -> npt.NDArray[np.int64]:
-    """Rows of a trace that may cause events: the first, rows that differ from the row before, and the last."""
-    new = np.zeros(len(trace), bool)
-    new[:1] = new[-1:] = True
-    new[1:] |= trace["reason"][1:] != trace["reason"][:-1]
-    return np.flatnonzero(new)
 
 
 class TripEvents:

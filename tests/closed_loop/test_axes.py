@@ -15,14 +15,14 @@ BOTH_WAYS = {"force_lowest_N": -50.0, "position_lowest_m": -0.05}
 FAST_MPS = 1e-3  # a slip of the stiff axes reaches 1.2 to 1.5 mm/s at a feed of 0.5
 
 
-# At 50 N/um the slide breaks away 6 ms after the start, which is before its drive is seen to move. At 1 N/um the first probe,
-# after 0.9 s, ends in a surge of 1.2 mm/s, against 4.8 mm/s of a slip without a controller.
-@pytest.mark.parametrize(("stiffness_N_per_m", "first", "later"), [(1e6, 0, 1), (20e6, 0, 0), (50e6, 1, 0)])
+# At 50 N/um the slide breaks away 6 ms after the start, at 20 N/um 15 ms: before the drive is seen to move. A start shown by the
+# force cost 43 false sticks under hum. No loop check shows the exciter's gain here, so a tenth of the stroke measures it for 30 ms.
+@pytest.mark.parametrize(("stiffness_N_per_m", "first", "later"), [(1e6, 0, 1), (20e6, 2, 0), (50e6, 5, 0)])
 def test_a_stiff_axis_does_not_slip(stiffness_N_per_m: float, first: int, later: int) -> None:
     loop = close_the_loop(3.0, rig=machine_axis(stiffness_N_per_m), controller=told(stiffness_N_per_m), pair="")
-    assert loop.slips(0.0, 0.02, fast_mps=FAST_MPS) <= first
-    assert loop.slips(0.02, fast_mps=FAST_MPS) <= later
-    assert loop.slips(0.02, fast_mps=1.5e-3) == 0
+    assert loop.slips(0.0, 0.04, fast_mps=FAST_MPS) <= first
+    assert loop.slips(0.04, fast_mps=FAST_MPS) <= later
+    assert loop.slips(0.04, fast_mps=1.5e-3) == 0
     assert loop.trace["loop_delay_s"][-1] == 0.0
     exciting = (loop.trace["mode"] == wire.EXCITE) & (loop.trace["mode"] == np.roll(loop.trace["mode"], 50))
     off = np.abs(loop.trace["vibration_velocity_mps"] / np.maximum(loop.trace["wanted_velocity_mps"], 1e-9) - 1.0)
@@ -34,7 +34,8 @@ def test_slips_of_a_stiff_axis_are_counted() -> None:
     loop = close_the_loop(2.0, rig=machine_axis(20e6), controller=controller, pair="")
     happened = loop.slips(0.0, fast_mps=FAST_MPS)
     assert happened > 100
-    assert int(loop.trace["slips"][-1]) == pytest.approx(happened, rel=0.02)
+    # every tenth follows the slip before it within the window that shows both
+    assert 0.88 * happened < int(loop.trace["slips"][-1]) <= happened
 
 
 def test_a_stiff_axis_stops_slipping_when_the_controller_comes_late() -> None:
@@ -75,12 +76,11 @@ def test_a_wrong_configured_stiffness_is_corrected(factor: float) -> None:
     assert loop.trace["drive_stiffness_N_per_m"][-1] == pytest.approx(11700.0, rel=0.05)
 
 
-def test_without_a_slide_position_a_configured_stiffness_that_is_too_small_is_raised() -> None:
-    """No force climbs faster than k_d v_d."""
+def test_without_a_slide_position_a_configured_stiffness_that_is_too_small_does_no_harm() -> None:
     controller = {"drive_stiffness_N_per_m": 1170.0, "estimator": {"use_slide_position": False}}
     loop = close_the_loop(4.0, controller=controller)
     assert loop.slips(0.0) == 0
-    assert loop.trace["drive_stiffness_N_per_m"][-1] == pytest.approx(11700.0, rel=0.2)
+    assert loop.ratio(0.5).max() < 1.5
 
 
 @pytest.mark.parametrize("missing", ["use_force", "use_slide_position"])

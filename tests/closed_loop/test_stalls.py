@@ -11,7 +11,6 @@ from bridge.log.logfile import RunData, read_run
 from bridge.wire.event_codes import TRIPS, WEAK_REASONS
 from cockpit.run.scenario import load_scenario
 from cockpit.run.simulated.run import run_with_faults
-from controller.in_force import MOST_S, SETTLED_S
 from plant.faults.table import FaultTable
 
 FROM_S = 1.0
@@ -55,23 +54,14 @@ def test_a_gap_in_the_commands_raises_no_vibration_and_doubts_nothing(tmp_path: 
     assert data.trace["velocity_ratio"][after].max() < 1.31
 
 
-def test_an_accelerometer_that_fails_in_a_stall_is_reported_soon_after_it(tmp_path: Path) -> None:
-    frozen = {"kind": "frozen", "target": "plant", "from_s": FROM_S, "for_s": 0.03}
-    dead = {"kind": "off", "target": "base_accel_mps2", "from_s": FROM_S}
-    blamed_stalls = list(blamed(run(tmp_path / "run.mcap", 3.0, frozen, dead)))
-    assert FROM_S + SETTLED_S < blamed_stalls[0][0] < FROM_S + SETTLED_S + 0.5
-    assert "stalled" not in blamed_stalls[0][2]
-
-
-def test_a_computer_that_stalls_all_the_time_is_named_and_delays_a_doubt_by_the_longest_wait(tmp_path: Path) -> None:
-    """Stalls that leave no time to compare v_a: every 0.15 s, with 0.12 s between them."""
+def test_an_accelerometer_that_fails_while_the_computer_stalls_all_the_time_is_reported(tmp_path: Path) -> None:
+    """Stalls every 0.15 s, with 0.12 s between them."""
     stalls = [
-        {"kind": "frozen", "target": "plant", "from_s": at_s, "for_s": 0.03} for at_s in np.arange(FROM_S, 6.0, 0.15)
+        {"kind": "frozen", "target": "plant", "from_s": at_s, "for_s": 0.03} for at_s in np.arange(FROM_S, 3.0, 0.15)
     ]
     dead = {"kind": "off", "target": "base_accel_mps2", "from_s": FROM_S}
-    blamed_stalls = list(blamed(run(tmp_path / "run.mcap", 6.0, *stalls, dead)))
-    # steps without a block and the late blocks of the same stall both count
-    assert FROM_S + MOST_S - 0.3 < blamed_stalls[0][0] < FROM_S + MOST_S + 0.5
+    blamed_stalls = list(blamed(run(tmp_path / "run.mcap", 3.0, *stalls, dead)))
+    assert FROM_S < blamed_stalls[0][0] < FROM_S + 0.5
     assert "the computer or the link stalled" in blamed_stalls[0][2]
 
 

@@ -16,8 +16,7 @@ from cockpit.run.replay import changes_of, outcome
 from cockpit.run.scenario import processor
 from controller.core import step
 from controller.records import build
-from controller.replay import replay
-from controller.replay_steps import writable
+from controller.replay import replay, writable
 from tests.golden.bless import FOLDER, make, situations
 
 FIGURES = tomllib.loads((FOLDER / "figures.toml").read_text())

@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -24,8 +24,11 @@ SCENARIO = ["--scenario", "from-the-start", "--set", "duration_s=99"]
 
 
 @contextmanager
-def rig(endpoint: str, environment: dict[str, str], *more: str) -> Generator[subprocess.Popen[str]]:
-    arguments = [*COMMAND, "plant", *SCENARIO, "--wait-for", "", "--endpoint", endpoint, *more]
+def rig(
+    endpoint: str, environment: dict[str, str], *more: str, before: Sequence[str] = ()
+) -> Generator[subprocess.Popen[str]]:
+    """A running rig, started by the words `before` and its command."""
+    arguments = [*before, *COMMAND, "plant", *SCENARIO, "--wait-for", "", "--endpoint", endpoint, *more]
     process = subprocess.Popen(arguments, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         yield process

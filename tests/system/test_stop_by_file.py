@@ -1,12 +1,15 @@
-"""A stop where the bus fails: a port jammed by random bytes, no runtime folder, an expired certificate; and idle connections."""
+"""A stop where bus or disk fail, also after a restart of the rig: a port jammed by random bytes or by idle connections, no
+runtime folder, an expired certificate, a full disk. And idle connections while the rig vibrates."""
 
 import contextlib
 import json
 import os
+import resource
 import shutil
 import socket
 import subprocess
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -24,11 +27,15 @@ from tests.system.run_under_way import COMMAND
 from tests.system.test_guard import rig, say
 
 pytestmark = [pytest.mark.realtime, pytest.mark.slow]
+# a process that may make and remove files and write no byte to them, as on most full disks
+FULL_DISK = ("sh", "-c", 'ulimit -f 0; exec "$@"', "sh")
 RIG = load_scenario("from-the-start", []).rig.name
 
 
-def stop(endpoint: str, environment: dict[str, str], *more: str) -> tuple[int, dict[str, str]]:
-    command = [*COMMAND, "stop", "--json", "--endpoint", endpoint, *more]
+def stop(
+    endpoint: str, environment: dict[str, str], *more: str, before: Sequence[str] = ()
+) -> tuple[int, dict[str, str]]:
+    command = [*before, *COMMAND, "stop", "--json", "--endpoint", endpoint, *more]
     done = subprocess.run(command, env=environment, timeout=60, check=False, capture_output=True, text=True)
     return done.returncode, json.loads(done.stdout)
 
@@ -52,12 +59,15 @@ def expire(folder: Path, role: str, monkeypatch: pytest.MonkeyPatch) -> None:
         shutil.copy(path, folder / path.name)
 
 
-@pytest.mark.parametrize("trouble", ["random bytes", "no runtime folder", "expired certificate"])
+@pytest.mark.parametrize(
+    "trouble", ["random bytes", "idle connections", "no runtime folder", "expired certificate", "full disk"]
+)
 def test_a_stop_needs_no_bus(trouble: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     endpoint, more = free_endpoint(), []
     runtime = tmp_path / "runtime"
     runtime.mkdir(mode=0o700)
-    if trouble != "no runtime folder":
+    before = FULL_DISK if trouble == "full disk" else ()
+    if trouble in {"random bytes", "expired certificate"}:
         folder = tmp_path / "certificates"
         folder.mkdir()
         authority.make_certificates(folder, [])
@@ -69,24 +79,28 @@ def test_a_stop_needs_no_bus(trouble: str, tmp_path: Path, monkeypatch: pytest.M
     environment = dict(os.environ)
     with rig(endpoint, environment, "--set", "arm=true", *more) as process, contextlib.ExitStack() as links:
         await_rig(tmp_path)
-        if trouble == "random bytes":
+        if trouble in {"random bytes", "idle connections"}:
             for _ in range(500):
                 link = links.enter_context(socket.create_connection(("127.0.0.1", BusConfig(endpoint=endpoint).port)))
                 with contextlib.suppress(OSError):
-                    link.sendall(os.urandom(2000))
+                    link.sendall(os.urandom(2000) if trouble == "random bytes" else b"")
+        elif trouble == "full disk":
+            resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (0, 0))
         elif trouble == "no runtime folder":
             shutil.rmtree(runtime)
-        status, stopped = stop(endpoint, environment, *more)
+        status, stopped = stop(endpoint, environment, *more, before=before)
         assert (status, stopped["state"], stopped["amplitude_m"]) == (0, "FAULT", 0.0)
-        assert ("expired" if trouble == "expired certificate" else "STOP NOT DELIVERED") in stopped["bus_problem"]
+        if trouble not in {"idle connections", "full disk"}:
+            assert ("expired" if trouble == "expired certificate" else "STOP NOT DELIVERED") in stopped["bus_problem"]
         assert process.poll() is None
     assert StopLatch(RIG).is_set
-    if trouble == "no runtime folder":
+    if trouble != "full disk":  # it leaves no room for the passwords of another endpoint
         endpoint = free_endpoint()
-        with rig(endpoint, environment, "--set", "arm=true"):
-            assert say("status", endpoint)[1]["cause"] == "STOP_KEPT"
-            assert say("reset", endpoint)[1]["state"] == "DISARMED"
-        assert not StopLatch(RIG).is_set
+    with rig(endpoint, environment, "--set", "arm=true", before=before):
+        assert say("status", endpoint)[1]["cause"] == "STOP_KEPT"
+        assert say("reset", endpoint)[1]["state"] == "DISARMED"
+        assert say("stop", endpoint)[1]["state"] == "FAULT"
+    assert StopLatch(RIG).is_set
 
 
 def test_idle_connections_do_not_end_the_vibration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

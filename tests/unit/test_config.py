@@ -71,23 +71,22 @@ def test_a_misspelt_key_is_not_reported_as_missing_too() -> None:
         (["controller.limits.stale_after_s=0.0005"], ["limits.stale_after_s = 0.0005", "2 blocks", "raise it"]),
         (["rig.piezo.command_timeout_s=0.0005"], ["piezo.command_timeout_s = 0.0005", "2 blocks", "raise it"]),
         (
-            ["rig.piezo.frequency_max_Hz=2000.0"],
-            [
-                "controller.limits.frequency_max_Hz = 5000",
-                "4500 Hz",
-                "rig.piezo.frequency_max_Hz = 2000",
-                "set it to 2000",
-            ],
+            ["controller.limits.frequency_max_Hz=5001.0"],
+            ["controller.limits.frequency_max_Hz = 5001: must be at most 5000, the limit of the rig", "leave it out"],
         ),
         (
-            ["rig.piezo.frequency_min_Hz=2650.0"],
-            ["controller.limits.frequency_min_Hz = 500", "2600 Hz", "rig.piezo.frequency_min_Hz = 2650"],
+            ["controller.limits.frequency_min_Hz=500.0", "rig.piezo.frequency_min_Hz=650.0"],
+            ["controller.limits.frequency_min_Hz = 500: must be at least 650"],
+        ),
+        (
+            ["controller.limits.amplitude_max_m=1e-7", "rig.guard.stroke_m={alarm=5e-8, abort=1e-7}"],
+            ["controller.limits.amplitude_max_m = 1e-07: must be at most 5e-08"],
         ),
         (["duration_s=200.0"], ["duration_s", "50 mm", "shorten"]),
         (["duration_s=1e9"], ["duration_s = 1e+09", "5e+08 mm", "after 100 s", "shorten"]),
         (
             ["rig.guard.forbidden_Hz=[[2600.0, 4600.0]]"],
-            ["controller.limits.forbidden_Hz", "2600 Hz", "rig.guard.forbidden_Hz = [2600, 4600]", "as well"],
+            ["controller.limits.forbidden_Hz: no frequency is left: every multiple of 100 Hz between 2516.8 Hz"],
         ),
         (["controller.limits.forbidden_Hz=[[0.0, 9000.0]]"], ["forbidden_Hz", "no frequency is left"]),
         (
@@ -268,9 +267,18 @@ def test_the_travel_of_a_changing_drive_is_counted(peak_mps: float, fits: bool) 
         load_scenario("paper-c45-c45", [profile, "duration_s=14.0"])
 
 
-def test_a_controller_within_the_frequencies_of_its_rig_is_taken() -> None:
-    for limit in ("frequency_max_Hz=2000.0", "frequency_min_Hz=2650.0"):
-        assert load_scenario("paper-c45-c45", [f"rig.piezo.{limit}", f"controller.limits.{limit}"])
+def test_the_controller_takes_the_limits_of_its_rig() -> None:
+    rig = [
+        "rig.guard.stroke_m={alarm=5e-8, abort=1e-7}",
+        "rig.guard.velocity_mps={alarm=1e-3, abort=2e-3}",
+        "rig.guard.forbidden_Hz=[[4500.0, 4700.0]]",
+        "rig.piezo.amplitude_slew_m_per_s=2e-6",
+        "rig.piezo.frequency_min_Hz=2650.0",
+    ]
+    limits = load_scenario("paper-c45-c45", [*rig, "controller.limits.amplitude_max_m=4e-8"]).controller.limits
+    assert (limits.amplitude_max_m, limits.velocity_max_mps, limits.slew_m_per_s) == (4e-8, 1e-3, 2e-6)
+    assert (limits.frequency_min_Hz, limits.frequency_max_Hz) == (2650.0, 5000.0)
+    assert limits.forbidden_Hz == [(4500.0, 5000.0)]  # with the controller's own band, from 4600 Hz on
 
 
 def test_every_rig_and_scenario_that_comes_along_is_valid() -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bridge.wire.block_numbers import BlockNumbers, NumberCheck
+from bridge.wire.complaints import BlockNumbers, NumberCheck
 
 MS = 1_000_000
 

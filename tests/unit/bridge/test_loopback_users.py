@@ -17,7 +17,7 @@ ENDPOINT = "tcp/127.0.0.1:7447"
 def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "runtime"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "tmp"))
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "tmp"))
     return tmp_path / "runtime" / "stickslip" / "127.0.0.1-7447.users"
 
 
@@ -64,8 +64,26 @@ def test_a_folder_that_others_enter_is_passed_over(place: Path, tmp_path: Path) 
 def test_nowhere_to_keep_it_is_a_fault(place: Path, tmp_path: Path) -> None:
     for name in ("runtime", "cache", "tmp"):
         (tmp_path / name).write_text("a file where a folder should be")
-    with pytest.raises(Fault, match=r"NOT_SECURE: .*set XDG_RUNTIME_DIR"):
+    with pytest.raises(Fault, match=r"NOT_SECURE: .*\(Not a directory\).*set XDG_RUNTIME_DIR"):
         loopback_users.make(ENDPOINT)
+
+
+def test_a_full_disk_keeps_the_passwords_that_exist_and_is_named(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_args: object, **_options: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    for name in ("mkstemp", "gettempdir"):  # the second writes a file, to choose a folder
+        monkeypatch.setattr(f"tempfile.{name}", full)
+    assert loopback_users.password(ENDPOINT, "operator") is None
+    with pytest.raises(Fault, match="No space left on device"):
+        loopback_users.make(ENDPOINT)
+    monkeypatch.undo()
+    with monkeypatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", str(place.parents[1]))
+        assert loopback_users.make(ENDPOINT) == place
+        word = loopback_users.password(ENDPOINT, "operator")
+        patch.setattr("tempfile.mkstemp", full)
+        assert (loopback_users.make(ENDPOINT), loopback_users.password(ENDPOINT, "operator")) == (place, word)
 
 
 @pytest.mark.parametrize(

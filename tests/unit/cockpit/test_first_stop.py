@@ -68,6 +68,12 @@ def test_the_confirmation_by_file_suffices(rig: RigFile) -> None:
     assert (outcome.done, outcome.state, outcome.endpoint) == (True, "FAULT", HERE)
     assert "warning  confirmed by file, not over the bus: no rig answered: must run" in outcome.in_words()
 
+    def full_disk() -> CommandOutcome:
+        raise OSError(28, "No space left on device")
+
+    outcome = stop_rig(full_disk, first_stop.ordered)
+    assert (outcome.done, "No space left on device" in outcome.bus_problem) == (True, True)
+
 
 def test_a_stop_that_no_rig_confirms_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cockpit.live.operator._BY_FILE_S", 0.0)

@@ -25,7 +25,7 @@ def time_s(seconds: float) -> Any:
 def listen(
     drive_m: Any,
     slide_m: Any,
-    offset_N: float = 0.0,
+    offset_N: Any = 0.0,
     seed: int = 1,
     position_noise_m: float = POSITION_NOISE_M,
     missing: str = "",

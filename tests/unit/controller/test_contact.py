@@ -82,7 +82,7 @@ def test_the_stiffness_is_learnt_whatever_is_configured(factor: float) -> None:
     assert trace["drive_stiffness_N_per_m"][-1] == pytest.approx(STIFFNESS_N_PER_M, rel=0.05)
     assert trace["drive_stiffness_sigma"][-1] < 0.1
     assert int(trace["slips"][-1]) == 3
-    assert (trace["state"][40:950] == wire.STICK).mean() > 0.95
+    assert (trace["state"][170:950] == wire.STICK).mean() > 0.95
 
 
 def test_breakaway_and_the_time_to_the_next_slip_are_learnt() -> None:
@@ -100,16 +100,18 @@ def test_a_slide_on_a_resting_drive_is_at_a_standstill_and_does_not_slip() -> No
     assert trace["slips"][-1] == 0
 
 
-@pytest.mark.parametrize(("stiffness", "fall_s", "drop_N"), [(168.0, 0.042, 0.019), (2254.0, 0.0116, 0.022)])
+@pytest.mark.parametrize(
+    ("stiffness", "fall_s", "drop_N", "for_s"), [(168.0, 0.042, 0.019, 2.0), (2254.0, 0.0116, 0.022, 0.7)]
+)
 @pytest.mark.slow
 def test_slips_are_counted_where_they_last_longer_than_a_stick_and_nothing_shows_the_slide(
-    stiffness: float, fall_s: float, drop_N: float
+    stiffness: float, fall_s: float, drop_N: float, for_s: float
 ) -> None:
     """A dead slide position must not make the spring soft: it never changes by a step."""
     speed_mps = 1.1e-3
     stick_s = drop_N / (stiffness * speed_mps)
     period_s = stick_s + fall_s
-    t_s = time_s(2.0)  # later the dead slide position is doubted, and no slip is counted
+    t_s = time_s(for_s)  # later the dead slide position is doubted, and no slip is counted
     phase = t_s % period_s
     fall = 0.5 * drop_N * (1 + np.cos(np.pi * (phase - stick_s) / fall_s))
     node = ControllerNode(
@@ -122,4 +124,4 @@ def test_slips_are_counted_where_they_last_longer_than_a_stick_and_nothing_shows
         sensors["sequence"], sensors["t_ns"] = block, 1_000_000 * (block + 1)
         sensors["drive_force_N"], sensors["drive_position_m"] = force_N[rows], speed_mps * t_s[rows]
         node.block(sensors.tobytes())
-    assert int(node._trace[0]["slips"]) == pytest.approx(2.0 / period_s, rel=0.05)
+    assert int(node._trace[0]["slips"]) == pytest.approx(for_s / period_s, rel=0.05)

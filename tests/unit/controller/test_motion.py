@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bridge.wire import stickslip_pb2 as wire
-from tests.unit.controller.signals import listen, time_s
+from tests.unit.controller.signals import STIFFNESS_N_PER_M, listen, time_s
 
 
 @pytest.mark.parametrize("velocity_mps", [5e-3, 5e-4, 5e-5, -5e-4, -5e-5])
@@ -71,6 +71,22 @@ def test_a_drive_that_starts_is_not_lost_again(seed: int) -> None:
     begins = np.flatnonzero(np.diff(moving.astype(int)) == 1)
     assert len(begins) == 1
     assert v_mps[begins[0] + 1] < 1.5e-4
+
+
+def test_v_a_is_for_a_v_d_that_still_rises() -> None:
+    drive_m, v_mps = _started(5e-3, 5e-4, 1.4)
+    trace = listen(drive_m, np.zeros_like(drive_m), policy={"mode": "moving"})
+    rises = slice(1050, 1090)
+    assert (trace["wanted_velocity_mps"][rises] / v_mps[rises]).mean() > 1.2
+
+
+def test_hum_of_the_force_moves_no_resting_drive_and_slips_no_slide() -> None:
+    t_s = time_s(4.0)
+    still = np.zeros(len(t_s))
+    hum_N = 0.1 * np.sin(2.0 * np.pi * 50.0 * t_s)
+    trace = listen(still, still, offset_N=hum_N, drive_stiffness_N_per_m=STIFFNESS_N_PER_M)
+    assert not trace["drive_velocity_mps"].any()
+    assert trace["slips"][-1] == 0
 
 
 def test_hum_on_both_positions_does_not_count_as_motion_before_its_noise_is_known() -> None:

@@ -65,7 +65,7 @@ def test_a_restarted_rig_is_accepted_after_eight_blocks() -> None:
     assert node.duplicates == 1
     answered = [node.block(block(number), (1400 + number) * MS) is not None for number in range(20)]
     assert answered == [False] * 7 + [True] * 13
-    assert (node.restarts, node.strays, node.last_block) == (1, 0, 19)
+    assert (node.restarts, node.last_block) == (1, 19)
     assert node._trace[0]["gap_blocks"] == 0
     assert node.t_ns == 20 * MS
 

@@ -6,14 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bridge.guard.events import changes
 from bridge.log.logfile import read_run
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.event_codes import EVENTS, TRIPS
 from bridge.wire.messages import TRACE
 from cockpit.run.in_process import run_onboard
 from cockpit.run.scenario import load_scenario
-from controller.trips.age import HOLD_NS, MARGIN_NS, Age
-from controller.trips.trip_events import TripEvents, changes
+from controller.freshness import HOLD_NS, MARGIN_NS, Age
+from controller.trips.trip_events import TripEvents
 from tests.closed_loop.sensor_faults import suffer
 
 MS_NS = 1_000_000
@@ -24,13 +25,13 @@ def events_of(reasons: Sequence[int], limits: Sequence[int]) -> list[tuple[str, 
     trace["t_ns"] = np.arange(len(reasons)) * MS_NS
     trace["reason"], trace["limit"] = reasons, limits
     events = TripEvents()
-    return [event for row in changes(trace) for event in events.news(trace[row])]
+    return [event for row in changes(trace, "reason") for event in events.news(trace[row])]
 
 
 def test_a_trip_and_its_end_are_reported_once() -> None:
     reported = events_of([wire.HELD] * 5 + [wire.OPEN_LOOP] * 300 + [wire.HELD] * 5, [wire.NO_LIMIT] * 310)
     assert [code for code, _ in reported] == ["OPEN_LOOP", "CLEARED"]
-    assert reported[0][1].startswith("failure: far less v_a than commanded")
+    assert reported[0][1].startswith("failure: v_a fell by more than amplitude.gain_band")
 
 
 def test_the_end_of_the_exciter_is_reported_with_its_limit() -> None:

@@ -72,12 +72,8 @@ def test_reports_hold_failures_and_limits_and_no_change_of_state() -> None:
     applied, trace = APPLIED.blank(4), TRACE.blank(4)
     applied["guard_state"] = [wire.ARMED, wire.ARMED, wire.ACTIVE, wire.ACTIVE]
     trace["reason"] = [wire.NOTHING_TO_DO, wire.STICK_SEEN, wire.CANNOT_HELP, wire.HELD]
-    trace["drive_velocity_mps"] = 5e-4
     empty = np.empty(0)
     made = Stretch(empty, applied, empty, trace, empty, empty, empty, empty, empty)
     reports = Reports()
     reports(made)
     assert reports.codes == {"CANNOT_HELP"}
-    trace["slips"], trace["drive_velocity_mps"] = [0, 1, 1, 1], 0.0
-    reports(made)
-    assert reports.codes == {"CANNOT_HELP", "DRIVE_UNSEEN"}

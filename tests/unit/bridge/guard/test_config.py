@@ -16,7 +16,7 @@ from tests.unit.bridge.guard.rigs import EXCITER, real
     ("table", "message"),
     [
         ({"stroke_m": {"alarm": 2e-7, "abort": 1e-7}}, "abort = 1e-07: must not be below alarm = 2e-07"),
-        ({"forbidden_Hz": [[3000.0, 2000.0]]}, "forbidden_Hz: [3000, 2000]: the second must be above the first"),
+        ({"forbidden_Hz": [[3000.0, 2000.0]]}, "forbidden_Hz.0: [3000, 2000]: the second must be above the first"),
         ({"check_Hz": [2000.0, 1000.0]}, "check_Hz = [2000.0, 1000.0]: must rise"),
         ({"check_Hz": [1000.0, 1000.0]}, "must rise"),
         ({"loud": 3.0}, "loud = 3.0: unknown key; known here"),

@@ -45,6 +45,8 @@ def test_every_change_of_state_is_reported_once_with_its_reason() -> None:
 def test_another_gain_is_a_separate_event(cause: str) -> None:
     ready: dict[str, Any] = {"guard_state": wire.READY, "cause": wire.Cause.Value(cause)}
     assert codes_of(ARMED, ready, ready) == [["GUARD"], ["GUARD", cause], []]
+    (_, (_, text)) = GuardEvents(lambda: "measured 0.1 at 2000 Hz").news(applied(ready)[0])
+    assert text.startswith("measured 0.1 at 2000 Hz; ")
 
 
 def test_missing_commands_are_reported_when_they_stop_and_when_they_return_but_not_before_the_first() -> None:
