@@ -16,7 +16,7 @@ FAST_MPS = 1e-3  # a slip of the stiff axes reaches 1.2 to 1.5 mm/s at a feed of
 
 
 # At 50 N/um the slide breaks away 6 ms after the start, at 20 N/um 15 ms: before the drive is seen to move. A start shown by the
-# force cost 43 false sticks under hum. No loop check shows the exciter's gain here, so a tenth of the stroke measures it for 30 ms.
+# force cost 43 false sticks under hum. No loop check shows the gain here, so a tenth of the stroke measures it for 30 ms.
 @pytest.mark.parametrize(("stiffness_N_per_m", "first", "later"), [(1e6, 0, 1), (20e6, 2, 0), (50e6, 5, 0)])
 def test_a_stiff_axis_does_not_slip(stiffness_N_per_m: float, first: int, later: int) -> None:
     loop = close_the_loop(3.0, rig=machine_axis(stiffness_N_per_m), controller=told(stiffness_N_per_m), pair="")
