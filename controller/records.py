@@ -174,10 +174,8 @@ STATE = np.dtype(
         ("fade", "f8"),  # v_a / v_d of a trial that begins
         ("fade_per_s", "f8"),
         ("trials", "i8"),  # number of trials
-        (
-            "crest_N",
-            "f8",
-        ),  # largest force along the motion in the present window of `controller.policy.trial`, and in the last
+        # largest force along the motion in the present window of `controller.policy.trial`, and in the last
+        ("crest_N", "f8"),
         ("crest_before_N", "f8"),
         ("fall_N", "f8"),  # largest fall below the crest in the present window
         ("fall_s", "f8"),

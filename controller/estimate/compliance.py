@@ -8,11 +8,8 @@ import math
 
 from bridge.kernel import hypot, kernel
 from bridge.layouts import ControllerMemory, ControllerParams
-from controller.estimate.windows import DRIVE, FEWEST, FORCE, SLIDE
+from controller.estimate.windows import DRIVE, FEWEST, FORCE, SIGMAS, SLIDE
 
-# Least rate of the force over its noise in a window that shows c. Smaller: the noise of the force makes c too small; at 6 by
-# 1 / 6^2 = 3 % at most.
-_SIGMAS = 6.0
 _GIVEN_SIGMA = 0.5  # relative sigma of a configured stiffness: a data sheet without bearings and couplings
 # Least relative sigma of c, and of c in one window: the mass of the slide and the lag of the sensors bend the law. A configured
 # stiffness has it where only the force shows the slide. Smaller: one fast slip outweighs a hundred sticks.
@@ -48,8 +45,8 @@ def learn_compliance(p: ControllerParams, s: ControllerMemory, tick_s: float) ->
         rate, drive_mps, slide_mps = s.slope[FORCE, level], s.slope[DRIVE, level], s.slope[SLIDE, level]
         # hum of the force in windows that show no motion would make every spring stiff; a slide position that never changes by a
         # step is not connected, and would make every spring soft
-        moves = math.fabs(drive_mps) > _SIGMAS * drive or math.fabs(slide_mps) > _SIGMAS * slide
-        if slide > 0.0 and moves and math.fabs(rate) > _SIGMAS * force:
+        moves = math.fabs(drive_mps) > SIGMAS * drive or math.fabs(slide_mps) > SIGMAS * slide
+        if slide > 0.0 and moves and math.fabs(rate) > SIGMAS * force:
             by_force = s.compliance_m_per_N * force
             now = (slide * slide + drive * drive + by_force * by_force) / (rate * rate)
             if now < variance:
@@ -78,7 +75,7 @@ def learn_compliance(p: ControllerParams, s: ControllerMemory, tick_s: float) ->
 def _is_stuck(s: ControllerMemory, level: int) -> bool:
     """Whether the slide sticks on a moving drive: only this refines a learnt c, as a wrong position would soften it."""
     drive_mps = math.fabs(s.slope[DRIVE, level])
-    return drive_mps > _SIGMAS * s.noise[DRIVE, level] and math.fabs(s.slope[SLIDE, level]) < _STUCK * drive_mps
+    return drive_mps > SIGMAS * s.noise[DRIVE, level] and math.fabs(s.slope[SLIDE, level]) < _STUCK * drive_mps
 
 
 @kernel

@@ -30,7 +30,6 @@ from controller.policy.trial import (
 )
 from controller.trips.doubts import CONTACT
 
-TWO_PI = 2.0 * math.pi
 WHILE_MOVING = MODES.index("moving")
 
 _STEP = 0.4  # rise of the ratio at a slip or a surge
@@ -116,7 +115,7 @@ def _look_ahead_s(p: ControllerParams, s: ControllerMemory) -> float:
     delay_s = (s.loop_delay_steps + 1) * p.block_s
     if s.moving == 1:
         return delay_s
-    largest_m = min(p.amplitude_max_m, p.velocity_max_mps / (TWO_PI * p.frequency_Hz))
+    largest_m = min(p.amplitude_max_m, p.velocity_max_mps / (math.tau * p.frequency_Hz))
     return delay_s + largest_m / p.slew_m_per_step * p.block_s
 
 
