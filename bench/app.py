@@ -6,6 +6,7 @@ from bench.blind.command import blind_app
 from bench.control.command import control
 from bench.control.trust.command import trust
 from bench.faults.command import faults
+from bench.judge.command import judge
 from cockpit.commands.as_json.option import JsonGroup
 
 app = typer.Typer(
@@ -18,4 +19,5 @@ app = typer.Typer(
 app.command("control")(control)
 app.command("trust")(trust)
 app.command("faults")(faults)
+app.command("judge")(judge)
 app.add_typer(blind_app, name="blind")

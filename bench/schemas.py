@@ -45,6 +45,7 @@ FORMATS = {
         Format("bench-control-result", "`python -m bench control --json`.", "bench.control.result:BankResult"),
         Format("bench-trust-result", "`python -m bench trust --json`.", "bench.control.trust.result:TrustResult"),
         Format("bench-faults-result", "`python -m bench faults --json`.", "bench.faults.run:FaultBench"),
+        Format("bench-judge-result", "`python -m bench judge --json`.", "bench.judge.command:JudgeResult"),
         Format("blind-run-result", "`python -m bench blind run --json`.", "bench.blind.command:SetDone"),
     )
 }

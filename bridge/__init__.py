@@ -13,6 +13,7 @@ kernel, kernel_cache  compiled code; its place on disk and its renewal   layouts
 kernel_linking  how kernels that call each other are compiled once
 compiling  the progress of compilation, and signals during it
 plain, processes  text that is safe on a terminal; the identity of a process
+threads   work that a thread repeats
 arrays    names for the types of arrays
 
 """

@@ -31,3 +31,13 @@ class Fault(Exception):
     def __reduce__(self) -> tuple[type["Fault"], tuple[str, str]]:
         """Pickle code and line, for another process; by default Python rebuilds an exception from its message alone."""
         return Fault, (self.kind.code, self.line)
+
+
+def install(extra: str) -> str:
+    """The command that installs an extra of this project: in a checkout from its source tree, which no index holds."""
+    root = Path(__file__).parents[1]
+    return (
+        f"pip install -e '{root}[{extra}]'"
+        if (root / "pyproject.toml").is_file()
+        else f"pip install 'stickslip[{extra}]'"
+    )

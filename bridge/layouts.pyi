@@ -4,42 +4,41 @@ from typing import Any
 import numpy.typing as npt
 
 class ControllerParams:
-    accel_bandwidth_Hz:float; amplitude_max_m:float; band_Hz:npt.NDArray[Any]; bands:int; bin_s:float; bin_samples:int;
-    bins_per_tick:int; block_s:float; configured_gain:float; drive_stiffness_N_per_m:float; enabled_from_ns:int;
-    filter_share:float; follow_share:float; frequency_Hz:float; frequency_max_Hz:float; frequency_min_Hz:float;
-    frozen_steps:int; gain_band:float; gain_floor:float; gain_leap:float; learn_share:float; least_feed_mps:float;
-    least_ratio:float; levels:int; mode:int; most_ratio:float; sample_s:float; samples_per_block:int;
-    slew_m_per_step:float; slot_steps:int; spring_level:int; ticks_per_block:int; travel_high_m:float;
-    travel_low_m:float; trial_every_s:float; use_force:int; use_slide_position:int; v_ratio:float;
+    accel_bandwidth_Hz:float; accel_range_mps2:float; amplitude_max_m:float; band_Hz:npt.NDArray[Any]; bands:int;
+    bin_s:float; bin_samples:int; bins_per_tick:int; block_s:float; configured_gain:float;
+    drive_stiffness_N_per_m:float; enabled_from_ns:int; enabled_from_s:float; filter_s:float; filter_share:float;
+    follow_share:float; frequency_Hz:float; frequency_max_Hz:float; frequency_min_Hz:float; frozen_steps:int;
+    gain_band:float; gain_floor:float; gain_leap:float; learn_share:float; least_feed_mps:float; least_ratio:float;
+    levels:int; mode:int; most_ratio:float; sample_s:float; samples_per_block:int; slew_m_per_s:float;
+    slew_m_per_step:float; slot_steps:int; spring_level:int; stale_after_s:float; ticks_per_block:int;
+    travel_high_m:float; travel_low_m:float; trial_every_s:float; use_force:int; use_slide_position:int; v_ratio:float;
     velocity_max_mps:float; window_s:npt.NDArray[Any]
 
 class ControllerMemory:
-    accepted_share:float; agreed:int; agreed_mps:float; agreements:npt.NDArray[Any]; allowed_Hz:float; allowed_m:float;
-    announced_count:int; announced_from_ns:npt.NDArray[Any]; announced_mps:npt.NDArray[Any]; applied_mps:float;
-    at_limit:int; banded:int; bins:npt.NDArray[Any]; blind:int; block:int; block_sum:npt.NDArray[Any];
-    breakaway_N:npt.NDArray[Any]; changed:int; check_least:float; check_most:float; checked_blocks:int;
-    compliance_m_per_N:float; compliance_sigma:float; contact:int; crest_N:float; crest_before_N:float;
-    differences:npt.NDArray[Any]; direction:int; doubted:int; dragged:npt.NDArray[Any]; drive_unseen:int;
-    drive_velocity_mps:float; drive_velocity_sigma_mps:float; even_s:float; evidence_s:float; expected_stick_s:float;
-    fade:float; fade_per_s:float; failed:float; fall_N:float; fall_s:float; fall_with_N:npt.NDArray[Any];
+    accepted_share:float; agreed:int; agreed_mps:float; allowed_Hz:float; allowed_m:float; announced_count:int;
+    announced_from_ns:npt.NDArray[Any]; announced_mps:npt.NDArray[Any]; applied_mps:float; at_limit:int; banded:int;
+    bins:npt.NDArray[Any]; blind:int; block:int; block_sum:npt.NDArray[Any]; breakaway_N:npt.NDArray[Any]; changed:int;
+    check_least:float; check_most:float; checked_blocks:int; compliance_m_per_N:float; compliance_sigma:float;
+    contact:int; crest_N:float; crest_before_N:float; differences:npt.NDArray[Any]; direction:int; doubted:int;
+    dragged:npt.NDArray[Any]; drive_unseen:int; drive_velocity_mps:float; drive_velocity_sigma_mps:float; even_s:float;
+    evidence_s:float; expected_stick_s:float; fade:float; failed:float; fall_N:float; fall_s:float; fall_with_N:float;
     far:npt.NDArray[Any]; fast_mps:float; followed_gain:float; force_rate:float; fresh:npt.NDArray[Any]; gain:float;
     gain_off_s:float; grown_s:float; guard_state:int; held_mps:float; in_force_s:float; in_phase_mps2:float;
-    kept_mps:npt.NDArray[Any]; known_gain:float; last:npt.NDArray[Any]; law_mps:npt.NDArray[Any];
-    least_mps:npt.NDArray[Any]; level:int; limit:int; listened:int; longest_m:float; loop_delay_steps:int;
+    jumps:float; kept_mps:npt.NDArray[Any]; known_gain:float; last:npt.NDArray[Any]; law_mps:npt.NDArray[Any];
+    least_mps:npt.NDArray[Any]; level:int; limit:int; listened:int; longest_m:float; loop_delay_steps:int; low_s:float;
     memory_s:float; missing_blocks:int; mode:int; mode_s:float; most_drive_mps:float; most_mps:npt.NDArray[Any];
-    moved_s:float; moving:int; needed_to_mps:npt.NDArray[Any]; needless_from_mps:npt.NDArray[Any];
-    noise:npt.NDArray[Any]; noise_mps:float; off:npt.NDArray[Any]; off_left_s:npt.NDArray[Any]; off_s:npt.NDArray[Any];
-    offset_m:float; outside:int; peak_N:float; phase_rad:float; proven:npt.NDArray[Any]; pushed:npt.NDArray[Any];
-    quadrature_mps2:float; rate:npt.NDArray[Any]; ratio:npt.NDArray[Any]; ratio_now:float; relaxed_m:float;
-    repeats:npt.NDArray[Any]; resolution:npt.NDArray[Any]; resonates:int; rising_mps:float; run:int;
+    moved_s:float; moving:int; needed_to_mps:float; needless_from_mps:float; noise:npt.NDArray[Any]; noise_mps:float;
+    off:npt.NDArray[Any]; off_left_s:float; offset_m:float; outside:int; peak_N:float; phase_rad:float;
+    pushed:npt.NDArray[Any]; quadrature_mps2:float; rate:npt.NDArray[Any]; ratio:float; ratio_now:float;
+    relaxed_m:float; repeats:npt.NDArray[Any]; resolution:npt.NDArray[Any]; resonates:int; rising_mps:float; run:int;
     scatter:npt.NDArray[Any]; shortest_m:float; shown:float; shown_c:float; shown_square:float; shown_windows:float;
     sigma:npt.NDArray[Any]; silent_s:float; since_stick_s:float; slide_accel_unread:int; sliding_mps:float;
     slip_began:int; slipped_s:float; slipping:int; slips:int; slope:npt.NDArray[Any]; slope_before:npt.NDArray[Any];
-    spikes:npt.NDArray[Any]; spring_level:int; stale:int; steady_mps:float; steady_s:float; stepped:int; steps:int;
-    stick_began:int; stiffness_learnt:int; stood_s:float; stopped:int; stretched:int; surges:int; swing:float;
-    time_to_slip_s:float; top:float; trials:int; tried_s:npt.NDArray[Any]; trip:int; unexplained:int; unheard:int;
-    unseen_s:float; untried_s:npt.NDArray[Any]; usual:npt.NDArray[Any]; vibration_velocity_mps:float; waiting_s:float;
-    wanted_m:float; wanted_speed_mps:float; wanted_velocity_mps:float; weak_s:float; why:int; window_s:float
+    steady_mps:float; steady_s:float; stepped:int; steps:int; stick_began:int; stiffness_learnt:int; stood_s:float;
+    stopped:int; stretched:int; surges:int; swing:float; time_to_slip_s:float; top:float; tried_mps:float;
+    tried_s:float; trip:int; unexplained:int; unseen_s:float; untried_s:float; usual:npt.NDArray[Any];
+    vibration_velocity_mps:float; waiting_s:float; wanted_m:float; wanted_speed_mps:float; wanted_velocity_mps:float;
+    weak_s:float; why:int; window_s:float
 
 class GuardParams:
     abort:npt.NDArray[Any]; alarm:npt.NDArray[Any]; announced_keep:float; band_Hz:npt.NDArray[Any]; bands:int;

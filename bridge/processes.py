@@ -12,7 +12,7 @@ _STARTED = 19  # field of /proc/PID/stat after the name: start time in ticks sin
 
 def this_process() -> str:
     """The identity of the calling process as JSON: pid, host, start time."""
-    return json.dumps({"pid": os.getpid(), "host": socket.gethostname(), "started": _started(os.getpid())})
+    return json.dumps({"pid": os.getpid(), "host": socket.gethostname(), "started": started(os.getpid())})
 
 
 def pid_here(role: str, identity_text: str) -> int:
@@ -22,14 +22,14 @@ def pid_here(role: str, identity_text: str) -> int:
     """
     try:
         identity = json.loads(identity_text)
-        pid, host, started = int(identity["pid"]), str(identity["host"]), identity["started"]
+        pid, host, start = int(identity["pid"]), str(identity["host"]), identity["started"]
     except (ValueError, KeyError, TypeError):
         line = f"{role}: sends no process identity: must be a process of this version; end it by hand"
         raise Fault("NO_PEER", line) from None
     if host != socket.gethostname():
         line = f"{role}: is process {pid} of {host[:64]}: must be on this computer; give the command there"
         raise Fault("NO_PEER", line)
-    if started is None or _started(pid) != started:
+    if start is None or started(pid) != start:
         raise Fault("NO_PEER", f"{role}: process {pid} has ended: must be running; start it again")
     owner = Path(f"/proc/{pid}").stat().st_uid
     if owner != os.getuid():
@@ -38,7 +38,8 @@ def pid_here(role: str, identity_text: str) -> int:
     return pid
 
 
-def _started(pid: int) -> int | None:
+def started(pid: int) -> int | None:
+    """The start time of a process, in ticks since boot; None for an ended process."""
     try:
         return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[_STARTED])
     except (OSError, ValueError, IndexError):

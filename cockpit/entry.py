@@ -6,7 +6,7 @@ import os
 import sys
 from typing import TYPE_CHECKING
 
-from cockpit.first_stop import stop_by_file
+from cockpit.first_stop import status_of_stop, stop_by_file
 
 if TYPE_CHECKING:
     import typer
@@ -39,7 +39,7 @@ def main(app: "typer.Typer | None" = None) -> None:
     # Registered first, so it runs last, and ends the process before the interpreter is torn down. During the teardown an Arrow
     # thread that frees a table would abort the process, on a busy computer in one of seven commands that read a CSV.
     atexit.register(end)
-    status = exit_status_of(lambda: _status(app))
+    status = status_of_stop(sys.argv[1:], exit_status_of(lambda: _status(app)))
     sys.exit(status)
 
 

@@ -6,18 +6,32 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from bridge.faults import FAULTS
 from bridge.guard import stop_file
+from bridge.plain import print_line
 
 _WITH_VALUE = ("--endpoint", "--scenario", "--prefix", "--certs")
+BY_FILE_S = 1.0  # longest wait for a confirmation by file; a rig needs 10 ms and its ramp
+_NO_PEER = FAULTS["NO_PEER"].exit_status
 _DEFAULT = "tcp/127.0.0.1:7447"  # endpoint of a scenario that names none
 
 ordered: list[stop_file.StopOrder] = []  # the stops that this process ordered at its start
+answers: list[Any] = []  # the answer of the rig to the stop of this process
+CUT_AMPLIFIER = "assume that the exciter still vibrates: cut its amplifier by hand now"
 
 
 def stop_by_file(words: list[str]) -> None:
     """Order the stop of a command line `stop ...`; one with an unknown option, or another command, orders none."""
     if words[:1] == ["stop"] and (given := _options(words[1:])) is not None and (endpoint := _endpoint(given)):
         ordered.extend(stop_file.order(endpoint, sender()))
+
+
+def status_of_stop(words: list[str], status: int) -> int:
+    """The exit status of a command line: a stop that failed before it was sent, as by a wrong option, ends like NO_PEER."""
+    if words[:1] != ["stop"] or answers or status in (0, _NO_PEER) or stop_file.confirmed(ordered, BY_FILE_S):
+        return status
+    print_line(f"stickslip: STOP NOT DELIVERED: {CUT_AMPLIFIER}")
+    return _NO_PEER
 
 
 def sender() -> str:

@@ -29,8 +29,6 @@ def announced_ahead(s: ControllerMemory, t_ns: int, until_ns: int) -> float:
     holding_ns, holding_mps, fastest_mps = -1, 0.0, 0.0
     for i in range(min(s.announced_count, MOST_ANNOUNCED)):
         from_ns, velocity_mps = s.announced_from_ns[i], s.announced_mps[i]
-        if not math.isfinite(velocity_mps):
-            continue
         if from_ns <= t_ns:
             if from_ns > holding_ns:
                 holding_ns, holding_mps = from_ns, velocity_mps

@@ -1,10 +1,8 @@
 """The controller process: blocks in, commands out. The command leaves first; all other messages follow."""
 
-import collections
 import json
 import math
 import threading
-from collections.abc import Callable
 
 from bridge.faults import Fault
 from bridge.plain import StepReport, no_report
@@ -37,10 +35,8 @@ from controller.rig_header import for_rig, refuse_another_rig
 # blocks of a rig that has left the bus, until it counts as lost; and for the recorder after a cut of the link. The recorder was
 # back 0.4 s after this process (tests/system/test_restart.py). Shorter: events miss the log. Longer: a rig is lost later.
 _WAIT_S = 1.0
-_MOST_WAITING = 1000  # most events that wait during a cut; the recorder reports older ones as GAP
 _GIVEN_UP_S = 30.0  # time without a rig after which this process ends; equals the wait for a rig at the start
 _AT_ONCE_S = 0.05  # time for a controller that starts at the same moment to appear, and period of checking again
-_LONGEST_WHO = 200  # most letters of an operator's name in an answer
 # Wait for another controller to leave. Shorter: a frozen controller refuses this one, though its lease is about to end. Longer: a
 # second controller is refused later.
 _OTHER_GONE_S = LEASE_S + 0.2
@@ -60,7 +56,7 @@ def run(
 
     Raises Fault NO_PEER, PEER_DIED, BAD_MESSAGE, CONFIG, ENDPOINT_BUSY.
     """
-    node = ControllerNode(config, lockstep)
+    node = ControllerNode(config)
     node.warm_up()
     report("waiting", f"for a rig at {bus_config.endpoint}, at most {bus_config.wait_s:g} s")
     with Bus(bus_config, "controller", lockstep, stop) as bus:
@@ -70,7 +66,6 @@ def run(
         header.configuration = json.dumps(config.model_dump(mode="json"), sort_keys=True)  # a replay needs them
         bus.serve_header(header)
         process = ControllerProcess(config, node, bus, lockstep, report=report)
-        process.prepare()
         granted = ""
         if lockstep:
             # Plant and controller take turns: if they share a core, waking the other process takes a tenth of the time.
@@ -130,51 +125,34 @@ class ControllerProcess:
         self._bus = bus
         self._lockstep = lockstep
         self._inbox = inbox or Inbox(WAITING)
-        self._send: dict[str, Callable[[bytes], None]] = {}
         self._events = 0
+        self._waiting: list[bytes] = []  # events that are not sent yet
+        self._events_from_s = 0.0  # time from which events are sent: during a cut of the link the log would miss them
         self._complaints = Complaints(self.event)
-        self._orders = Complaints(lambda code, text: self.event(code, text.replace(": ", " ", 1)))
         node.note = self._complaints.note
         self._dropped: dict[str, int] = {}  # number of published drops of the inbox, by topic
         self._end_sent_s: float | None = None
-        self._restarts = 0
         self._refusal: Fault | None = None  # of a restarted rig, by its header
         self._rig_came = 0
         self._rig_lost = ""  # the reason, from RIG_LOST until blocks arrive
-        self._rig_back_s = -math.inf  # time of the last RIG_BACK
-        self._is_cut = False  # from RIG_LOST without a link until the recorder is back: events wait
-        self._waiting = collections.deque[bytes](maxlen=_MOST_WAITING)
         self._blocks = Freshness(config.block_s, config.limits.stale_after_s)
-
-    def prepare(self) -> None:
-        """Open the publishers and listen to plant and operator."""
-        for topic in (COMMAND, TRACE, STATE, SNAPSHOT, CONTROLLER_EVENT):
-            self._send[topic.name] = self._bus.publisher(topic)
-        self._bus.listen(SENSORS, self._inbox.push)
-        self._bus.listen(ANNOUNCE, self._inbox.keep)
-        for topic in (PLANT_EVENT, OPERATOR):
-            self._bus.listen(topic, self._inbox.keep)
-
-    def _read_header_again(self) -> None:
-        """Compare the header of a restarted rig, in a thread, as the loop must not wait for it."""
-        try:
-            refuse_another_rig(self._bus.headers(["plant"], _WAIT_S, threading.Event()).get("plant"), self._config)
-        except Fault as fault:
-            self._refusal = fault
+        self._send = {topic.name: bus.publisher(topic) for topic in (COMMAND, TRACE, STATE, SNAPSHOT, CONTROLLER_EVENT)}
+        bus.listen(SENSORS, self._inbox.push)
+        for topic in (ANNOUNCE, PLANT_EVENT, OPERATOR):
+            bus.listen(topic, self._inbox.keep)
 
     def event(self, code: str, text: str) -> None:
         """Publish an event with a code and a text."""
         event = wire.Event(sequence=self._events, t_ns=self._node.t_ns, source="controller", code=code, text=text)
         self._events += 1
         self._waiting.append(event.SerializeToString())
-        if not self._is_cut:
-            self._send_events()
+        self._send_events()
         if is_listed(code):
             self._report(code, text)
 
     def _send_events(self) -> None:
-        while self._waiting:
-            self._send[CONTROLLER_EVENT.name](self._waiting.popleft())
+        while self._waiting and time.monotonic() >= self._events_from_s:
+            self._send[CONTROLLER_EVENT.name](self._waiting.pop(0))
 
     def loop(self, stop: threading.Event, granted: str) -> None:
         """Take blocks in order and answer each block; the plant applies the newest answer.
@@ -186,10 +164,9 @@ class ControllerProcess:
         finally:
             self._fade_out()
             self._publish(self._blocks.paused())
-            for reports in (self._complaints, self._orders):
-                reports.report_when_due(all_of_it=True)
+            self._complaints.report_when_due(all_of_it=True)
         node = self._node
-        self._is_cut = False
+        self._events_from_s = 0.0
         self.event("END", f"steps={node.steps} duplicates={node.duplicates} dropped={self._inbox.dropped}")
 
     @property
@@ -207,10 +184,7 @@ class ControllerProcess:
             received = self._inbox.get(max(blocks.due_s - asked_s, 0.0))
             waited_until_s = max(asked_s, blocks.due_s)
             if received is not None:
-                if self._consume(received):  # only a new block is fresh: a rig that hangs may repeat its last block
-                    self._publish(blocks.heard(time.monotonic(), self._node.block_was_late))
-                    if self._node.unreadable:
-                        self._publish(blocks.unreadable(self._node.last_block))
+                self._consume(received)
                 if received.topic is SENSORS and not started:
                     started = True
                     self._report("running", granted or "in lockstep")
@@ -246,7 +220,6 @@ class ControllerProcess:
                 self._dropped[topic] = dropped
                 self._complaints.note(FLOOD, topic, "more messages than can be answered: dropped", new)
         self._complaints.report_when_due()
-        self._orders.report_when_due()
 
     def _ramp(self, silent_blocks: int) -> None:
         self._send[COMMAND.name](self._node.stale(silent_blocks).payload)
@@ -258,55 +231,56 @@ class ControllerProcess:
             self._ramp(1)
             time.sleep(self._config.block_s)
 
-    def _consume(self, received: Received) -> bool:
-        """Take one message; return whether it was a block that got an answer. Unreadable messages are dropped and reported."""
+    def _consume(self, received: Received) -> None:
+        """Take one message. Unreadable messages are dropped and reported."""
         try:
-            return self._take(received)
+            if received.topic is SENSORS:
+                self._take_block(received)
+            elif received.topic is ANNOUNCE:
+                self._node.announcement(received.payload)
+            elif received.topic is OPERATOR:
+                self._apply(received.payload)
+            else:
+                self._take_rig_event(parsed(wire.Event, received.payload, PLANT_EVENT.name))
         except Fault as fault:
             if fault.kind.code != "BAD_MESSAGE":
                 raise
             self._complaints.note(BAD_MESSAGE, received.topic.name, f"{fault.line.partition(': ')[2]}: dropped")
-            return False
 
-    def _take(self, received: Received) -> bool:
-        node = self._node
-        if received.topic is SENSORS:
-            before = node.last_block
-            command = node.block(received.payload, received.arrival_ns, time.perf_counter_ns())
-            if command is not None:
-                self._send[COMMAND.name](command.payload)
-                if not self._lockstep:
-                    realtime.let_the_bus_send()
-                self._send_rest(0 if self._lockstep else received.arrival_ns)
-                self._report_block(before)
-            return command is not None
-        if received.topic is ANNOUNCE:
-            node.announcement(received.payload)
-        elif received.topic is OPERATOR:
-            self._apply(received.payload)
-        else:
-            self._take_rig_event(parsed(wire.Event, received.payload, PLANT_EVENT.name))
-        return False
-
-    def _report_block(self, before: int) -> None:
-        """Publish the events of the block that was just answered; `before` is the number of the block before it."""
-        node = self._node
-        self._publish(node.news())
-        if node.restarts != self._restarts:
-            self._restarts = node.restarts
-            text = f"block {node.last_block} after block {before}: the controller continues with empty windows"
-            self.event("RIG_RESTARTED", text)
-            threading.Thread(target=self._read_header_again, name="rig again", daemon=True).start()
+    def _take_block(self, received: Received) -> None:
+        """Answer a new block, then publish its events; only a new block is fresh: a rig that hangs may repeat its last block."""
+        node, in_real_time = self._node, not self._lockstep
+        command = node.block(received.payload, received.arrival_ns, time.perf_counter_ns() if in_real_time else 0)
+        if command is None:
+            return
+        self._send[COMMAND.name](command.payload)
+        if in_real_time:
+            realtime.let_the_bus_send()
+        self._send_rest(received.arrival_ns if in_real_time else 0)
+        now_s = time.monotonic()
+        for code, text in node.news():
+            self.event(code, text)
+            if code == "RIG_RESTARTED":
+                threading.Thread(target=self._read_header_again, name="rig again", daemon=True).start()
         if self._rig_lost:  # the event repeats the reason, as RIG_LOST may not have passed the broken link
             self._report("joined", "the rig again")
+            self._events_from_s = min(self._events_from_s, now_s + _WAIT_S)
             self.event("RIG_BACK", f"blocks arrive again, from block {node.last_block} on; {self._rig_lost}")
-            self._rig_lost, self._rig_back_s = "", time.monotonic()
-        if self._is_cut and (self._bus.alive("recorder") or time.monotonic() > self._rig_back_s + _WAIT_S):
-            self._is_cut = False
+            self._rig_lost = ""
+        if self._waiting:
+            self._events_from_s = 0.0 if self._bus.alive("recorder") else self._events_from_s
             self._send_events()
-        if self._end_sent_s is not None and time.monotonic() - self._end_sent_s > _WAIT_S:
+        if self._end_sent_s is not None and now_s - self._end_sent_s > _WAIT_S:
             self._end_sent_s = None
             self._complaints.note(FOREIGN, PLANT_EVENT.name, "END, but the rig still runs: ignored")
+        self._publish(self._blocks.heard(now_s, node.in_time))
+
+    def _read_header_again(self) -> None:
+        """Compare the header of a restarted rig, in a thread, as the loop must not wait for it."""
+        try:
+            refuse_another_rig(self._bus.headers(["plant"], _WAIT_S, threading.Event()).get("plant"), self._config)
+        except Fault as fault:
+            self._refusal = fault
 
     def _take_rig_event(self, event: wire.Event) -> None:
         if event.code == "END":
@@ -322,8 +296,7 @@ class ControllerProcess:
             raise Fault("BAD_MESSAGE", f"{OPERATOR.name}: action = {command.action}: not known")
         self._node.operator(command.action)
         if not (self._node.rig_reports and self._blocks.is_fresh):  # a rig with a guard reports the command itself
-            sender = command.who[:_LONGEST_WHO] or "an unnamed operator"
-            self._orders.note("OPERATOR", wire.Operator.Action.Name(command.action), f"by {sender}")
+            self._complaints.order(wire.Operator.Action.Name(command.action), command.who)
 
     def _send_rest(self, arrival_ns: int) -> None:
         lateness_ns = time.perf_counter_ns() - arrival_ns if arrival_ns else 0
@@ -343,6 +316,6 @@ class ControllerProcess:
         if self._lockstep or silent_s > _GIVEN_UP_S:
             raise Fault("PEER_DIED", f"{text}, {silent_s:.1f} s ago")
         if not self._rig_lost:
-            self._rig_lost, self._is_cut = f"{text} then", not self._bus.linked()
+            self._rig_lost, self._events_from_s = f"{text} then", 0.0 if self._bus.linked() else math.inf
             self._report("waiting", f"for the rig, at most {_GIVEN_UP_S:g} s: {text}")
             self.event("RIG_LOST", f"{text}; waiting for it for {_GIVEN_UP_S:g} s")

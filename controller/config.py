@@ -32,8 +32,7 @@ class PolicyConfig(Strict):
 
     gone = {
         "gentle_ratio": "least_ratio is the least v_a / v_d",
-        "gentle_from": "a vibration begins as soon as a stick is seen",
-        "too_late_from": "a vibration begins as soon as a stick is seen",
+        **dict.fromkeys(("gentle_from", "too_late_from"), "a vibration begins as soon as a stick is seen"),
         **dict.fromkeys(
             ("first_probe_s", "probe_every_s", "probe_every_max_s", "probe_fade_s", "probe_hold_s"),
             "trial_every_s is the time between trials without vibration",

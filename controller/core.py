@@ -15,7 +15,6 @@ from controller.exciter import begin_gain, listen, note_applied, note_check, res
 from controller.in_force import note_in_force
 from controller.limits import allow
 from controller.policy.decide import decide
-from controller.policy.need import way_of
 from controller.policy.reason import reason_of
 from controller.policy.trial import note_fall
 from controller.trips.reset import begin_motion, begin_policy, end_trips
@@ -73,55 +72,32 @@ def step(
             listen(p, s)
             force_N = _look(p, s, block)
             watch_channels(p, s)
-            watch(p, s, block)
-            decide(p, s, t_ns, force_N, p.block_s)
+            watch(p, s)
+            decide(p, s, t_ns, force_N)
             restrain(s)
             stroke(p, s)
     allow(p, s, events, p.frequency_Hz, s.wanted_m if usable else math.nan)
     s.silent_s = s.silent_s + p.block_s if s.allowed_m == 0.0 else 0.0
 
     c: CommandRow = command[0]
-    c.sequence = s.steps
-    c.t_ns = t_ns
-    c.block = s.block
-    c.frequency_Hz = s.allowed_Hz
-    c.amplitude_m = s.allowed_m
-    c.mode = s.mode
-    c.limit = s.limit
-    c.reason = reason_of(s)
-    c.run = s.run
+    c.sequence, c.t_ns, c.block, c.run = s.steps, t_ns, s.block, s.run
+    c.frequency_Hz, c.amplitude_m = s.allowed_Hz, s.allowed_m
+    c.mode, c.limit, c.reason = s.mode, s.limit, reason_of(s)
 
     t: TraceRow = trace[0]
-    t.sequence = s.steps
-    t.t_ns = t_ns
-    t.block = s.block
-    t.events = events
-    t.gap_blocks = gap_blocks
-    t.state = s.contact
-    t.mode = s.mode
-    t.reason = c.reason
-    t.limit = s.limit
-    t.slips = s.slips
-    t.force_rate = s.force_rate
+    t.sequence, t.t_ns, t.block, t.events, t.gap_blocks = s.steps, t_ns, s.block, events, gap_blocks
+    t.state, t.mode, t.reason, t.limit = s.contact, s.mode, c.reason, s.limit
+    t.slips, t.surges, t.announcements = s.slips, s.surges, s.announced_count
+    t.force_rate, t.window_s, t.time_to_slip_s = s.force_rate, s.window_s, s.time_to_slip_s
     t.drive_force_N = force_N if p.use_force == 1 or s.compliance_m_per_N > 0.0 else 0.0
-    t.drive_velocity_mps = s.drive_velocity_mps
-    t.vibration_velocity_mps = s.vibration_velocity_mps
-    t.wanted_velocity_mps = s.wanted_velocity_mps
-    t.wanted_amplitude_m = s.wanted_m
-    t.wanted_frequency_Hz = p.frequency_Hz
-    t.time_to_slip_s = s.time_to_slip_s
-    way = way_of(s)
-    t.surges = s.surges
-    t.sliding_velocity_mps = s.direction * s.sliding_mps
-    t.window_s = s.window_s
-    t.velocity_ratio = s.ratio_now
+    t.drive_velocity_mps, t.sliding_velocity_mps = s.drive_velocity_mps, s.direction * s.sliding_mps
+    t.vibration_velocity_mps, t.wanted_velocity_mps = s.vibration_velocity_mps, s.wanted_velocity_mps
+    t.velocity_ratio, t.wanted_amplitude_m, t.wanted_frequency_Hz = s.ratio_now, s.wanted_m, p.frequency_Hz
     known = s.compliance_m_per_N > 0.0 and s.compliance_sigma < s.compliance_m_per_N
     t.drive_stiffness_N_per_m = 1.0 / s.compliance_m_per_N if known else 0.0
     t.drive_stiffness_sigma = s.compliance_sigma / s.compliance_m_per_N if known else 1.0
-    t.breakaway_force_N = s.breakaway_N[way]
-    t.loop_delay_s = s.loop_delay_steps * p.block_s
-    t.exciter_gain = s.gain
-    t.announcements = s.announced_count
+    t.breakaway_force_N = s.breakaway_N[0 if s.direction > 0 else 1]
+    t.loop_delay_s, t.exciter_gain = s.loop_delay_steps * p.block_s, s.gain
     s.steps += 1
 
 

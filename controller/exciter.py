@@ -1,14 +1,13 @@
 """The exciter: its gain, learnt from the delivered v_a, and the stroke for a wanted v_a.
 
-Each block states the vibration that the rig applied. The measured v_a is compared with all vibrations applied within the
-longest delay of exciter and accelerometer that the loop is designed for. The gain is learnt only from a v_a that none of them
-explains (set membership: the delay is unknown but bounded). So the learnt gain does not overshoot the true gain, for any delay
-and any change of it, and the loop needs no integrator. Gaps in the commands and limits of the guard change no gain.
+The measured v_a is compared with all vibrations that the rig applied within the longest delay of the loop. The gain is learnt
+only from a v_a that none of them explains (set membership: the delay is unknown but bounded). So it does not overshoot, for any
+delay, gap or limit of the guard, and the loop needs no integrator.
 
-The known gain comes from the rig's loop check, else from the configuration, else from the first even vibration. The stroke
-never exceeds the stroke for the wanted v_a at the known gain, times the band: an accelerometer that loses gain looks like an
-exciter that loses gain. The contact is the second witness: a slide that sticks while the measured v_a is at v_d shows a weak,
-warm exciter, which is followed down to a floor. A gain that leaps down by more than the band is a loose plug.
+The known gain comes from the rig's loop check, else from the configuration, else from the first even vibration. The stroke is at
+most the stroke for the known gain, times the band, as an accelerometer that loses gain looks like an exciter that loses gain. The
+contact is the second witness: a slide that sticks shows a warm exciter, which is followed down to a floor. A gain that leaps down
+by more than the band is a loose plug.
 """
 
 import math
@@ -20,6 +19,7 @@ from bridge.kernel import kernel
 from bridge.layouts import ControllerMemory, ControllerParams, SensorRow
 from bridge.wire.messages import RESET
 from bridge.wire.stickslip_pb2 import CHECKING, OPEN_LOOP
+from controller.in_force import is_settled
 from controller.trips.doubts import ACCELEROMETER, trip
 
 FIRST_SHARE = 0.1  # first stroke over the stroke of the rigid mount, for a gain that was never measured
@@ -29,11 +29,10 @@ TAIL = 3.0  # time constants of the demodulator's low-pass after which an earlie
 SLOTS = 6  # time slots of the extremes of the applied vibration. Fewer: they reach back further, and the gain is learnt later
 _STEADY = 0.05  # largest difference of v_a from its low-pass, over v_a, from which a first gain is known
 _HEARD = 5.0  # smallest v_a that counts as detected, over the v_a that noise shows at rest
-_HOLD_S = 0.1  # time of a gain outside of its bounds until it is reported; a slip that shakes the base is shorter
+HOLD_S = 0.1  # time of a gain outside of its bounds until it is reported; a slip that shakes the base is shorter
 # Time constant of the gain with which a leap is compared. Shorter: leaps are missed. Longer: an exciter that warms up leaps.
 FOLLOW_S = 0.5
 _CHECK_BLOCKS = 16  # blocks after a loop check that carry its result, a tone each; 8 tones at most, so each comes twice
-_ALARM_RATIO = 1.05  # v_a / v_d below which a vibration at the exciter's limit is too weak
 _SAME_HZ = 1.0  # largest difference of the applied frequency, a short float, from the command
 
 
@@ -73,13 +72,6 @@ def restart_gain(p: ControllerParams, s: ControllerMemory, events: int) -> None:
 
 
 @kernel
-def accept_weaker(p: ControllerParams, s: ControllerMemory) -> None:
-    """Follow a warm exciter: the contact shows that it delivers no more than measured."""
-    if s.gain_off_s == 0.0:
-        s.accepted_share = max(min(s.gain / s.known_gain, s.accepted_share), p.gain_floor)
-
-
-@kernel
 def note_applied(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> None:
     """Store the vibration that the rig applied in this block, and the loop delay: the age of its command."""
     applied_m = float(block.applied_m)
@@ -105,15 +97,14 @@ def listen(p: ControllerParams, s: ControllerMemory) -> None:
     least_mps, most_mps, now_mps = s.least_mps.min(), s.most_mps.max(), s.vibration_velocity_mps
     if most_mps == 0.0:
         s.noise_mps += (p.learn_share if s.noise_mps > 0.0 else 1.0) * (now_mps - s.noise_mps)
-    before, s.unexplained, s.unheard, s.resonates = s.unexplained, 0, 0, 0
+    before, s.unexplained, s.resonates = s.unexplained, 0, 0
     noise_mps, doubted = _HEARD * s.noise_mps, s.doubted & ACCELEROMETER != 0
     if s.known_gain == 0.0 and most_mps > 0.0 and not doubted:
-        s.unheard = 1 if least_mps > 0.0 and now_mps <= noise_mps else 0
         steady = math.fabs(s.fast_mps - now_mps) < _STEADY * now_mps
         if now_mps > noise_mps and steady and s.applied_mps > 0.0:
             s.gain = s.followed_gain = s.known_gain = s.fast_mps / s.applied_mps
     if least_mps == 0.0 or s.known_gain == 0.0 or doubted:
-        s.gain_off_s = 0.0
+        s.gain_off_s = s.low_s = 0.0
         return
     if now_mps > p.gain_leap * s.gain * most_mps:
         s.unexplained = 1
@@ -125,16 +116,12 @@ def listen(p: ControllerParams, s: ControllerMemory) -> None:
     s.gain = min(s.gain + p.learn_share * (explained - s.gain), s.known_gain / FIRST_SHARE)
     leaps = s.gain * p.gain_band < min(s.followed_gain, s.known_gain)
     high = s.gain > p.gain_leap * s.known_gain
+    s.low_s = s.low_s + p.block_s if s.gain * p.gain_leap < s.accepted_share * s.known_gain else 0.0
     s.followed_gain += p.follow_share * (s.gain - s.followed_gain)
     s.gain_off_s = s.gain_off_s + p.block_s if leaps or high else 0.0
-    if s.gain_off_s > _HOLD_S and leaps:
+    if s.gain_off_s > HOLD_S and leaps:
         trip(s, OPEN_LOOP, ACCELEROMETER)
-    s.resonates = 1 if s.gain_off_s > _HOLD_S and high else 0
-
-
-@kernel
-def _least_gain(p: ControllerParams, s: ControllerMemory) -> float:
-    return s.accepted_share * s.known_gain / p.gain_band
+    s.resonates = 1 if s.gain_off_s > HOLD_S and high else 0
 
 
 @kernel
@@ -144,13 +131,18 @@ def stroke(p: ControllerParams, s: ControllerMemory) -> None:
     if s.wanted_velocity_mps <= 0.0:
         s.wanted_m, s.weak_s = 0.0, 0.0
         return
-    doubted = s.doubted & ACCELEROMETER != 0
-    gain = s.accepted_share * s.known_gain if doubted and s.known_gain > 0.0 else s.gain
-    if gain < _least_gain(p, s):
-        gain, s.banded = _least_gain(p, s), 1
+    doubted, accepted = s.doubted & ACCELEROMETER != 0, s.accepted_share * s.known_gain
+    gain = accepted if doubted and accepted > 0.0 else s.gain
+    if gain < accepted / p.gain_band:
+        gain, s.banded = accepted / p.gain_band, 1
     s.wanted_m = s.wanted_velocity_mps / (math.tau * p.frequency_Hz * gain)
     largest_m = min(p.amplitude_max_m, p.velocity_max_mps / (math.tau * p.frequency_Hz))
-    if s.wanted_m > largest_m or s.unheard == 1 or s.banded == 1 or doubted:
+    unheard = s.known_gain == 0.0 and s.least_mps.min() > 0.0
+    if s.wanted_m > largest_m or unheard or s.banded == 1 or doubted:
         s.at_limit = 1
-    judged = s.at_limit == 1 and not doubted and s.in_force_s > 0.0
-    s.weak_s = s.weak_s + p.block_s if judged and s.vibration_velocity_mps < _ALARM_RATIO * s.held_mps else 0.0
+    weak = s.at_limit == 1 and not doubted and s.vibration_velocity_mps < p.least_ratio * s.held_mps
+    s.weak_s = s.weak_s + p.block_s if weak and s.in_force_s > 0.0 else 0.0
+    begun = s.slip_began == 1 or s.stick_began == 1
+    if weak and begun and s.banded == 1 and s.gain_off_s == 0.0 and is_settled(s, 0.0):
+        # the contact shows that a warm exciter delivers no more than measured
+        s.accepted_share = max(min(s.gain / s.known_gain, s.accepted_share), p.gain_floor)

@@ -16,7 +16,6 @@ SETTLED_S = 0.15
 # the spring has settled, which looks like a swing of friction. Shorter: with 0, an exciter that delivers double for 80 ms of each
 # second raised the ratio from 1.2 to 1.43; gaps in the commands did so on none of five axes. Longer: a swing is followed later.
 _SPRING = 2.0
-_SLOWEST_S = 5.0  # longest settling time of the spring that counts; slow feeds would hold the ratio for minutes
 
 
 @kernel
@@ -31,4 +30,4 @@ def note_in_force(p: ControllerParams, s: ControllerMemory, events: int, block: 
 @kernel
 def is_settled(s: ControllerMemory, spring_s: float) -> bool:
     """Whether the slide has settled after the last interruption, for a settling time of its spring [s]: else no ratio rises."""
-    return s.in_force_s > max(SETTLED_S, _SPRING * min(spring_s, _SLOWEST_S))
+    return s.in_force_s > max(SETTLED_S, _SPRING * spring_s)

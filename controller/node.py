@@ -16,8 +16,7 @@ from bridge.wire.topics import ANNOUNCE, COMMAND, SENSORS, SNAPSHOT, STATE, TRAC
 from controller.announced import take_announcement
 from controller.config import ControllerConfig
 from controller.core import step
-from controller.freshness import MARGIN_NS, Age
-from controller.in_force import SETTLED_S
+from controller.freshness import MARGIN_NS, Age, Events
 from controller.records import build
 from controller.telemetry import SNAPSHOT_EVERY, STATE_EVERY, plotted, snapshot
 from controller.trips.trip_events import TripEvents
@@ -32,40 +31,33 @@ _SECOND = "dropped; is a second rig on this prefix?"
 
 
 class ControllerNode:
-    """The controller, stepped frame by frame.
+    """The controller of a configuration, stepped frame by frame.
 
     Raises Fault BAD_MESSAGE for messages that cannot be read, CONFIG for blocks of another length.
-
-    Args:
-        config: the controller.
-        lockstep: whether the rig waits for each command: no block is late then, however long the computer stalled.
-
     """
 
-    def __init__(self, config: ControllerConfig, lockstep: bool = False) -> None:
+    def __init__(self, config: ControllerConfig) -> None:
         self.note: Callable[..., object] = lambda *_: None  # publishes a fault of the blocks, as `Complaints.note`
         self.duplicates = 0  # number of repeated blocks, and of late blocks that were counted as a gap
-        self.restarts = 0  # number of restarts of the rig
         self.steps = 0
         self.t_ns = 0  # time of the last frame
+        self.block_t_ns = 0  # time of the last block
+        self.last_block = -1  # number of the last block
+        self.age = Age()
         self._params, self._state = build(config)
         self._block_ns = round(config.block_s * 1e9)
         self._layout = sensor_block(config.samples_per_block)
         self._no_sensors = self._layout.blank()
         self._command = COMMAND_LAYOUT.blank()
         self._trace = TRACE_LAYOUT.blank()
-        self._lateness_ns = self._trace["lateness_ns"]
         self._numbers = BlockNumbers()
-        self.block_t_ns = 0  # time of the last block
         self._seals = False  # whether the rig's blocks have a checksum
-        self._length_checked = False
-        self._wrong_lengths_ns: list[int] = []
+        self._lengths_ns: list[int] | None = []  # of the blocks so far; None once a length was right
+        self._clock_jump_ns = 0  # t_ns of the last block minus the time by its number; 0 if about equal
         self._operator_events = 0
         self._announced = 0  # ANNOUNCED if announcements arrived since the last frame, else 0
+        self._news: Events = []  # of the last block
         self._trip_events = TripEvents()
-        self.age = Age()
-        self._lockstep = lockstep
-        self._clock_jump_ns = 0  # t_ns of the last block minus the time by its number; 0 if about equal
 
     @property
     def amplitude_m(self) -> float:
@@ -78,19 +70,13 @@ class ControllerNode:
         return int(self._state[0]["guard_state"]) != wire.NO_GUARD
 
     @property
-    def block_was_late(self) -> bool:
-        """Whether the last block was answered later than the amplitude loop tolerates, 15 ms."""
-        return self.age.late_ns > MARGIN_NS
+    def in_time(self) -> bool:
+        """Whether the last block was answered in time, within 15 ms, and all its samples are numbers."""
+        return self.age.late_ns <= MARGIN_NS and not self._is_unreadable
 
     @property
-    def unreadable(self) -> bool:
-        """Whether the last block held a sample of NaN or infinity."""
+    def _is_unreadable(self) -> bool:
         return int(self._trace[0]["limit"]) == wire.NOT_FINITE
-
-    @property
-    def last_block(self) -> int:
-        """Number of the last block; -1 before the first."""
-        return (self._numbers.expected or 0) - 1
 
     def warm_up(self) -> None:
         """Compile or load the kernels on copies, so that the first answer is not late."""
@@ -110,7 +96,7 @@ class ControllerNode:
 
     def operator(self, action: int) -> None:
         """Take an operator's action (`wire.Operator.Action`); it takes effect, and is logged, with the next frame."""
-        self._operator_events = obeyed(self._operator_events, action)
+        self._operator_events = operator_events(self._operator_events, action)
 
     def announcement(self, payload: bytes) -> None:
         """Take the rig's announcement of its drive velocity for the next frame. Raises Fault BAD_MESSAGE."""
@@ -132,12 +118,13 @@ class ControllerNode:
     def block(self, payload: bytes, arrival_ns: int = 0, answered_ns: int = 0) -> Outgoing | None:
         """Consume a sensor block; return the command that answers it, or None for a late, repeated or foreign block.
 
-        Send the command first; then `rest` gives the other messages of the step.
+        Send the command first; then `rest` gives the other messages of the step, and `news` its events.
 
         Args:
             payload: the block.
-            arrival_ns: time of its arrival (time.perf_counter_ns); 0 in lockstep.
-            answered_ns: the present time; the age of a block counts until now, including its time in the queue.
+            arrival_ns: time of its arrival (time.perf_counter_ns).
+            answered_ns: the present time; the age of a block counts until now, including its time in the queue. 0 in lockstep:
+                the rig waits, so no block is late, however long the computer stalled.
 
         """
         payload = self._layout.canonical(payload, SENSORS.name)
@@ -152,11 +139,11 @@ class ControllerNode:
         if verdict is NumberCheck.AGAIN:
             self.duplicates += 1  # late or repeated: the controller has counted this block as a gap already
             self.note("REPEATED", SENSORS.name, f"repeated or late blocks: {_SECOND}")
-            return None
-        if verdict is NumberCheck.STRAY:
+        if verdict in (NumberCheck.AGAIN, NumberCheck.STRAY):
             return None
         if verdict is NumberCheck.ANEW:
-            self.restarts += 1
+            text = f"block {sequence} after block {self.last_block}: the controller continues with empty windows"
+            self._news.append(("RIG_RESTARTED", text))
             self.age.forget()
             gap_blocks, self._clock_jump_ns = _MOST_GAP_BLOCKS, 0
         else:
@@ -164,12 +151,13 @@ class ControllerNode:
             gap_blocks = min(lost, _MOST_GAP_BLOCKS)
             if expected is not None:
                 self._check_clock(t_ns - self.block_t_ns, lost)
-        if not self._lockstep:
+        if answered_ns > 0:
             self.age.note(answered_ns, t_ns)
+        self.last_block = sequence
         self.block_t_ns = self.t_ns = t_ns
-        sensors = self._layout.record(payload)
-        events = BLOCK | (GAP if gap_blocks else 0) | (LATE if self.block_was_late else 0) | self._operator_events
-        return self._step(sensors, events, gap_blocks)
+        late = LATE if self.age.late_ns > MARGIN_NS else 0
+        events = BLOCK | (GAP if gap_blocks else 0) | late | self._operator_events
+        return self._step(self._layout.record(payload), events, gap_blocks)
 
     def _refuse_changed(self, payload: bytes) -> None:
         """Raise Fault BAD_MESSAGE for a block that was changed in transit; after the first checksum every block needs one."""
@@ -187,11 +175,10 @@ class ControllerNode:
         self._clock_jump_ns = off_ns if 100 * abs(off_ns) > self._block_ns else 0
         if self._clock_jump_ns:
             self.age.forget()
-        if self._length_checked or lost:
+        if self._lengths_ns is None or lost:
             return
-        self._wrong_lengths_ns = [*self._wrong_lengths_ns, apart_ns][-_WRONG_LENGTHS:] if self._clock_jump_ns else []
-        self._length_checked = not self._clock_jump_ns
-        if len(self._wrong_lengths_ns) >= _WRONG_LENGTHS and len(set(self._wrong_lengths_ns)) == 1 and apart_ns > 0:
+        self._lengths_ns = [*self._lengths_ns, apart_ns][-_WRONG_LENGTHS:] if self._clock_jump_ns else None
+        if self._lengths_ns == [apart_ns] * _WRONG_LENGTHS and apart_ns > 0:
             line = f"{SENSORS.name}: blocks are {apart_ns * 1e-6:g} ms apart: must be block_s = {self._block_ns * 1e-9:g} s"
             raise Fault("CONFIG", f"{line}; set block_s of rig and controller alike")
 
@@ -210,22 +197,26 @@ class ControllerNode:
         self.steps += 1
         return Outgoing(COMMAND, self._command.tobytes())
 
-    def news(self) -> list[tuple[str, str]]:
-        """Codes and texts of trips and limits that the last step began or ended; notes faults of the last block."""
+    def news(self) -> Events:
+        """Codes and texts of a restart of the rig, and of trips that began or ended; notes the faults of the last block."""
         if self._clock_jump_ns:
             text = f"t_ns is {self._clock_jump_ns * 1e-6:g} ms off the time that the block number gives"
             self.note(CLOCK, SENSORS.name, f"block {self.last_block}: {text}; trace and log keep the rig's times")
         if self.age.is_late:
             text = f"blocks arrive {self.age.late_ns * 1e-6:.0f} ms later than before"
             self.note("LATE", SENSORS.name, f"{text}: v_a oscillates more than it should")
+        if self._is_unreadable:
+            text = f"block {self.last_block} holds a sample that is not a number: ramping to zero"
+            self.note("NOT_FINITE", SENSORS.name, text)
         if self._state[0]["slide_accel_unread"]:
             text = "a sample is not a number; the controller continues without this channel"
             self.note("NOT_FINITE", f"{SENSORS.name} mass_accel_mps2", text)
-        return self._trip_events.news(self._trace[0], bool(self._state[0]["in_force_s"] < SETTLED_S))
+        news, self._news = self._news, []
+        return news + self._trip_events.news(self._trace[0])
 
     def rest(self, lateness_ns: int) -> list[Outgoing]:
         """The messages after the command: the trace, and at lower rates the plotted state and a snapshot of the memory."""
-        self._lateness_ns[0] = lateness_ns
+        self._trace["lateness_ns"] = lateness_ns
         messages = [Outgoing(TRACE, self._trace.tobytes())]
         if self.steps % STATE_EVERY == 0:
             messages.append(Outgoing(STATE, plotted(self._trace, self.steps).tobytes()))
@@ -234,7 +225,7 @@ class ControllerNode:
         return messages
 
 
-def obeyed(events: int, action: int) -> int:
+def operator_events(events: int, action: int) -> int:
     """The operator's bits for the next frame, after a further action (`wire.Operator.Action`); a RESET does not cancel a STOP."""
     if action == wire.Operator.STOP:
         return STOP

@@ -3,8 +3,8 @@
 Inputs are fed, outputs are compared; no output is copied from the log. The only field that is not compared is the lateness in
 the trace, which comes from a clock and has no effect on a command.
 
-A log in order is replayed piece by piece. A step is replayed once its block, its command and its announcements have been read,
-and is then dropped, so that the memory does not grow with the log. A log that lacks messages is replayed as a whole.
+A log is replayed piece by piece, each step once its messages, or later ones of their topics, have been read; then its messages
+are dropped, so that the memory does not grow with the log. A log that is not in order is sorted as a whole first.
 """
 
 from typing import Any, Final, NamedTuple
@@ -24,8 +24,8 @@ from controller.config import ControllerConfig
 from controller.core import step
 from controller.records import LAYOUT_ID, STATE, build
 
-# Largest delay of a message in the log [steps], 10 s of blocks of 1 ms. Larger: a replay in pieces needs more memory. Smaller: a
-# log with a step farther from its block is read a second time, as a whole. Not swept.
+# Most blocks that wait for a step, 10 s of blocks of 1 ms, as a rig may run on without its controller. Larger: more memory.
+# Smaller: a log whose steps are farther from their blocks is read a second time, as a whole. Not swept.
 WINDOW: Final = 10_000
 _BLOCK = sensor_block(20)  # layout of the blocks before the first has come
 _OF_A_CLOCK = "lateness_ns"  # field of the trace that comes from a clock and is not compared
@@ -64,7 +64,7 @@ class Replay(NamedTuple):
 
 
 class OutOfOrder(Exception):
-    """Messages are missing or not in order: the log can only be replayed as a whole."""
+    """Messages are not in order: `replay` sorts the whole log."""
 
 
 @unlocked_kernel
@@ -97,32 +97,29 @@ def _steps(
 
 
 class Replayer:
-    """Replay of a log piece by piece, in its order. Methods raise OutOfOrder, but not with `whole`.
+    """Replay of a log piece by piece. Methods raise OutOfOrder if the messages of a topic do not come in order.
 
     Args:
         changes: configurations in order of time; the first holds from the start.
         from_s: only steps from this time on are compared. The replay starts at the last snapshot before, or at the run's start.
-        whole: whether all of the log is added before `result`; it may then be in any order.
 
     """
 
-    def __init__(self, changes: list[Change], from_s: float = 0.0, whole: bool = False) -> None:
+    def __init__(self, changes: list[Change], from_s: float = 0.0) -> None:
         built = [build(change.config) for change in changes]
         self._params = np.concatenate([params for params, _ in built]).view(built[0][0].dtype)
         self._params_from_ns = np.array([change.t_ns for change in changes])
         self._memory = built[0][1]
         self._from_ns = round(from_s * 1e9)
-        self._whole = whole
-        # messages that no step has used so far, by sequence
+        self._begun = self._from_ns == 0
+        # messages that no step has used so far, by sequence; all announcements
         self._tables: dict[str, Records] = {
             "trace": TRACE.blank(0), "sensors": _BLOCK.blank(0),
             "command": COMMAND.blank(0), "announce": ANNOUNCE.blank(0),
         }  # fmt: skip
-        self._dropped = dict.fromkeys(self._tables, -1)  # largest sequence of dropped messages
-        self._snapshots: list[wire.Snapshot] = []  # of the memory after the present step
-        self._newest = 0  # number of steps in the newest piece, whose blocks and commands may follow
-        self._begun = False
-        self._lost_from: int | None = None  # step from which the memory is lost, until a snapshot at or after it
+        self._newest = dict.fromkeys([*self._tables, "snapshot"], -1)  # largest sequence that has come
+        self._unused = -1  # newest block that was dropped before a step came
+        self._snapshots: list[wire.Snapshot] = []  # of the memory after steps that are not replayed yet
         self._compared = self._skipped = 0
         self._difference: ReplayDifference | None = None
 
@@ -131,100 +128,75 @@ class Replayer:
         table = self._tables.get(topic)
         if table is None or not len(records):
             return
-        if topic == "trace":
-            self._newest = len(records)
-        raw = f"V{records.dtype.itemsize}"  # joined and moved as bytes: numpy would drop the tags between the fields
-        if len(table):
-            records = np.concatenate([table.view(raw), records.view(raw)]).view(records.dtype)
         sequence = records["sequence"]
-        if self._whole:
-            records = records.view(raw)[np.argsort(sequence, kind="stable")].view(records.dtype)
-        elif int(sequence[0]) <= self._dropped[topic] or not (sequence[1:] > sequence[:-1]).all():
-            raise OutOfOrder
-        self._tables[topic] = records
-        if not self._whole:
-            self._advance(end=False)
+        if topic != "announce":  # a rig that restarts counts its announcements from 0
+            self._note_order(topic, int(sequence[0]), int(sequence[-1]))
+            if not (sequence[1:] > sequence[:-1]).all():
+                raise OutOfOrder
+        self._tables[topic] = (
+            np.concatenate([_raw(table), _raw(records)]).view(records.dtype) if len(table) else records
+        )
+        self._advance(end=False)
 
     def add_snapshot(self, snapshot: wire.Snapshot) -> None:
-        """Add a snapshot of the controller's memory; a snapshot of another version is skipped."""
-        if snapshot.layout != LAYOUT_ID:
-            return
-        if not self._whole:
-            early = snapshot.t_ns < self._from_ns
-            if (early and self._begun) or (self._snapshots and snapshot.step <= self._snapshots[-1].step):
-                raise OutOfOrder
-            if early:  # the replay begins after it, or after a later snapshot
-                self._snapshots.clear()
-                self._pass_over(int(np.searchsorted(self._tables["trace"]["sequence"], np.uint64(snapshot.step + 1))))
-            elif self._begun and self._lost_from is None:
-                return
-        self._snapshots.append(snapshot)
+        """Add a snapshot of the controller's memory; the memory of another version is skipped."""
+        self._note_order("snapshot", snapshot.step, snapshot.step)
+        late = snapshot.t_ns >= self._from_ns
+        if snapshot.layout == LAYOUT_ID:
+            if not late:  # the replay begins after it, or after a later snapshot
+                self._snapshots, self._memory["steps"] = [], -1
+                self._skip(snapshot.step)
+            self._snapshots.append(snapshot)
+        self._begun = self._begun or late
+        self._advance(end=False)
+
+    def _note_order(self, topic: str, first: int, last: int) -> None:
+        if first <= self._newest[topic]:
+            raise OutOfOrder
+        self._newest[topic] = last
 
     def result(self) -> Replay:
-        """The result, at the end of the log. Raises Fault BAD_LOG where two controllers answered, as their steps are mixed."""
-        sequence = self._tables["trace"]["sequence"]
-        twice = np.flatnonzero(sequence[1:] == sequence[:-1])
-        if len(twice):
-            _refuse_two(self._tables["trace"][twice[0]], self._tables["trace"][twice[0] + 1])
-        self._snapshots.sort(key=lambda snapshot: snapshot.step)
+        """The result, at the end of the log."""
+        self._begun = True
         self._advance(end=True)
         return Replay(self._compared, self._skipped, self._difference)
 
     def _advance(self, end: bool) -> None:
-        """Replay every complete step; with `end` all steps, as no message follows."""
-        while count := len(self._tables["trace"]):
-            # number of steps whose messages have all been read
-            sure = count if end else max(count - max(WINDOW, self._newest), 0)
-            if not (self._begun or self._begin(bool(sure))):
+        """Replay every step whose messages have come; with `end` all steps, as no message follows."""
+        self._snapshots = [snapshot for snapshot in self._snapshots if snapshot.step >= self._memory[0]["steps"]]
+        while self._begun and len(trace := self._tables["trace"]):
+            follows = int(trace["sequence"][0]) == int(self._memory[0]["steps"])
+            if not (follows or self._restore(end)) or not self._take(end):
                 break
-            if self._lost_from is not None and not self._restore(sure, end):
-                break
-            if not self._take(sure):
-                break
-        for topic in ("sensors", "command") if not self._whole else ():  # messages that no step used
-            if (old := len(table := self._tables[topic]) - 2 * WINDOW) > 0:
-                self._drop(topic, int(table["sequence"][old - 1]))
+        if not len(self._tables["trace"]) and len(blocks := self._tables["sensors"]) > WINDOW:
+            self._unused = int(blocks["sequence"][-WINDOW - 1])
+            self._tables["sensors"] = blocks[-WINDOW:]
 
-    def _begin(self, sure: bool) -> bool:
-        """Find the step at which the replay begins; False while later messages decide it, which is not `sure`."""
-        first = int(self._tables["trace"]["sequence"][0])
-        if (first or self._from_ns) and not sure:
-            return False
-        self._begun = True
-        early = [snapshot.step for snapshot in self._snapshots if snapshot.t_ns < self._from_ns]
-        if first or early:
-            self._lost_from = early[-1] if early else first
-        return True
-
-    def _restore(self, sure: int, end: bool) -> bool:
+    def _restore(self, end: bool) -> bool:
         """Skip steps up to a snapshot with a step after it, and continue there; False while messages are missing."""
-        sequence = self._tables["trace"]["sequence"]
-        while self._snapshots:
-            snapshot = self._snapshots[0]
-            place = int(np.searchsorted(sequence, np.uint64(snapshot.step + 1)))
-            if place >= sure and not end:
-                return False
-            self._snapshots.pop(0)
-            follows = place < len(sequence) and int(sequence[place]) == snapshot.step + 1
-            if follows and snapshot.step >= (self._lost_from or 0):
-                self._pass_over(place)
+        while self._snapshots and (end or self._newest["trace"] > self._snapshots[0].step):
+            snapshot, sequence = self._snapshots.pop(0), self._tables["trace"]["sequence"]
+            if np.uint64(snapshot.step + 1) in sequence:
+                self._skip(snapshot.step)
                 self._memory[:] = np.frombuffer(snapshot.memory, STATE)
-                self._lost_from = None
                 return True
-        self._pass_over(sure)
+        if end:
+            self._skip(self._newest["trace"])
         return False
 
-    def _take(self, sure: int) -> bool:
+    def _take(self, end: bool) -> bool:
         """Replay, compare and drop the steps with all their messages; return whether others may follow at once."""
         trace = writable(self._tables["trace"][: 10 * WINDOW])
         sensors, command, announce = (writable(self._tables[topic]) for topic in ("sensors", "command", "announce"))
-        sequence = trace["sequence"]
-        of_block, has_block = _places(sensors["sequence"], trace["block"])
+        sequence, blocks = trace["sequence"], trace["block"]
+        of_block, has_block = _places(sensors["sequence"], blocks)
         of_command, has_command = _places(command["sequence"], sequence)
+        lacks_block = (trace["events"] & BLOCK != 0) & ~has_block
+        waits = lacks_block & (blocks.astype(np.int64) > self._newest["sensors"])
+        waits |= ~has_command & (sequence.astype(np.int64) > self._newest["command"])
+        waits |= trace["announcements"] > len(announce)
         follows = sequence == np.uint64(self._memory[0]["steps"]) + np.arange(len(trace), dtype=np.uint64)
-        complete = follows & (has_block | (trace["events"] & BLOCK == 0))
-        if not self._whole:
-            complete &= has_command & (trace["announcements"] <= len(announce))
+        complete = follows & ~lacks_block & (~waits | end)
         count = len(trace) if complete.all() else int(np.argmin(complete))
         if count:
             frames, answers, traces = trace[:count], COMMAND.blank(count), TRACE.blank(count)
@@ -240,37 +212,37 @@ class Replayer:
                 logged = command[of_command[:count]] if len(command) else COMMAND.blank(count)
                 pairs = ("trace", frames, traces, late), ("command", logged, answers, late & has_command[:count])
                 self._difference = _first_difference(pairs, traces)
-            self._drop_steps(frames)
-        if count == len(trace):
+            self._drop(frames)
+        if count == len(trace) or not follows[count]:
             return True
-        if count >= sure:
-            return False  # the messages may follow
-        if not self._whole:
+        if waits[count] and not end:
+            return False
+        if int(blocks[count]) <= self._unused:
             raise OutOfOrder
-        self._lost_from = int(sequence[count])
+        self._skip(int(sequence[count]))  # its block is lost
         return True
 
-    def _pass_over(self, count: int) -> None:
-        """Drop the first steps, which cannot be replayed."""
-        steps = self._tables["trace"][:count]
+    def _skip(self, until: int) -> None:
+        """Drop the steps up to a sequence, which cannot be replayed."""
+        trace = self._tables["trace"]
+        steps = trace[: np.searchsorted(trace["sequence"], np.uint64(until), "right")]
         self._skipped += int((steps["t_ns"] >= self._from_ns).sum())
-        self._drop_steps(steps)
+        self._drop(steps)
 
-    def _drop_steps(self, steps: Records) -> None:
-        """Drop steps with their commands, and all blocks up to the last that they used."""
-        if not len(steps):
-            return
-        blocks = steps["block"][steps["events"] & BLOCK != 0]
-        if len(blocks):
-            self._drop("sensors", int(blocks.max()))
-        for topic in ("command", "trace"):
-            self._drop(topic, int(steps["sequence"][-1]))
+    def _drop(self, steps: Records) -> None:
+        """Drop the first steps with their commands, and all blocks up to the last that they used."""
+        for topic, used in (
+            *((topic, steps["sequence"]) for topic in ("command", "trace")),
+            ("sensors", steps["block"][steps["events"] & BLOCK != 0]),
+        ):
+            table = self._tables[topic]
+            if len(used):
+                self._tables[topic] = table[np.searchsorted(table["sequence"], used.max(), "right") :]
 
-    def _drop(self, topic: str, until: int) -> None:
-        """Drop all messages up to a sequence, which no later step uses."""
-        table = self._tables[topic]
-        self._tables[topic] = table[np.searchsorted(table["sequence"], np.uint64(until), "right") :]
-        self._dropped[topic] = max(self._dropped[topic], until)
+
+def _raw(records: Records) -> Any:
+    """The messages as bytes: numpy omits the tags between the fields of messages that it copies."""
+    return records.view(f"V{records.dtype.itemsize}")
 
 
 def _places(known: npt.NDArray[np.uint64], wanted: npt.NDArray[np.uint64]) -> tuple[Any, Any]:
@@ -284,30 +256,22 @@ def _places(known: npt.NDArray[np.uint64], wanted: npt.NDArray[np.uint64]) -> tu
 
 def _first_difference(pairs: Any, traces: Records) -> ReplayDifference | None:
     """The first bit that differs, in pairs of a name, logged and replayed messages, and the rows that are compared."""
-    places: list[tuple[int, int, str, str, float, float]] = []
-    for number, (table, logged, replayed, rows) in enumerate(pairs):
-        if logged.tobytes() == replayed.tobytes():
-            continue
-        for name in (field.name for field in (TRACE, COMMAND)[number].message.DESCRIPTOR.fields):
-            bits = f"u{logged.dtype[name].itemsize}"
-            was, now = (np.ascontiguousarray(part[name]) for part in (logged, replayed))
-            row = int(np.argmax(differs := rows & (was.view(bits) != now.view(bits))))
-            if differs[row]:
-                places.append((row, number, table, name, float(was[row]), float(now[row])))
+    places = [
+        (int(np.argmax(differs)), number, name)
+        for number, (_, logged, replayed, rows) in enumerate(pairs)
+        for name in logged.dtype.names
+        if (differs := rows & (_bits(logged[name]) != _bits(replayed[name]))).any()
+    ]
     if not places:
         return None
-    row, _, table, name, logged, replayed = min(places, key=lambda place: place[:2])
-    at = traces[row]
-    return ReplayDifference(
-        table, int(at["sequence"]), int(at["block"]), float(at["t_ns"]) * 1e-9, name, logged, replayed
-    )
+    row, number, name = min(places, key=lambda place: place[:2])
+    table, logged, replayed, _ = pairs[number]
+    was, now, at = float(logged[name][row]), float(replayed[name][row]), traces[row]
+    return ReplayDifference(table, int(at["sequence"]), int(at["block"]), float(at["t_ns"]) * 1e-9, name, was, now)
 
 
-def _refuse_two(first: Any, second: Any) -> None:
-    at_s, again_s = 1e-9 * int(first["t_ns"]), 1e-9 * int(second["t_ns"])
-    line = f"/trace: step {first['sequence']} is recorded at {at_s:.3f} s and again at {again_s:.3f} s"
-    why = "the controller was started again, or two controllers answered"
-    raise Fault("BAD_LOG", f"{line}: {why}; record every controller in a separate log")
+def _bits(column: Any) -> Any:
+    return np.ascontiguousarray(column).view(f"u{column.itemsize}")
 
 
 def writable(records: Records) -> Records:
@@ -316,19 +280,27 @@ def writable(records: Records) -> Records:
 
 
 def replay(run: RunData, changes: list[Change], from_s: float = 0.0) -> Replay:
-    """Replay a log that is in memory, from `from_s` on.
-
-    Args:
-        run: the log.
-        changes: configurations in order of time; the first holds from the start.
-        from_s: only steps from this time on are compared.
+    """Replay a log that is in memory, as a `Replayer` with these arguments.
 
     Raises Fault BAD_LOG where two controllers answered, as their steps are mixed.
-
     """
-    replayer = Replayer(changes, from_s, whole=True)
-    for topic in ("announce", "sensors", "command", "trace"):
-        replayer.add(topic, getattr(run, topic))
-    for snapshot in run.snapshots:
+    replayer = Replayer(changes, from_s)
+    replayer.add("announce", run.announce)
+    for topic in ("trace", "command", "sensors"):
+        replayer.add(topic, _sorted(topic, getattr(run, topic)))
+    for _, snapshot in sorted({snapshot.step: snapshot for snapshot in run.snapshots}.items()):
         replayer.add_snapshot(snapshot)
     return replayer.result()
+
+
+def _sorted(topic: str, records: Records) -> Records:
+    """The messages by sequence, repeated ones once. Raises Fault BAD_LOG for repeated steps."""
+    order = np.argsort(records["sequence"], kind="stable")
+    again = np.diff(records["sequence"][order].astype(np.int64), prepend=-1) == 0
+    if topic == "trace" and again.any():
+        first, second = records[order[np.argmax(again) - 1 :][:2]]
+        at_s, again_s = 1e-9 * int(first["t_ns"]), 1e-9 * int(second["t_ns"])
+        line = f"/trace: step {first['sequence']} is recorded at {at_s:.3f} s and again at {again_s:.3f} s"
+        why = "the controller was started again, or two controllers answered"
+        raise Fault("BAD_LOG", f"{line}: {why}; record every controller in a separate log")
+    return _raw(records)[order[~again]].view(records.dtype)

@@ -27,21 +27,15 @@ def for_rig(header: wire.Header | None, config: ControllerConfig) -> ControllerC
     table: Any = None
     with contextlib.suppress(ValueError, RecursionError):
         table = json.loads(header.configuration)
-    if not isinstance(table, dict):
-        return config
-    rig = table.get("rig")
-    solver = rig.get("solver") if isinstance(rig, dict) else None
+    solver = _part(_part(table, "rig"), "solver")
     for name in ("block_s", "samples_per_block"):
-        if not isinstance(solver, dict):
-            break
-        theirs, ours = solver.get(name), getattr(config, name)
+        theirs, ours = _part(solver, name), getattr(config, name)
         if isinstance(theirs, int | float) and abs(theirs - ours) > 0.01 * ours:
             line = f"header/plant: rig.solver.{name} = {theirs:g}: must be controller.{name} = {ours:g}"
             raise Fault("CONFIG", f"{line}; set both to the same number")
-    if "limits" not in table:
-        return config
+    limits = _part(table, "limits")
     try:
-        return within(config, _LIMITS.validate_python(table["limits"]))
+        return config if limits is None else within(config, _LIMITS.validate_python(limits))
     except ValidationError as error:
         problem = error.errors()[0]
         place = ".".join(map(str, problem["loc"]))
@@ -49,6 +43,10 @@ def for_rig(header: wire.Header | None, config: ControllerConfig) -> ControllerC
         raise Fault("CONFIG", f"{line}; see bridge/wire/PROTOCOL.md for its fields") from None
     except ValueError as error:
         raise Fault("CONFIG", f"controller.{error}") from None
+
+
+def _part(table: Any, name: str) -> Any:
+    return table.get(name) if isinstance(table, dict) else None
 
 
 def refuse_another_rig(header: wire.Header | None, config: ControllerConfig) -> None:

@@ -14,26 +14,18 @@ _COPIED = (
     *("t_ns", "drive_force_N", "vibration_velocity_mps", "drive_velocity_mps", "force_rate"),
     *("mode", "state", "slips"),
 )
+_OLD_VIBRATION = (wire.STALE_INPUT, wire.NOT_FINITE)  # limits during which the trace repeats an old v_a
 
 
 def plotted(traces: Records, steps: int) -> Records:
-    """The state messages of some steps.
-
-    Args:
-        traces: traces of these steps, which are STATE_EVERY apart, [n].
-        steps: number of the controller's steps up to the first trace.
-
-    """
+    """The state messages of `traces`, which are STATE_EVERY apart, [n]; `steps`: number of steps up to the first of them."""
     states = STATE.blank(len(traces))
     states["sequence"] = steps // STATE_EVERY - 1 + np.arange(len(traces))
     for name in _COPIED:
         states[name] = traces[name]
     drive_mps = np.abs(traces["drive_velocity_mps"])
-    moving = (traces["state"] > wire.STANDSTILL) & (drive_mps > 0.0)
-    # during these limits the trace repeats an old v_a
-    measured = (traces["limit"] != wire.STALE_INPUT) & (traces["limit"] != wire.NOT_FINITE)
-    ratio = traces["vibration_velocity_mps"] / np.where(moving, drive_mps, 1.0)
-    states["velocity_ratio"] = np.where(moving & measured, ratio, 0.0)
+    shown = (traces["state"] > wire.STANDSTILL) & (drive_mps > 0.0) & ~np.isin(traces["limit"], _OLD_VIBRATION)
+    np.divide(traces["vibration_velocity_mps"], drive_mps, out=states["velocity_ratio"], where=shown)
     return states
 
 

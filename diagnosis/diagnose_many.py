@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, cast
 from joblib import Parallel, delayed, parallel_config
 from joblib.externals.loky import BrokenProcessPool
 
-from bridge.faults import Fault
+from bridge.faults import Fault, install
 from bridge.files import shown
 from bridge.results import in_json
 from bridge.wire import certificates
@@ -224,7 +224,7 @@ def _workers(jobs: int, cluster: str, certs: str) -> Generator[_Workers]:
     try:
         from distributed import Client, KilledWorker  # noqa: PLC0415
     except ImportError:
-        line = "--cluster: needs the package distributed, which is not installed; pip install 'stickslip[cluster]'"
+        line = f"--cluster: needs the package distributed, which is not installed; {install('cluster')}"
         raise Fault("CONFIG", line) from None
     if not re.fullmatch(r"(tcp|tls)://.+:\d+", cluster):  # Dask would try for 10 s and print a traceback
         raise Fault("CONFIG", f"--cluster {cluster}: must be tcp://HOST:PORT; write for example tcp://127.0.0.1:8786")

@@ -12,7 +12,7 @@ from bridge.guard.events import GuardEvents
 from bridge.guard.keeper import Keeper
 from bridge.guard.kept import KeptGain, KeptHeat, StateFile, StopLatch
 from bridge.guard.received import CommandQueue
-from bridge.guard.states import RESET, STOP
+from bridge.guard.states import HOLD, RESET, STOP
 from bridge.guard.stop_file import RigFile
 from bridge.plain import StepReport, no_report
 from bridge.wire import realtime, refusals
@@ -64,14 +64,17 @@ def run(
         faults: injected into the rig and its bus.
         report: reports the state of this process and important events to the operator.
 
-    Raises Fault ENDPOINT_BUSY, NO_PEER, NOT_SECURE, PEER_DIED, LOCKSTEP_STALLED.
+    Raises Fault CONFIG for the name of another running rig, ENDPOINT_BUSY, NO_PEER, NOT_SECURE, PEER_DIED, LOCKSTEP_STALLED.
 
     """
     outlasts = latch is not None and latch.outlasts
+    keeper = None if latch is None else Keeper(latch, RigFile(latch.rig, bus_config.endpoint))
     latch_problem = latch.can_be_set() if latch is not None and outlasts else ""
+    if keeper is not None and outlasts and (other := keeper.rig.namesake):
+        line = f"rig.name = {rig.name!r}: a rig of this name runs at {other}: a stop or reset of either would hold for both"
+        raise Fault("CONFIG", f"{line}; give this rig another name (--set rig.name=WORD), or end the other")
     run_number = 1 if lockstep else secrets.randbits(63) | 1  # in lockstep the same run gives the same log
-    stop_kept = latch is not None and outlasts and latch.is_set
-    node = PlantNode(rig, seed, run_number, arm and not latch_problem, stop_kept, faults)
+    node = PlantNode(rig, seed, run_number, arm and not latch_problem, faults)
     kept = KeptGain(rig.name, node.check_tones_Hz, rig.guard.exciter_gain) if outlasts else None
     warmth = KeptHeat(rig.name, rig.guard.heat.time_s) if outlasts else None
     if kept is not None:
@@ -83,11 +86,12 @@ def run(
     log = None if lockstep else refusals.captured()
     with Bus(bus_config, "plant", lockstep) as bus, contextlib.ExitStack() as ending:
         bus.serve_header(header)
-        keeper = None if latch is None else Keeper(latch, RigFile(latch.rig, bus_config.endpoint))
         process = PlantProcess(node, bus, keeper, report, kept, warmth)
         begun = threading.Event()
         if log is not None:
             ending.enter_context(refusals.reported(log, partial(process.event, "REFUSED"), begun))
+        if keeper is not None:  # before the wait for the other processes: a stop during it holds
+            ending.enter_context(keeper.running(run_number, partial(process.event, "STATE_FOLDER")))
         # Priority is claimed before the other processes see this one: later, links may lapse on busy cores (docs/method/rig.md).
         if lockstep:
             realtime.claim(realtime.core(bus_config.port), realtime.LOCKSTEP_PRIORITY)
@@ -108,10 +112,12 @@ def run(
             process.event(
                 "STATE_FOLDER", f"{latch_problem}: a stop cannot be kept over a restart, so the rig starts disarmed"
             )
+        if keeper is not None and keeper.problem:
+            process.event("STATE_FOLDER", keeper.problem)
         if wide := wide_limits(rig):
             process.event("WIDE_LIMITS", wide)
-        if keeper is not None:
-            ending.enter_context(keeper.running(run_number, partial(process.event, "STATE_FOLDER")))
+        if keeper is not None and keeper.holder is not None:
+            node.apply_order(HOLD)
         advance = process.lockstep if lockstep else process.realtime
         advance(blocks, stop)
         process.end()
@@ -164,8 +170,6 @@ class PlantProcess:
         self._operator_orders, self._fault_orders = Inbox(16), Inbox(16)
         self._bus = bus
         self._complaints = Complaints(self.event)
-        # `ARM by WHO`, which the sender waits for
-        self._orders = Complaints(lambda code, text: self.event(code, text.replace(": ", " ", 1)))
         self._commands = CommandQueue(self._complaints)
         self._answers = Inbox(64)  # commands, read in lockstep only
         self._on_the_way: collections.deque[Received] = collections.deque(maxlen=WAITING)  # commands on the faulty bus
@@ -196,7 +200,6 @@ class PlantProcess:
     def end(self) -> None:
         """Publish END and withdraw the rig's liveliness token; the other processes end once they see both."""
         self._complaints.report_when_due(all_of_it=True)
-        self._orders.report_when_due(all_of_it=True)
         self._report_stall()
         self.event("END", f"blocks={self._node.block}")
         self._bus.withdraw()
@@ -242,14 +245,14 @@ class PlantProcess:
                 self._complaints.note("OPERATOR", "ignored", str(error))
                 continue
             self._node.apply_order(order.action)
-            self._orders.note("OPERATOR", name, f"by {order.who or 'an unnamed operator'}")
+            self._complaints.order(name, order.who)
             if keeper is not None and order.action == STOP:
                 keeper.keep_stop(order.who)
             elif keeper is not None and order.action == RESET:
                 keeper.clear_stop()
-        if keeper is not None and (sender := keeper.stop_by_file()) is not None:
+        if keeper is not None and (sender := keeper.holder) is not None and not self._node.is_stopped:
             self._node.apply_order(STOP)
-            self._orders.note("OPERATOR", "STOP", f"by {sender or 'an unnamed operator'}, by file")
+            self._complaints.order("STOP", sender, ", by file")
 
     def _take_orders(self) -> None:
         """Plan the requested faults from the block after the next one on; report and drop malformed requests."""
@@ -325,9 +328,8 @@ class PlantProcess:
             sent_ns[(node.block - 1) % _ROUND_TRIPS_KEPT] = time.perf_counter_ns()
             self._send(sensors.payload, applied.payload)
             self._complaints.report_when_due()
-            self._orders.report_when_due()
             if self._keeper is not None:
-                self._keeper.at_rest = node.is_stopped
+                self._keeper.at_rest = node.is_stopped and node.at_rest
             if late_ns > _PAUSE_NS:
                 self._paused_ns = max(self._paused_ns, late_ns)
             elif late_ns < node.block_ns and commands:  # commands arrive again: the link is up

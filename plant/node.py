@@ -15,7 +15,7 @@ from bridge.wire.channels import CHANNELS
 from bridge.wire.messages import APPLIED as APPLIED_LAYOUT
 from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
 from bridge.wire.messages import sealed, sensor_block
-from bridge.wire.stickslip_pb2 import FAULT
+from bridge.wire.stickslip_pb2 import FAULT, STOP_BY_PERSON, STOP_KEPT
 from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, SENSORS, Outgoing
 from plant.config import RigConfig
 from plant.faults.schedule import Faults
@@ -37,7 +37,6 @@ class PlantNode:
         seed: seed of the sensor noise; the same seed gives the same bytes.
         run: the number that each command must carry.
         arm: start ARMED, as only a simulated rig may.
-        stop_kept: start in FAULT, because the operator's stop of an earlier run holds.
         faults: injected into the rig.
 
     """
@@ -48,14 +47,13 @@ class PlantNode:
         seed: int,
         run: int = 1,
         arm: bool = False,
-        stop_kept: bool = False,
         faults: Sequence[FaultTable] = (),
     ) -> None:
         self.block_ns = round(config.solver.block_s * 1e9)
         self.block = 0  # number of the next block
         self._config = config
         self._params, self._state = build(config)
-        self._guard_params, self._guard_state = guard_records(config, run, arm, stop_kept)
+        self._guard_params, self._guard_state = guard_records(config, run, arm)
         self._inputs = RigInputs(config, seed)
         samples = config.solver.samples_per_block
         self.faults = Faults(faults, seed, config.solver.block_s, samples, self._params)
@@ -123,7 +121,7 @@ class PlantNode:
         return Outgoing(SENSORS, sealed(self._sensors.tobytes())), Outgoing(APPLIED, self._applied.tobytes())
 
     def apply_order(self, order: int) -> bool:
-        """Apply an operator's order (`wire.Operator.Action`) or the code LEAVE. Returns whether it changed the state."""
+        """Apply an operator's order (`wire.Operator.Action`), HOLD or LEAVE. Returns whether it changed the state."""
         return bool(apply_order(self._guard_state[0], order))
 
     @property
@@ -174,8 +172,9 @@ class PlantNode:
 
     @property
     def is_stopped(self) -> bool:
-        """Whether the guard holds the base at rest in FAULT."""
-        return self.at_rest and self._guard_state["state"][0] == FAULT
+        """Whether the guard is in FAULT because of an operator's stop."""
+        s = self._guard_state[0]
+        return s.state == FAULT and s.cause in (STOP_BY_PERSON, STOP_KEPT)
 
 
 def no_number(config: RigConfig, block: int) -> Fault:

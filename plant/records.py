@@ -145,9 +145,9 @@ def simulated_guard(config: RigConfig) -> GuardConfig:
     return guard.model_copy(update={"fastest_drive_mps": fastest_mps, "velocity_mps": velocity})
 
 
-def guard_records(config: RigConfig, run: int, arm: bool, stop_kept: bool = False) -> tuple[Records, Records]:
+def guard_records(config: RigConfig, run: int, arm: bool) -> tuple[Records, Records]:
     """Parameters and memory of the rig's guard; the other arguments are passed to `bridge.guard.records.build`."""
-    return build_guard(simulated_guard(config), _exciter(config), run, arm, stop_kept)
+    return build_guard(simulated_guard(config), _exciter(config), run, arm)
 
 
 def wide_limits(config: RigConfig) -> str:

@@ -21,8 +21,8 @@ settings.load_profile("stickslip")
 signal.signal(signal.SIGINT, signal.default_int_handler)
 if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
     signal.signal(signal.SIGHUP, lambda _number, _frame: None)
-# where rigs leave their passwords: a folder that is gone afterwards, with a short name as in a login
-os.environ["XDG_RUNTIME_DIR"] = tempfile.mkdtemp(prefix="stickslip-tests-")
+# where rigs leave their passwords and states: a folder that is gone afterwards, with a short name as in a login
+os.environ["XDG_RUNTIME_DIR"] = os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="stickslip-tests-")
 atexit.register(shutil.rmtree, os.environ["XDG_RUNTIME_DIR"], ignore_errors=True)
 _NIGHTLY_S = 3600.0  # a whole diagnosis while other programs run
 _REALTIME_S = 180.0  # a process that hangs is reported soon

@@ -10,7 +10,6 @@ locating        whether the diagnosis finds the gap where the effect is
 scoring         all scores of one method over one set
 baselines       simpler methods for comparison, which answer from numbers that the diagnosis computes anyway
 oracle          how far the true effects close the gap when their names are known
-trees           a tree ensemble on the same features, trained on simulated rigs
 pooling         kept scores of several sets read and scored together
 table, report   the scores as text; as one HTML file with pictures (template: report.html.j2)
 command         the command line, `python -m bench blind`

@@ -59,11 +59,6 @@ def told(case: Opened, shrinkage: float | None) -> Opened:
     return Opened(case.name, case.answer, result)
 
 
-def from_probabilities(case: Opened, probabilities: dict[str, float]) -> Opened:
-    """The result of a classifier: its answer is the candidate with the largest probability."""
-    return _saying(case, probabilities, None)
-
-
 def _gap_or_none(case: Opened, closes: str) -> Opened:
     retuned = case.said["gap"].get("retuned")
     gap = retuned is not None and retuned > _NO_GAP

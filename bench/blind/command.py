@@ -62,9 +62,7 @@ def blind_score(
     key: Key,
     as_json: Json = None,
     report: Report = None,
-    baselines: Annotated[
-        bool, typer.Option("--baselines", help="Score oracle and tree ensemble too: half a minute a case.")
-    ] = False,
+    baselines: Annotated[bool, typer.Option("--baselines", help="Score the oracle too: half a minute a case.")] = False,
     partial: Annotated[bool, typer.Option("--partial", help="Score although results are missing.")] = False,
     jobs: Jobs = None,
 ) -> None:
@@ -73,7 +71,7 @@ def blind_score(
     def work() -> None:
         from joblib import cpu_count
 
-        from bench.blind.opening import open_set, with_baselines
+        from bench.blind.opening import open_set, with_oracle
         from cockpit.commands.diagnose_output import watched
 
         end_like_ctrl_c()
@@ -84,7 +82,7 @@ def blind_score(
         with writing(), watched() as progress:
             opened_set = open_set(folder, key, partial)
             if baselines:
-                opened_set = with_baselines(opened_set, folder, jobs or cpu_count(), progress)
+                opened_set = with_oracle(opened_set, folder, jobs or cpu_count(), progress)
         _told(opened_set, folder.name, as_json, report, [])
 
     carry_out(work, as_json)

@@ -11,7 +11,6 @@ from bench.blind.running import missing, results
 from bench.blind.scoring import Oracle, Scores, score
 from bench.blind.sealing import mark_opened, opened_answers
 from bench.blind.table import TOOL
-from bench.blind.trees import tree_probabilities
 from bridge.faults import Fault
 
 Progress = Callable[[str, float], None]
@@ -24,7 +23,6 @@ class OpenedSet(NamedTuple):
     sealed: bool  # True if no answer was known when the results were made
     tool: str  # version of the diagnosis that made the results
     oracle: Oracle | None = None  # share of the gap that the true effects close, by case; None: not computed
-    trees: dict[str, dict[str, float]] | None = None  # the tree ensemble's probabilities, by case; None: not computed
 
 
 def open_set(folder: Path, key: Path, partial: bool) -> OpenedSet:
@@ -46,24 +44,20 @@ def open_set(folder: Path, key: Path, partial: bool) -> OpenedSet:
     return OpenedSet(cases, mark_opened(folder) and not published, tool)
 
 
-def with_baselines(opened_set: OpenedSet, folder: Path, jobs: int, progress: Progress) -> OpenedSet:
-    """The set with the answers of the two methods that need their own computation: oracle and trees."""
-    best = oracle(folder, opened_set.cases, jobs, progress)
-    readable = [case.name for case in opened_set.cases if case.verdict != "fault"]
-    return opened_set._replace(oracle=best, trees=tree_probabilities(folder, readable, jobs, progress))
+def with_oracle(opened_set: OpenedSet, folder: Path, jobs: int, progress: Progress) -> OpenedSet:
+    """The set with the answers of the oracle, which needs its own computation."""
+    return opened_set._replace(oracle=oracle(folder, opened_set.cases, jobs, progress))
 
 
 def scored(opened_set: OpenedSet) -> dict[str, Scores]:
     """Scores by method, the diagnosis first."""
-    cases, best, guessed = opened_set.cases, opened_set.oracle, opened_set.trees
+    cases, best = opened_set.cases, opened_set.oracle
     methods = {
         TOOL: cases,
         "parameters": [baselines.parameters_only(case) for case in cases],
         "BIC": [baselines.lowest_bic(case) for case in cases],
         "flexible": [baselines.flexible_residual(case) for case in cases],
     }
-    if guessed is not None:
-        methods["trees"] = [baselines.from_probabilities(case, guessed.get(case.name, {})) for case in cases]
     if best is not None:
         methods["oracle"] = [baselines.told(case, best.get(case.name)) for case in cases]
     return {name: score(answers, best or {}) for name, answers in methods.items()}

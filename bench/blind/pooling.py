@@ -56,13 +56,12 @@ def pooled(paths: Sequence[Path]) -> OpenedSet:
             if (other := seen.setdefault(case.answer["counterfactual_seed"], path)) is not path:
                 line = f"{path}: case {case.name} is in {other} too: must be in one; leave one file out"
                 raise Fault("BAD_SET", line)
-    asked = all(opened_set.oracle is not None and opened_set.trees is not None for opened_set in sets)
+    asked = all(opened_set.oracle is not None for opened_set in sets)
     return OpenedSet(
         [case for opened_set in sets for case in opened_set.cases],
         all(opened_set.sealed for opened_set in sets),
         sets[0].tool,
         {name: closed for opened_set in sets for name, closed in (opened_set.oracle or {}).items()} if asked else None,
-        {name: given for opened_set in sets for name, given in (opened_set.trees or {}).items()} if asked else None,
     )
 
 
@@ -71,8 +70,6 @@ def _row(opened_set: OpenedSet, case: Opened) -> dict[str, Any]:
     row = case.row() | {"answer": case.answer, "said": _scored_of(case.said)}
     if opened_set.oracle is not None:
         row["oracle"] = opened_set.oracle.get(case.name)
-    if opened_set.trees is not None:
-        row["trees"] = opened_set.trees.get(case.name)
     return row
 
 
@@ -111,12 +108,9 @@ def _read(path: Path) -> OpenedSet:
             [Opened(row["case"], row["answer"], row["said"]) for row in rows],
             table["sealed"],
             table["tool"],
-            *(
-                {row["case"]: row[key] for row in rows if row[key] is not None}
-                if all(key in row for row in rows)
-                else None
-                for key in ("oracle", "trees")
-            ),
+            {row["case"]: row["oracle"] for row in rows if row["oracle"] is not None}
+            if all("oracle" in row for row in rows)
+            else None,
         )
     except (KeyError, TypeError) as error:
         raise Fault("BAD_SET", f"{path}: cases: {error} is missing or has the wrong type; {_MADE_BY}") from None

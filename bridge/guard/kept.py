@@ -4,6 +4,7 @@ import hashlib
 import json
 import math
 import os
+import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import Any
 from bridge.files import write_whole
 
 MOST_BYTES = 1 << 16  # largest state file that is read
+_PROBE = b" " * 512  # about the size of the largest state file; a full disk often takes a name but no content
 
 
 def state_folder() -> Path:
@@ -70,12 +72,14 @@ class StopLatch(StateFile):
             return True
 
     def can_be_set(self) -> str:
-        """The reason why a stop cannot be kept, as text; empty if it can be kept."""
+        """The reason why state files cannot be written, as text; empty if they can."""
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+            with tempfile.TemporaryFile(dir=self.path.parent, buffering=0) as probe:
+                probe.write(_PROBE)
         except OSError as error:
             return f"{self.path.parent}: {error.strerror}"
-        return "" if os.access(self.path.parent, os.W_OK) else f"{self.path.parent}: is not writable"
+        return ""
 
     def set(self, who: str) -> None:
         """Make the stop hold over restarts; `who` ordered it. Raises OSError if it cannot be written."""

@@ -83,9 +83,7 @@ class ExciterLimits(NamedTuple):
     command_timeout_s: float
 
 
-def build(
-    config: GuardConfig, exciter: ExciterLimits, run: int, arm: bool = False, stop_kept: bool = False
-) -> tuple[Records, Records]:
+def build(config: GuardConfig, exciter: ExciterLimits, run: int, arm: bool = False) -> tuple[Records, Records]:
     """Parameters and state of a guard at power-up.
 
     Raises Fault CONFIG if the limits lack the fastest drive or v_a, or the loop check lacks an allowed tone.
@@ -94,7 +92,6 @@ def build(
         config, exciter: limits and exciter of the rig file.
         run: the number that each command must carry.
         arm: the rig is simulated, and its scenario arms it.
-        stop_kept: the operator's stop of an earlier run holds.
 
     """
     params = record(PARAMS)
@@ -147,6 +144,4 @@ def build(
     s.last_sequence, s.newest_mps = -1, -1.0
     s.frequency_Hz = exciter.frequency_max_Hz
     s.state, s.cause = (wire.ARMED, wire.ARMED_BY_SCENARIO) if arm else (wire.DISARMED, wire.POWER_UP)
-    if stop_kept:
-        s.state, s.cause = wire.FAULT, wire.STOP_KEPT
     return params, state

@@ -8,6 +8,7 @@ from bridge.wire import stickslip_pb2 as wire
 STOP, RESET, ARM, DISARM = wire.Operator.STOP, wire.Operator.RESET, wire.Operator.ARM, wire.Operator.DISARM
 ACCEPT_GAIN = wire.Operator.ACCEPT_GAIN
 LEAVE = -1  # order at the end of the rig's process
+HOLD = -2  # order at its start, while an operator's stop holds
 
 
 @kernel
@@ -28,7 +29,7 @@ def trip(s: GuardMemory, cause: int) -> None:
 
 @kernel
 def apply_order(s: GuardMemory, order: int) -> bool:
-    """Apply an order of the operator or of the ending process. Returns whether it changed the state.
+    """Apply an order of the operator, or of the process at its start or end. Returns whether it changed the state.
 
     A stop is valid in every state. ARM begins a check in DISARMED, in READY, and in ARMED without a check. ACCEPT_GAIN does the
     same, but in READY it accepts the measured gain and arms. A rig in FAULT must be reset first.
@@ -37,7 +38,9 @@ def apply_order(s: GuardMemory, order: int) -> bool:
     if order == STOP:
         enter(s, wire.FAULT, wire.STOP_BY_PERSON)
         return True
-    if order == RESET and before == wire.FAULT:
+    if order == HOLD:
+        enter(s, wire.FAULT, wire.STOP_KEPT)
+    elif order == RESET and before == wire.FAULT:
         enter(s, wire.DISARMED, wire.RESET_BY_PERSON)
     elif order in (ARM, ACCEPT_GAIN):
         if before == wire.READY and order == ACCEPT_GAIN:

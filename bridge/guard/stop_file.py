@@ -14,6 +14,7 @@ from typing import Any
 
 from bridge.faults import Fault
 from bridge.guard.kept import MOST_BYTES, StateFile, StopLatch, state_folder
+from bridge.processes import started
 
 _NAME_S = 0.2  # longest search for the address of a name; longer: a stop waits for a name server that does not answer
 _POLL_S = 0.01  # interval at which the confirmation is looked for
@@ -35,9 +36,21 @@ class RigFile(StateFile):
     def make(self, run: int) -> None:
         """Write the file of a rig that starts, and remove files of ended rigs at its port. Raises OSError, Fault LOG_WRITE."""
         for path, table in _tables():
-            if _port(table["endpoint"]) == _port(self.endpoint) and not _runs(table["process"]):
+            if _port(table["endpoint"]) == _port(self.endpoint) and not _runs(table):
                 path.unlink(missing_ok=True)
-        self._write({"latch": self.rig, "endpoint": self.endpoint, "run": run, "process": os.getpid()})
+        process = {"process": os.getpid(), "started": started(os.getpid())}
+        self._write({"latch": self.rig, "endpoint": self.endpoint, "run": run} | process)
+
+    @property
+    def exists(self) -> bool:
+        """Whether the file exists, so that the rig takes a stop by file."""
+        return os.path.lexists(self.path)
+
+    @property
+    def namesake(self) -> str:
+        """The endpoint of another running rig with the same latch; empty without one."""
+        others = (table for path, table in _tables() if path != self.path and table["latch"] == self.rig)
+        return next((table["endpoint"] for table in others if _runs(table)), "")
 
     def confirm(self, set_ns: int) -> None:
         """Confirm that the rig is at rest after the stop that was set at this time. Raises OSError."""
@@ -120,14 +133,8 @@ def _port(endpoint: str) -> str:
     return endpoint.rpartition(":")[2]
 
 
-def _runs(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (PermissionError, OverflowError):
-        pass
-    return True
+def _runs(table: dict[str, Any]) -> bool:
+    return table.get("started") is not None and table["started"] == started(table["process"])
 
 
 def _is_here(host: str) -> bool:

@@ -94,6 +94,7 @@ class RunLog:
             "schema_version": str(header.schema_version),
             "configuration": header.configuration,
             "versions": header.versions,
+            "rig": header.rig,
         }
         self._add_table(header.role, fields)
 

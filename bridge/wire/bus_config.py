@@ -1,5 +1,6 @@
 """Endpoint and key prefix of the bus of one rig, and whether only this computer can reach the endpoint."""
 
+import contextlib
 import ipaddress
 import socket
 from typing import Annotated
@@ -77,3 +78,16 @@ def is_loopback(endpoint: str) -> bool:
     """Whether only this computer can reach an endpoint; False for a name that cannot be resolved."""
     number = address(endpoint).partition("%")[0]
     return bool(number) and ipaddress.ip_address(number).is_loopback
+
+
+def is_free(endpoint: str) -> bool:
+    """Whether an endpoint is of this computer alone and no process listens there. Connects nothing, which a rig counts."""
+    number, port = address(endpoint), endpoint.rpartition(":")[2]
+    if not is_loopback(endpoint):
+        return False
+    with socket.socket(socket.AF_INET6 if ":" in number else socket.AF_INET, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # does not disturb a rig that begins to listen
+        with contextlib.suppress(OSError):
+            probe.bind((number, int(port)))
+            return True
+    return False

@@ -62,19 +62,26 @@ class Complaints:
             times: number of occurrences.
 
         """
+        self._count(code, where, f"{where}: {text}", times)
+
+    def order(self, action: str, who: str, how: str = "") -> None:
+        """Count an operator's order by its action; the text of the event is `ARM by WHO`, which the sender waits for."""
+        self._count("OPERATOR", action, f"{action} by {who or 'an unnamed operator'}{how}", 1)
+
+    def _count(self, code: str, where: str, text: str, times: int) -> None:
         kind = self._kinds.setdefault((code, where), _Kind())
         kind.text = text
         kind.times += times
         kind.pending += times
-        self._report(code, where, kind)
+        self._report(code, kind)
 
     def report_when_due(self, all_of_it: bool = False) -> None:
         """Report problems that have waited for 1 s; with `all_of_it`, at the end of a process, all problems."""
-        for (code, where), kind in self._kinds.items():
+        for (code, _), kind in self._kinds.items():
             if kind.pending:
-                self._report(code, where, kind, all_of_it)
+                self._report(code, kind, all_of_it)
 
-    def _report(self, code: str, where: str, kind: _Kind, at_once: bool = False) -> None:
+    def _report(self, code: str, kind: _Kind, at_once: bool = False) -> None:
         now_s = self._clock()
         if not at_once and now_s - kind.reported_s < _EVERY_S:
             return
@@ -82,7 +89,7 @@ class Complaints:
         counts += [f"{kind.times} in all"] if kind.times > kind.pending else []
         count = f" ({', '.join(counts)})" if counts else ""
         kind.pending, kind.reported_s = 0, now_s
-        self._publish(code, f"{where}: {kind.text}{count}")
+        self._publish(code, f"{kind.text}{count}")
 
 
 class NumberCheck(Enum):

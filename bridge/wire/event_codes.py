@@ -7,7 +7,7 @@ from typing import NamedTuple
 from bridge.wire.words import CHECK, FAILURE, NEWS, SEVERITIES, help_of, source
 
 # codes of letter C that a verdict lists nevertheless: a run with an injected fault does not show a healthy rig
-TESTS = ("INJECTED",)
+TESTS = ("INJECTED", "INJECTION_ENDED")
 # reasons, in a controller's commands, for a vibration without the wanted effect
 WEAK_REASONS = ("EXCITER_END", "CANNOT_HELP", "PIEZO_WEAK", "HARMFUL")
 # reasons that mark a sensor or the exciter as doubted; `controller.trips` detects them, and each is an event too

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from bridge.faults import Fault
-from bridge.wire.bus_config import address
+from bridge.wire.bus_config import address, is_free, is_loopback
 
 ROLES = ("controller", "recorder", "operator", "viewer")
 _FOLDER = "stickslip"
@@ -51,10 +51,26 @@ def password(endpoint: str, role: str) -> str | None:
     return None
 
 
-def make(endpoint: str) -> Path:
+def absence(endpoint: str) -> str:
+    """The reason why a rig that listens at an endpoint refuses this user: the file is missing; empty if it is not."""
+    if not is_loopback(endpoint) or is_free(endpoint) or password(endpoint, "viewer") is not None:
+        return ""
+    places = ", ".join(str(folder) for folder in folders())
+    return (
+        f"a process listens at {endpoint}, but its password file {file_name(endpoint)} is in none of {places}: another user "
+        "started it, or the folder was removed: give the command as that user, or end the rig and start it again"
+    )
+
+
+def make(endpoint: str, passwords: str = "") -> Path:
     """Make the file of an endpoint, or keep an existing one, so that clients stay valid over a restart of the rig.
 
+    Args:
+        endpoint: the rig's endpoint.
+        passwords: content of the file; new passwords without it.
+
     Raises Fault NOT_SECURE if no folder is safe from other users.
+
     """
     problems: list[str] = []
     for path in _files(endpoint):
@@ -62,7 +78,7 @@ def make(endpoint: str) -> Path:
             path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             if is_private_folder(path.parent):
                 if not _is_whole(path):
-                    _write(path)
+                    _write(path, passwords or "".join(f"{role}:{secrets.token_urlsafe(24)}\n" for role in ROLES))
                 os.utime(path)
                 return path
             problems.append(f"{path.parent} (not private)")
@@ -73,6 +89,19 @@ def make(endpoint: str) -> Path:
         f"{endpoint}: no folder can hold its password: one of {places} must belong to this user, mode 0700, with room"
     )
     raise Fault("NOT_SECURE", f"{line}; set XDG_RUNTIME_DIR to such a folder, or use a tls/ endpoint")
+
+
+class KeptUsers:
+    """The file of a running rig, which is removed with its folder at the user's last logout. Raises Fault NOT_SECURE."""
+
+    def __init__(self, endpoint: str) -> None:
+        self._endpoint, self._path = endpoint, make(endpoint)
+        self._passwords = self._path.read_text()
+
+    def keep(self) -> None:
+        """Make the file again, with the same passwords, if it was removed. Raises Fault NOT_SECURE."""
+        if not os.path.lexists(self._path):
+            self._path = make(self._endpoint, self._passwords)
 
 
 def _files(endpoint: str) -> list[Path]:
@@ -99,12 +128,12 @@ def _is_whole(path: Path) -> bool:
     return known == list(ROLES)
 
 
-def _write(path: Path) -> None:
-    """Write new passwords completely or not at all; an existing file or link of the name is replaced."""
+def _write(path: Path, passwords: str) -> None:
+    """Write passwords completely or not at all; an existing file or link of the name is replaced."""
     handle, part = tempfile.mkstemp(dir=path.parent)  # mode 0600
     try:
         with os.fdopen(handle, "w") as file:
-            file.writelines(f"{role}:{secrets.token_urlsafe(24)}\n" for role in ROLES)
+            file.write(passwords)
         os.replace(part, path)
     except OSError:
         os.unlink(part)

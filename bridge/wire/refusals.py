@@ -12,6 +12,7 @@ import sys
 import threading
 from collections.abc import Callable, Generator
 
+from bridge.threads import repeat
 from bridge.wire.session import zenoh
 
 _FILTER = (
@@ -64,8 +65,9 @@ def reported(log: int, report: Callable[[str], object], begun: threading.Event) 
 
     Before the run has `begun` they are only counted, as an event without a recorder is lost.
     """
+    counted = _Refusals(log, report, begun)
     over = threading.Event()
-    thread = threading.Thread(target=_count, args=(log, report, begun, over), name="refusals", daemon=True)
+    thread = threading.Thread(target=repeat, args=(counted.read, _READ_S, over, report), name="refusals", daemon=True)
     thread.start()
     try:
         yield
@@ -74,18 +76,25 @@ def reported(log: int, report: Callable[[str], object], begun: threading.Event) 
         thread.join()
 
 
-def _count(log: int, report: Callable[[str], object], begun: threading.Event, over: threading.Event) -> None:
-    rest = b""
-    new = total = 0
-    newest = ""
-    tick = 0
-    while not over.wait(_READ_S):
-        tick += 1
+class _Refusals:
+    """The refused sessions in a log since the last report, and in all."""
+
+    def __init__(self, log: int, report: Callable[[str], object], begun: threading.Event) -> None:
+        self._log, self._report, self._begun = log, report, begun
+        self._rest = b""
+        self._new = self._total = self._ticks = 0
+        self._newest = ""
+
+    def read(self) -> None:
+        """Count the new lines of the log; report each second."""
+        self._ticks += 1
         with contextlib.suppress(BlockingIOError):
-            *lines, rest = (rest + os.read(log, _MOST_BYTES)).split(b"\n")
+            *lines, self._rest = (self._rest + os.read(self._log, _MOST_BYTES)).split(b"\n")
             causes = [cause for line in lines if (cause := refused(line.decode(errors="replace")))]
-            new, newest = new + len(causes), causes[-1] if causes else newest
-        if new and tick % _READS == 0 and begun.is_set():
-            total += new
-            report(f"{new} sessions refused since the last report, {total} in all; the newest: {newest}")
-            new = 0
+            self._new, self._newest = self._new + len(causes), causes[-1] if causes else self._newest
+        if self._new and self._ticks % _READS == 0 and self._begun.is_set():
+            new, self._new = self._new, 0
+            self._total += new
+            self._report(
+                f"{new} sessions refused since the last report, {self._total} in all; the newest: {self._newest}"
+            )

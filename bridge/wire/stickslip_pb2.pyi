@@ -530,18 +530,20 @@ class Operator(_message.Message):
     def __init__(self, action: _Optional[_Union[Operator.Action, str]] = ..., who: _Optional[str] = ...) -> None: ...
 
 class Header(_message.Message):
-    __slots__ = ("role", "schema_version", "configuration", "versions", "process")
+    __slots__ = ("role", "schema_version", "configuration", "versions", "process", "rig")
     ROLE_FIELD_NUMBER: _ClassVar[int]
     SCHEMA_VERSION_FIELD_NUMBER: _ClassVar[int]
     CONFIGURATION_FIELD_NUMBER: _ClassVar[int]
     VERSIONS_FIELD_NUMBER: _ClassVar[int]
     PROCESS_FIELD_NUMBER: _ClassVar[int]
+    RIG_FIELD_NUMBER: _ClassVar[int]
     role: str
     schema_version: int
     configuration: str
     versions: str
     process: str
-    def __init__(self, role: _Optional[str] = ..., schema_version: _Optional[int] = ..., configuration: _Optional[str] = ..., versions: _Optional[str] = ..., process: _Optional[str] = ...) -> None: ...
+    rig: str
+    def __init__(self, role: _Optional[str] = ..., schema_version: _Optional[int] = ..., configuration: _Optional[str] = ..., versions: _Optional[str] = ..., process: _Optional[str] = ..., rig: _Optional[str] = ...) -> None: ...
 
 class Inject(_message.Message):
     __slots__ = ("fault", "clear", "who", "id")

@@ -21,9 +21,10 @@ from typing import Any, Self
 
 from bridge.faults import Fault
 from bridge.processes import this_process
+from bridge.threads import repeat
 from bridge.wire import certificates, loopback_users
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.bus_config import BusConfig
+from bridge.wire.bus_config import BusConfig, is_free
 from bridge.wire.inbox import Inbox, Received
 from bridge.wire.payloads import largest_bytes, parsed
 from bridge.wire.session import DIAL_S, rig_security, role_security, session_config, zenoh
@@ -31,8 +32,9 @@ from bridge.wire.topics import Topic
 
 __all__ = ["Bus", "BusConfig", "Inbox", "Received"]
 
-# Duration of one attempt to dial without a password. A starting rig makes a password, which only the next attempt can use.
+# Duration of one attempt to dial without a password. Longer: a rig that needs one is dialled in vain for longer, every 20 ms.
 _WITHOUT_PASSWORD_S = 0.2
+_FREE_S = 0.02  # interval at which an endpoint without a listener and without a password is looked at
 # Interval of looking for new connections; those without a handshake are closed after 1 s. Longer: some are closed before, with a
 # wait of 7 ms each. Shorter: 0.1 ms of this process each time.
 _LINGER_S = 0.3
@@ -58,14 +60,20 @@ def _keep_thread_state() -> None:
         _of_thread.kept = True
 
 
-def _close_at_once(_event: zenoh.TransportEvent | None = None) -> None:
-    """Make this process close its links without a wait for unsent data; called when a link was made.
+def _close_at_once() -> None:
+    """Make this process close its links without a wait for unsent data. Raises OSError without a free file.
 
     Zenoh sets SO_LINGER: if the other process does not read, closing a link takes 7 to 40 ms, on a thread that others wait for
     (zenoh issues 1101, 2350). Unsent data of a closed link are still sent.
     """
     for name in os.listdir("/proc/self/fd"):  # has no effect on files that are not sockets
         _LIBC.setsockopt(int(name), socket.SOL_SOCKET, socket.SO_LINGER, _AT_ONCE, len(_AT_ONCE))
+
+
+def _on_link(_event: zenoh.TransportEvent) -> None:
+    """Let a new link be closed at once; without a free file, the thread `links` of a rig does it later."""
+    with contextlib.suppress(OSError):
+        _close_at_once()
 
 
 @functools.cache
@@ -92,17 +100,19 @@ def _dialled(
     patience_s = config.wait_s if fixed_s is None else fixed_s
     until_s = time.monotonic() + patience_s
     while not stop.is_set():
-        security = role_security(config, role)  # read at each attempt: the rig may have made the password since
-        dial_s = min(DIAL_S if security else _WITHOUT_PASSWORD_S, patience_s)
-        try:
-            return zenoh.open(session_config(config, False, lockstep, dial_s, security))
-        except zenoh.ZError:
-            if time.monotonic() > until_s:
-                line = f"{config.endpoint}: no plant answered within {patience_s:g} s"
-                more = "; a first start compiles before it answers" + (
-                    ": --wait S waits longer" if fixed_s is None else ""
-                )
-                raise Fault("NO_PEER", f"{line}; {_remedy(config, bool(security))}{more}") from None
+        # Looked at before the password is read: a rig makes it before it listens, and counts each attempt without it as refused.
+        free = is_free(config.endpoint)
+        security = role_security(config, role)
+        if security or not free:
+            dial_s = min(DIAL_S if security else _WITHOUT_PASSWORD_S, patience_s)
+            with contextlib.suppress(zenoh.ZError):
+                return zenoh.open(session_config(config, False, lockstep, dial_s, security))
+        else:
+            stop.wait(_FREE_S)
+        if time.monotonic() > until_s:
+            line = f"{config.endpoint}: no plant answered within {patience_s:g} s"
+            more = "; a first start compiles before it answers" + (": --wait S waits longer" if fixed_s is None else "")
+            raise Fault("NO_PEER", f"{line}; {_remedy(config)}{more}")
     raise Fault("NO_PEER", f"{config.endpoint}: no plant answered before the stop")
 
 
@@ -123,17 +133,13 @@ def is_frozen(config: BusConfig) -> bool:
     return False
 
 
-def _remedy(config: BusConfig, has_password: bool) -> str:
+def _remedy(config: BusConfig) -> str:
     start = "start `stickslip plant` with this --endpoint"
     if config.encrypted:
         return (
             f"{start}, and check the certificates: both sides need the same authority, and the rig's must name its host"
         )
-    return (
-        start
-        if has_password
-        else f"{start}; a rig of another user of this computer refuses clients that cannot read its password"
-    )
+    return loopback_users.absence(config.endpoint) or start
 
 
 class Bus:
@@ -181,9 +187,12 @@ class Bus:
             _warn(text)
         self._over = threading.Event()
         if role == "plant":
-            threading.Thread(target=self._close_refused_at_once, name="linger", daemon=True).start()
+            has_passwords = not (config.encrypted or config.insecure)
+            self._users = loopback_users.KeptUsers(config.endpoint) if has_passwords else None
+            tend = (self._tend, _LINGER_S, self._over, _warn)
+            threading.Thread(target=repeat, args=tend, name="links", daemon=True).start()
         # called in a Python thread, because it visits every open file of this process
-        self._keep.append(self._session.info.declare_transport_events_listener(_close_at_once, history=True))
+        self._keep.append(self._session.info.declare_transport_events_listener(_on_link, history=True))
         self._keep.append(
             self._session.liveliness().declare_subscriber(
                 self._key("alive/*"), zenoh.handlers.Callback(self._on_alive, indirect=False), history=True
@@ -200,10 +209,11 @@ class Bus:
         with contextlib.suppress(zenoh.ZError):
             self._session.close()
 
-    def _close_refused_at_once(self) -> None:
-        """Let connections that send nothing be closed without a wait: 300 of them stopped all links for 0.25 s."""
-        while not self._over.wait(_LINGER_S):
-            _close_at_once()
+    def _tend(self) -> None:
+        """Keep the passwords; let connections that send nothing be closed at once: 300 of them stopped all links for 0.25 s."""
+        _close_at_once()
+        if self._users is not None:
+            self._users.keep()
 
     def expiring(self) -> str:
         """The certificates of this session that end within 30 days, as text; empty if none does."""

@@ -4,6 +4,7 @@ from typing import Annotated
 
 import typer
 
+from bridge.faults import Fault
 from cockpit.commands.as_json.option import Json, print_result
 from cockpit.commands.options import BUS, SharedOptions, command
 
@@ -60,16 +61,22 @@ def stop(
     from bridge.guard.stop_file import confirmed
     from bridge.plain import print_line
     from bridge.wire import realtime
-    from cockpit.first_stop import ordered
-    from cockpit.live.operator import send_command, stop_rig
+    from cockpit.first_stop import answers, ordered
+    from cockpit.live.operator import STOPPED_DIAL_S, send_command, stop_rig
 
     realtime.raise_priority()
+    dial_s = None
     if confirmed(ordered, 0.0):
+        dial_s = STOPPED_DIAL_S
         print_line(f"stop     rig {ordered[0].rig} is at rest: it confirmed the stop by file; now over the bus")
     for order in ordered:
         if order.problem:
             print_line(f"stop     no stop by file for rig {order.rig}: {order.problem}; now over the bus")
-    answer = stop_rig(lambda: send_command(shared.bus(), "STOP"), ordered)
+    try:
+        answer = stop_rig(lambda: send_command(shared.bus(), "STOP", dial_s), ordered)
+    except Fault as fault:  # no rig confirmed the stop, whatever failed
+        raise Fault("NO_PEER", fault.line) from None
+    answers.append(answer)
     print_result(as_json, answer, answer.in_words())
     return 0 if answer.done else 1
 

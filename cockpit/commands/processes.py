@@ -36,7 +36,10 @@ class Recorded(NamedTuple):
 def plant(
     shared: SharedOptions,
     wait_for: Annotated[
-        str, typer.Option(help="Roles that must be on the bus before the first block: controller, recorder, or both.")
+        str,
+        typer.Option(
+            help="Roles that must be on the bus before the first block: controller, recorder, or controller,recorder."
+        ),
     ] = "controller",
     as_json: Json = None,
 ) -> None:
@@ -50,7 +53,7 @@ def plant(
     if unknown := set(roles) - {"controller", "recorder"}:
         raise Fault(
             "CONFIG",
-            f"--wait-for {wait_for}: {min(unknown)}: must be controller, recorder, or both with a comma between",
+            f"--wait-for {wait_for}: {min(unknown)}: must be controller, recorder, or controller,recorder",
         )
     if not shared.lockstep:
         refuse_short_blocks(made)

@@ -21,7 +21,7 @@ from bridge.log.storage.checksums import Checksums, checksum_findings
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.channels import SENSOR_CHANNELS
-from bridge.wire.event_codes import SEVERITIES, WEAK_REASONS, harms, is_listed
+from bridge.wire.event_codes import SEVERITIES, TESTS, WEAK_REASONS, harms, is_listed
 from cockpit.judge.machine_terms import MotionOf
 from cockpit.judge.pauses import CommandSum, StallSum
 from cockpit.judge.phases import (
@@ -37,7 +37,7 @@ from cockpit.judge.phases import (
 )
 from cockpit.judge.ratio_watch import RatioWatch
 from cockpit.judge.sensor_watch import SensorWatch
-from cockpit.judge.setup import SETTLING_S, Described, Setup, described, is_known, plant_of, setup_of
+from cockpit.judge.setup import SETTLING_S, Described, Setup, described, is_known, other_rig, plant_of, setup_of
 from cockpit.judge.slips import Forces, bins_of, forces_of
 from cockpit.judge.verdict import IN_CHARGE_SHARE, MISSING_SHARE, RunVerdict
 from cockpit.judge.watches import FrozenWatch, LatencyWatch, Losses, RigWatch, StepWatch, clock_fault, losses_of
@@ -206,7 +206,7 @@ class RunJudge:
         not_watched = events.not_watched if latency is not None else ""
         damaged = [f"{finding.kind}: {finding.text}" for finding in damage_findings(damage, self._path)]
         faults, others = self._lines(charge, gaps.fallbacks(), damaged, checksums, foreign)
-        others += steps.other_stiffness(setup.stiffness_N_per_m)
+        others += [*windows.sensors.other_stiffness(setup.stiffness_N_per_m), *other_rig(self._headers)]
         ratio = windows.ratio.result() if windows.checked else None
         slips_s = self.cycles.breakaway_t_s if self.cycles is not None else np.empty(0)
         judged_s = apart((setup.settled_from_s, seconds), gaps.all(is_last=True))
@@ -216,11 +216,12 @@ class RunJudge:
         return RunVerdict(
             log=str(self._path),
             seconds=seconds,
-            planned_s=losses.planned_s,
+            planned_s=setup.duration_s,
+            early=losses.early,
             blocks=self.log.topics["sensors"].messages,
             lost_blocks=losses.blocks,
             lost_messages=losses.messages,
-            all_losses_known=losses.blocks_known and not losses.planned_s,
+            all_losses_known=losses.blocks_known and not losses.early,
             absent=losses.absent,
             controller_missed=steps.missed,
             misses_known=losses.misses_known,
@@ -270,6 +271,9 @@ class RunJudge:
         counts, listed = self.log.events.counts, set[tuple[str, str]]()
         for event in self.log.events.kept:
             key = event.source, event.code
+            if event.code in TESTS:  # each of them is another fault
+                others.append(f"{event.code}: {event.text}, at {event.t_ns * 1e-9:.2f} s")
+                continue
             if key in listed or event.code in _COUNTED_ELSEWHERE or not is_listed(event.code):
                 continue
             listed.add(key)
@@ -303,7 +307,7 @@ class RunJudge:
                 doubts.append(f"{100 * share:.1f} % of the judged blocks are missing, {most}")
         if checksums.changed or any(CHANGED in line for line in damaged):
             doubts.append("bytes of the log were changed after it was written or judged")
-        if not (losses.blocks_known or losses.planned_s):
+        if not (losses.blocks_known or losses.early):
             doubts.append(f"the number of missing blocks is unknown; {'; '.join(damaged)}")
         return [doubt for doubt in doubts if doubt]
 

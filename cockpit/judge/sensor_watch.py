@@ -2,7 +2,8 @@
 
 Relations between the sensors, second by second: force and spring, and vibration of base, slide and controller. A channel that
 is swapped, of the wrong sign or scale, or not connected breaks a relation. A relation is compared in each second in which its
-signals exceed their noise; a single broken second is a doubt. "Bank": the simulated axes of docs/method/bank.md.
+signals exceed their noise; a single broken second is a doubt. The slope of the force over the elongation shows k_d.
+"Bank": the simulated axes of docs/method/bank.md.
 
 Only the list of slip times grows with the run. A check without signals to compare has no finding.
 """
@@ -37,8 +38,16 @@ _PARTS = 4
 # A second is compared if the power of force or spring force exceeds the power of both noises by this factor. Smaller: more of the
 # difference is noise, 4 % of the power at 25. Larger: less of a run is compared.
 _EXCITED = 25.0
+# Least square of the correlation of force and elongation for a stiffness. Smaller: a swapped channel shows a stiffness. Larger: a
+# drive with backlash or damping shows none.
+_ALIKE = 0.5
+# Factor from which a configured k_d is reported. Smaller: data sheets without bearings are. Larger: only wrong units are.
+_FAR = 2.0
 # Least vibration that is compared, in noises of the accelerometer. Smaller: noise counts. Larger: no slow feed is compared.
 _SEEN = 100.0
+# Least vibration that some sensor or the controller shows, over the command. Smaller: a dead exciter leaves noise, up to 0.014 of
+# the least command that is compared, and it counts. Larger: a weak exciter is not compared.
+_ARRIVES = 0.03
 # A second is compared if it vibrates for at least this share. Larger: an inching drive is never compared. Smaller: ramps of the
 # vibration fill most of the compared time, at 0.05 in `mount-stops` of the bank; at 0.25 they fill a twelfth at most.
 _COMPARED = 0.25
@@ -68,8 +77,12 @@ class ChannelRelations:
     def __init__(self, of: Described, block_s: float) -> None:
         self._of, self._count = of, round(1.0 / block_s)
         position_N = of.stiffness_N_per_m * of.channels["drive_position_m"].step
-        steps_N = [position_N, position_N, of.channels["drive_force_N"].step]
-        self._steps_N2 = float(np.nansum(np.square(steps_N))) / 12.0  # power of rounding to the resolutions
+        # powers of rounding to the resolutions, of the force and of both positions
+        self._steps_N2 = (
+            np.nan_to_num(np.square([of.channels["drive_force_N"].step, math.sqrt(2.0) * position_N])) / 12.0
+        )
+        # powers of force, spring force and their product, in seconds in which both exceed their noise
+        self._force_N2 = self._spring_N2 = self._product_N2 = 0.0
         self.vibrated = False
         self._broken: dict[str, tuple[str, int]] = {}  # by code: text of the first broken second, and their number
 
@@ -88,17 +101,23 @@ class ChannelRelations:
 
     def _spring(self, t_s: Floats, force_N: Floats, spring_N: Floats) -> None:
         """Compare the force with the spring force k_d (drive - slide), [seconds, bins]."""
-        noise_N2 = noise_of(force_N) ** 2 + noise_of(spring_N) ** 2 + self._steps_N2
+        noises_N2 = [
+            noise_of(values) ** 2 + step for values, step in zip((force_N, spring_N), self._steps_N2, strict=True)
+        ]
         width = force_N.shape[1] // _PARTS
         parts = (signal[:, : _PARTS * width].reshape(-1, _PARTS, width) for signal in (force_N, spring_N))
         force_N, spring_N = (part - part.mean(axis=2, keepdims=True) for part in parts)
         force, spring, apart = (np.square(part).mean(axis=(1, 2)) for part in (force_N, spring_N, force_N - spring_N))
+        both = (force > _EXCITED * noises_N2[0]) & (spring > _EXCITED * noises_N2[1])
+        self._force_N2 += float(force[both].sum())
+        self._spring_N2 += float(spring[both].sum())
+        self._product_N2 += float((force_N * spring_N).mean(axis=(1, 2))[both].sum())
         larger = np.maximum(force, spring)
         text = "drive_force_N varies by {:.3g} N, the described stiffness times drive_position_m - mass_position_m by {:.3g} N, "
         text += (
             "their difference by {:.3g} N: look at sign, scale and cable of these three channels, and at the stiffness"
         )
-        broken = (larger > _EXCITED * noise_N2) & (apart > self._of.apart**2 * larger)
+        broken = (larger > _EXCITED * sum(noises_N2)) & (apart > self._of.apart**2 * larger)
         self._take("SENSOR_SCALE", t_s, broken, text, *map(np.sqrt, (force, spring, apart)))
 
     def _vibration(self, t_s: Floats, window: Window, at: Rows, force_N: Floats) -> None:
@@ -115,7 +134,14 @@ class ChannelRelations:
         applied = _rows_at(window.applied, "sequence", window.blocks.sequence[at])
         amplitude_m, omega = applied["amplitude_m"], 2.0 * math.pi * applied["frequency_Hz"]
         self.vibrated |= bool((amplitude_m > 0.0).any())
-        vibrates = omega**2 * amplitude_m > _SEEN * np.nan_to_num(base_noise_mps2)
+        # the controller does not measure v_a during a loop check
+        trace = _rows_at(window.trace, "block", window.blocks.sequence[at])
+        v_a_mps = np.where(trace["mode"] == wire.EXCITE, trace["vibration_velocity_mps"], 0.0)
+        slide_above_mps2 = np.where(slide_mps2 > _QUIET * np.nan_to_num(noise_mps2), slide_mps2, 0.0)
+        shown_mps2 = np.fmax.reduce([math.sqrt(2.0) * base_mps2, math.sqrt(2.0) * slide_above_mps2, omega * v_a_mps])
+        commanded_mps2 = omega**2 * amplitude_m
+        vibrates = commanded_mps2 > _SEEN * np.nan_to_num(base_noise_mps2)
+        vibrates &= shown_mps2 > _ARRIVES * commanded_mps2
         text = "mass_accel_mps2 vibrates by {:.3g} m/s2, more than base_accel_mps2 by {:.3g} m/s2: are they swapped, or is "
         text += "base_accel_mps2 not connected?"
         compare("SENSOR_SWAPPED", vibrates, slide_mps2 <= _LOUDER * base_mps2, text, slide_mps2, base_mps2)
@@ -125,10 +151,7 @@ class ChannelRelations:
         shakes = vibrates & (shaken_mps2 > _SHAKEN * noise_mps2)
         text = "mass_accel_mps2 shows {:.3g} m/s2, its noise, where friction shakes the slide by {:.3g} m/s2: is it connected?"
         compare("SENSOR_DEAD", shakes, slide_mps2 >= _QUIET * noise_mps2, text, slide_mps2, shaken_mps2)
-        # the controller does not measure v_a during a loop check
-        trace = _rows_at(window.trace, "block", window.blocks.sequence[at])
-        v_a_mps = trace["vibration_velocity_mps"]
-        both = vibrates & (v_a_mps > 0.0) & (trace["mode"] == wire.EXCITE)
+        both = vibrates & (v_a_mps > 0.0)
         rolled_off = applied["frequency_Hz"] / self._of.accel_bandwidth_Hz
         shown_mps = math.sqrt(2.0) * base_mps2 * per_omega_s * np.hypot(1.0, rolled_off)
         same = (shown_mps > v_a_mps / _SAME_V_A) & (shown_mps < v_a_mps * _SAME_V_A)
@@ -142,6 +165,16 @@ class ChannelRelations:
             first = f"from {t_s[second]:.1f} s on {text.format(*(values[second] for values in shown))}"
             first, seconds = self._broken.get(code, (first, 0))
             self._broken[code] = first, seconds + 1
+
+    def other_stiffness(self, given_N_per_m: float) -> list[str]:
+        """A warning about a configured k_d that is far from the slope of the force over the elongation; empty without one."""
+        if not given_N_per_m or self._product_N2 <= math.sqrt(_ALIKE * self._force_N2 * self._spring_N2):
+            return []
+        shown_N_per_m = self._of.stiffness_N_per_m * self._product_N2 / self._spring_N2
+        if 1.0 / _FAR <= shown_N_per_m / given_N_per_m <= _FAR:
+            return []
+        line = f"controller.drive_stiffness_N_per_m = {given_N_per_m:.3g}: the run shows {shown_N_per_m:.3g}"
+        return [f"{line}, more than a factor of {_FAR:g} away; correct it, or leave it out"]
 
     def doubts(self) -> list[Doubt]:
         """A finding for each broken relation."""
@@ -185,6 +218,10 @@ class SensorWatch:
             # a restarted controller counts from 0
             more = np.maximum(np.diff(trace[name], prepend=trace[name][:1]), 0)
             self._slips_s[name].append(np.repeat(trace["t_ns"][judged] * 1e-9, more[judged]))
+
+    def other_stiffness(self, given_N_per_m: float) -> list[str]:
+        """A warning about a configured k_d that the run contradicts; empty without one."""
+        return self._relations.other_stiffness(given_N_per_m)
 
     def result(self, force_slips_s: Floats, judged: Stretches) -> SensorVerdict:
         """Findings at the end of the log, with the slip times of the force; `judged`: stretches in which slips count."""

@@ -35,7 +35,8 @@ class RunVerdict(NamedTuple):
 
     log: str
     seconds: float
-    planned_s: float  # planned length if the log ends earlier and without the plant's END; else 0
+    planned_s: float  # planned length; 0: without an end, or unknown
+    early: bool  # the log ends before the planned end of its run, without the plant's END
     blocks: int
     lost_blocks: int
     lost_messages: int  # lower limit: only the number of blocks is exact
@@ -101,7 +102,7 @@ class RunVerdict(NamedTuple):
     def cut(self) -> str:
         """Actual and planned end in words, if the log ends before the planned end of its run; else empty."""
         ends = f"the log ends at {self.seconds:.2f} s, the run was to end at {self.planned_s:.2f} s"
-        return ends if self.planned_s and self.blocks else ""
+        return ends if self.early and self.blocks else ""
 
     @in_json
     def good(self) -> bool:
@@ -117,7 +118,7 @@ class RunVerdict(NamedTuple):
 
     @in_json
     def injected(self) -> list[str]:
-        """Faults injected by a scenario or an operator."""
+        """Begins and ends of the faults that a scenario or an operator injected."""
         return [line for line in self.told if _code(line) in TESTS]
 
     @in_json

@@ -40,6 +40,9 @@ def in_words(verdict: RunVerdict, verbose: bool, without: Phase | None = None) -
         )
     if verbose:
         return [*lines, *_figures(v)]
+    if begun := [line.removeprefix("INJECTED: ") for line in v.injected if line.startswith("INJECTED: ")]:
+        more = f"; and {len(begun) - _MOST_WARNINGS} more: --verbose" if len(begun) > _MOST_WARNINGS else ""
+        lines.append(f"injected {'; '.join(begun[:_MOST_WARNINGS])}{more}")
     return [*lines, *shortened([f"warning  {line}" for line in (*v.trips, *v.warnings)], verbose)]
 
 
@@ -103,7 +106,7 @@ def data_in_words(verdict: RunVerdict) -> str:
     v = verdict
     total = v.blocks + v.lost_blocks
     missed = f"the controller missed {'' if v.misses_known else 'at least '}{v.controller_missed}"
-    parts = [f"{v.seconds:.2f} of {v.planned_s:.2f} s; the rest is not in the log"] if v.planned_s else []
+    parts = [f"{v.seconds:.2f} of {v.planned_s:.2f} s; the rest is not in the log"] if v.early else []
     if v.lost_blocks:
         had = "the controller had them all" if v.misses_known else "not known whether the controller had them"
         had = missed if v.controller_missed else had

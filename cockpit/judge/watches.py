@@ -19,9 +19,6 @@ from cockpit.judge.setup import SETTLING_S, Setup
 STANDSTILL_MPS = 2e-5  # a slower drive is at standstill; the default of the controller
 
 _OF_EVERY_BLOCK = ("applied", "command", "trace")
-_KNOWN = 0.2  # relative sigma below which the controller has learnt k_d
-# Factor from which a configured k_d is reported. Smaller: data sheets without bearings are. Larger: only wrong units are.
-_FAR = 2.0
 
 
 class Latency(NamedTuple):
@@ -141,7 +138,6 @@ class StepWatch:
         self.armed = self.moved = False
         self.highest_set_point = 0.0  # highest set point of v_a / v_d during vibration
         self.drive_velocity_max_mps = 0.0
-        self._stiffness_N_per_m = 0.0  # k_d, once it is known within _KNOWN; 0 before
         self.stale: list[tuple[float, float]] = []  # first and last step of each stretch without a timely block [s]
         self._idle, self._doubted = _Stretches(), _Stretches()
 
@@ -155,8 +151,6 @@ class StepWatch:
         v_d_mps, t_s = records["drive_velocity_mps"], records["t_ns"] * 1e-9
         self.moved = self.moved or bool((np.abs(v_d_mps) > STANDSTILL_MPS).any())
         self.drive_velocity_max_mps = max(self.drive_velocity_max_mps, float(v_d_mps.max()))
-        if (known := records["drive_stiffness_sigma"] < _KNOWN).any():
-            self._stiffness_N_per_m = float(records["drive_stiffness_N_per_m"][known][-1])
         set_points = records["velocity_ratio"][records["mode"] == wire.EXCITE]
         self.highest_set_point = max(self.highest_set_point, float(set_points.max(initial=0.0)))
         for at_s in t_s[(records["events"] & STALE) != 0].tolist():
@@ -166,14 +160,6 @@ class StepWatch:
         self._idle.add(idle, t_s)
         frozen = (records["reason"] == wire.FROZEN) & ~np.isin(records["limit"], (wire.HELD_OPEN_LOOP, wire.NO_DRIVE))
         self._doubted.add(frozen | np.isin(records["reason"], (wire.FORCE_DOUBTED, wire.SLIDE_DOUBTED)), t_s)
-
-    def other_stiffness(self, given_N_per_m: float) -> list[str]:
-        """A warning about a configured k_d that is far from the learnt one; empty without one."""
-        learnt_N_per_m = self._stiffness_N_per_m
-        if not (given_N_per_m and learnt_N_per_m) or 1.0 / _FAR <= learnt_N_per_m / given_N_per_m <= _FAR:
-            return []
-        line = f"controller.drive_stiffness_N_per_m = {given_N_per_m:.3g}: the run shows {learnt_N_per_m:.3g}"
-        return [f"{line}, more than a factor of {_FAR:g} away; correct it, or leave it out"]
 
     def stops(self, block_s: float, is_last: bool) -> list[tuple[float, float]]:
         """Stretches in which the controller is stopped or the rig not armed, each with its settling second [s]."""
@@ -187,7 +173,7 @@ class StepWatch:
 class Losses(NamedTuple):
     """Losses of one log."""
 
-    planned_s: float  # planned length if the log ends earlier and without the plant's END; else 0
+    early: bool  # the log ends before the planned end of its run, without the plant's END
     blocks: int  # missing blocks
     at_the_end: int  # part of `blocks` after the last block in the log, by the plant's END
     blocks_known: bool  # False: a cut or damaged log may lack more
@@ -208,7 +194,7 @@ def losses_of(log: LogWatch, steps: StepWatch, setup: Setup, damage: Damage, sec
     if sent is not None:  # by the plant's END also blocks before a late start of the recorder are counted
         lost, known = lost + (0 if known else blocks.first_number) + at_the_end, True
     return Losses(
-        planned_s=setup.duration_s if early else 0.0,
+        early=early,
         blocks=lost,
         at_the_end=at_the_end,
         blocks_known=known,

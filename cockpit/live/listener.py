@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, Self
 
 from bridge.faults import Fault
 from bridge.wire import realtime
+from bridge.wire.loopback_users import absence
 from bridge.wire.topics import APPLIED, CONTROLLER_EVENT, PLANT_EVENT, RECORDER_EVENT, SENSORS, TRACE
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, is_frozen
 
@@ -45,7 +46,7 @@ def connected(config: BusConfig, role: str, patience_s: float, frozen: str, abse
     """A session with a running rig. Messages of the role `operator` wait for a slow link instead of being dropped.
 
     Raises Fault NO_PEER, whose message begins with `about` and ends with a remedy: `frozen` for a rig that accepts connections
-    but does not answer, `absent` without an answer.
+    but does not answer or whose password is missing, `absent` without an answer.
     """
     try:
         return Bus(config, role, lockstep=role == "operator", patience_s=patience_s)
@@ -56,6 +57,8 @@ def connected(config: BusConfig, role: str, patience_s: float, frozen: str, abse
     if is_frozen(config):
         line = f"{about}the rig at {where} accepts connections but does not answer (frozen or overloaded)"
         raise Fault("NO_PEER", f"{line}: must run; {frozen}")
+    if refusal := absence(where):
+        raise Fault("NO_PEER", f"{about}{refusal}; {frozen}")
     line = f"{about}no rig answered at {where} within {patience_s:g} s: {config.must_be} of a running rig"
     raise Fault("NO_PEER", f"{line}; {absent}")
 

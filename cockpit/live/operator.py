@@ -16,10 +16,14 @@ from bridge.wire.payloads import parsed
 from bridge.wire.topics import APPLIED, OPERATOR, PLANT_EVENT
 from bridge.wire.words import help_of, word_of
 from bridge.wire.zenoh_link import BusConfig, Inbox, Received
+from cockpit.first_stop import BY_FILE_S, CUT_AMPLIFIER
 from cockpit.live.listener import connected
 
 # Timeout of the connection. Longer: the advice to cut the amplifier comes later. Shorter: fails on a busy computer.
 _DIAL_S = 2.0
+# The same for a stop that the rig has confirmed by file. Longer: a jammed bus delays the end of the command. Shorter: a busy
+# computer reports a bus that works.
+STOPPED_DIAL_S = 0.5
 # Timeout since the rig's last progress on a command. A ramp takes 0.1 s; a loop check takes 1.7 s of the rig's time, and each of
 # its blocks counts as progress. Shorter: `arm` fails on a busy computer though the rig arms. Longer: the advice to cut the
 # amplifier comes later.
@@ -30,13 +34,10 @@ _SILENT_S = 1.0  # silence of the rig after which its last state is outdated; it
 _NOTHING_M = 1e-12  # a smaller amplitude counts as zero: rounding at the end of a ramp
 # Wait after a stop for the rig's event that it cannot keep the stop over a restart; also for the controller on the bus.
 _KEPT_S = 0.1
-# Longest wait for a confirmation by file, after the bus failed; a rig needs 10 ms and its ramp.
-_BY_FILE_S = 1.0
 _REFUSED_S = 1.0  # a rig that is in FAULT for this long after ARM refuses it
 _ARMS = (wire.Operator.ARM, wire.Operator.ACCEPT_GAIN)
 _QUIETING = (wire.Operator.STOP, wire.Operator.DISARM)
 _START_ONE = "start one, or give its --endpoint"
-_CUT_AMPLIFIER = "assume that the exciter still vibrates: cut its amplifier by hand now"
 
 
 class CommandOutcome(NamedTuple):
@@ -86,16 +87,22 @@ class CommandOutcome(NamedTuple):
         return lines
 
 
-def send_command(bus_config: BusConfig, name: str) -> CommandOutcome:
+def send_command(bus_config: BusConfig, name: str, dial_s: float | None = None) -> CommandOutcome:
     """Send a command until the rig has carried it out or refuses it.
 
+    Args:
+        bus_config: the bus.
+        name: the command.
+        dial_s: timeout of the connection; 2 s without it.
+
     Raises Fault NO_PEER if no rig answers, or if the rig falls silent, does not confirm the command, or vibrates after STOP.
+
     """
     where = bus_config.endpoint
     action = wire.Operator.Action.Value(name)
     by_hand = "if the exciter vibrates, cut its amplifier by hand now; otherwise check --endpoint"
     absent = by_hand if action in _QUIETING else _START_ONE
-    with connected(bus_config, "operator", _DIAL_S, _CUT_AMPLIFIER, absent, f"{name} NOT DELIVERED: ") as bus:
+    with connected(bus_config, "operator", dial_s or _DIAL_S, CUT_AMPLIFIER, absent, f"{name} NOT DELIVERED: ") as bus:
         exchange = _Exchange(name)
         bus.listen(APPLIED, exchange.inbox.push)
         bus.listen(PLANT_EVENT, exchange.inbox.keep)
@@ -106,13 +113,13 @@ def send_command(bus_config: BusConfig, name: str) -> CommandOutcome:
     last = exchange.applied
     if last is None:
         line = f"{where}: no rig publishes `applied` messages: --prefix must equal the prefix of the run"
-        raise Fault("NO_PEER", f"{line}; {_CUT_AMPLIFIER if action in _QUIETING else 'give the --prefix of the run'}")
+        raise Fault("NO_PEER", f"{line}; {CUT_AMPLIFIER if action in _QUIETING else 'give the --prefix of the run'}")
     before = f"{wire.GuardState.Name(last.guard_state)} with {_vibration(last.amplitude_m)}"
     if exchange.silent_s > _SILENT_S:
         line = (
             f"{where}: the rig has been silent for {exchange.silent_s:.1f} s, before that {before}: must answer {name}"
         )
-        raise Fault("NO_PEER", f"{line}; {_CUT_AMPLIFIER}; then check its process and the network")
+        raise Fault("NO_PEER", f"{line}; {CUT_AMPLIFIER}; then check its process and the network")
     cause = word_of("cause", last.cause)
     outcome = CommandOutcome(
         endpoint=where,
@@ -129,9 +136,9 @@ def send_command(bus_config: BusConfig, name: str) -> CommandOutcome:
     )
     if not (outcome.done or outcome.taken) and last.guard_state != wire.NO_GUARD:
         line = f"{where}: the rig did not confirm {name} within {_ANSWER_S:g} s and is {before}: must confirm it"
-        raise Fault("NO_PEER", f"{line}; {_CUT_AMPLIFIER if action in _QUIETING else 'send it again'}")
+        raise Fault("NO_PEER", f"{line}; {CUT_AMPLIFIER if action in _QUIETING else 'send it again'}")
     if action == wire.Operator.STOP and not outcome.done:
-        raise Fault("NO_PEER", f"{where}: the rig is {before} after a stop: must be at rest; {_CUT_AMPLIFIER}")
+        raise Fault("NO_PEER", f"{where}: the rig is {before} after a stop: must be at rest; {CUT_AMPLIFIER}")
     return outcome
 
 
@@ -149,13 +156,13 @@ def stop_rig(by_bus: Callable[[], CommandOutcome], orders: list[StopOrder]) -> C
     try:
         return by_bus()
     except (Fault, OSError) as error:
-        fault = error if isinstance(error, Fault) else Fault("NO_PEER", f"the bus failed: {error}; {_CUT_AMPLIFIER}")
+        fault = error if isinstance(error, Fault) else Fault("NO_PEER", f"the bus failed: {error}; {CUT_AMPLIFIER}")
         problems = "; ".join(order.problem for order in orders if order.problem)
-        if not confirmed(orders, _BY_FILE_S):
+        if not confirmed(orders, BY_FILE_S):
             unconfirmed = "; the stop file of the rig is set, but the rig did not confirm it"
             if problems:
                 unconfirmed = f"; the stop file of the rig could not be set: {problems}"
-            advice = f"; STOP NOT DELIVERED: {_CUT_AMPLIFIER}" if fault.kind.code == "NOT_SECURE" else ""
+            advice = "" if fault.kind.code == "NO_PEER" else f"; STOP NOT DELIVERED: {CUT_AMPLIFIER}"
             raise Fault(fault.kind.code, fault.line + (unconfirmed if orders else "") + advice) from None
         return CommandOutcome(
             endpoint=orders[0].endpoint,

@@ -1,12 +1,13 @@
 """Reads a measured file and the given facts into one record; reports its assumptions as findings and as a map to correct."""
 
 import json
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from bridge.arrays import Floats
+from bridge.arrays import Bools, Floats
 from bridge.config import read_toml, validate
 from bridge.faults import Fault
 from bridge.log.finding import Finding
@@ -17,7 +18,7 @@ from bridge.tables.table import Table
 from bridge.tables.unit_words import in_brackets, known_unit, weight_unit
 from cockpit.look.findings import of_time, of_values, tare_of
 from diagnosis.evidence.import_table import ImportMap
-from diagnosis.evidence.manifest_keys import ChannelMap
+from diagnosis.evidence.manifest_keys import VIBRATION, ChannelMap
 from diagnosis.evidence.mapped import calendar_unit_s, has_time, mapped
 from diagnosis.evidence.run_log import columns_of_log
 from diagnosis.look.guess import Guess, guess, no_time
@@ -25,6 +26,10 @@ from diagnosis.look.look import LookResult, RecordFacts, look
 from diagnosis.look.slips import FEWEST
 from diagnosis.look.sticks import is_of_slide
 from diagnosis.look.words import headline
+
+# Shortest stretch without vibration that is looked at. Shorter: stops and turns of the drive between two vibrations count as
+# swings, 1.5 s in docs/guides/describe-an-axis.md. Longer: the controller's trials without vibration, 5 s, are left out.
+_ALONE_S = 2.0
 
 
 class LookOptions(NamedTuple):
@@ -47,9 +52,22 @@ class MeasuredRecord(NamedTuple):
     t_s: Floats
     force_N: Floats
     position_m: Floats | None  # position of the drive
+    vibration: dict[str, Floats]  # commanded frequency and amplitude; empty if unknown
     known: RecordFacts
     findings: list[Finding]
     map_text: str  # map that reproduces this reading; empty if a map was given, or for a run log
+
+    @property
+    def free(self) -> Bools:
+        """True for samples in long stretches without a commanded vibration, which hides stick, slip and swing of the slide."""
+        free = np.ones(len(self.t_s), np.bool_)
+        if "vibration_amplitude_m" not in self.vibration:
+            return free
+        vibrates = self.vibration["vibration_amplitude_m"] > 0.0
+        limits = [0, *(np.flatnonzero(np.diff(vibrates)) + 1).tolist(), len(free)] if vibrates.any() else []
+        for first, end in pairwise(limits):
+            free[first:end] = not vibrates[first] and self.t_s[end - 1] - self.t_s[first] >= _ALONE_S
+        return free
 
 
 def read_record(path: Path, asked: LookOptions) -> MeasuredRecord:
@@ -144,8 +162,10 @@ def read_record(path: Path, asked: LookOptions) -> MeasuredRecord:
 
 
 def looked_at(record: MeasuredRecord) -> LookResult:
-    """Slips, friction, stiffness and mass from a record. Raises Fault BAD_TABLE for a record that is too short."""
-    seen = look(record.t_s, record.force_N, record.position_m, record.known)
+    """Slips, friction, stiffness and mass from a record without its vibration. Raises Fault BAD_TABLE if it is too short."""
+    free, position_m = record.free, record.position_m
+    position_m = None if position_m is None else position_m[free]
+    seen = look(record.t_s[free], record.force_N[free], position_m, record.known)
     if seen is None:
         line = f"{record.path.name}: fewer than 16 samples of a force with a time; give a longer record"
         raise Fault("BAD_TABLE", line)
@@ -183,7 +203,20 @@ def _record(
         not np.isfinite(position).any() or float(np.nanmax(position) - np.nanmin(position)) == 0.0
     ):
         position = None
-    return MeasuredRecord(path, columns["t_s"], columns["drive_force_N"], position, known, findings, text)
+    vibration = {name: columns[name] for name in VIBRATION if name in columns}
+    record = MeasuredRecord(path, columns["t_s"], columns["drive_force_N"], position, vibration, known, findings, text)
+    free = record.free
+    if free.all():
+        return record
+    remedy = "record the rig alone, or for longer before `controller.policy.enabled_from_s`"
+    if not free.any():
+        line = (
+            f"{path.name}: vibrates, which hides stick and slip, and has no stretch of {_ALONE_S:g} s without vibration"
+        )
+        raise Fault("BAD_TABLE", f"{line}; {remedy}")
+    line = f"the vibration hides stick and slip: {100.0 * free.mean():.0f} % of the samples are used, without vibration for"
+    line = f"{line} {_ALONE_S:g} s or more; if they are too few, {remedy}"
+    return record._replace(findings=[*findings, Finding("vibrated", path.name, line)])
 
 
 def _channels(table: Table, guessed: Guess) -> dict[str, ChannelMap]:

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 from bridge import compiling
-from bridge.faults import Fault
+from bridge.faults import Fault, install
 from bridge.plain import StepReport, no_report, print_line
 from bridge.wire import realtime
 
@@ -258,7 +258,7 @@ def _status(work: Callable[[], int | None], as_json: bool) -> int:
         if module not in EXTRA_MODULES and module != "foxglove":  # not in [all]: large, and used by one option only
             raise
         extra = "foxglove" if module == "foxglove" else "all"
-        line = f"this command needs {module}, which is not installed; pip install 'stickslip[{extra}]'"
+        line = f"this command needs {module}, which is not installed; {install(extra)}"
         return report(Fault("MISSING_EXTRA", line), as_json)
 
 

@@ -24,7 +24,7 @@ from bridge.wire.topics import (
 )
 from cockpit.run.closed_loop import ClosedLoop, Stretch
 from cockpit.run.scenario import Scenario, header
-from controller.node import obeyed
+from controller.node import operator_events
 from controller.replay import Change
 from controller.telemetry import SNAPSHOT_EVERY, STATE_EVERY, plotted, snapshot
 from controller.trips.trip_events import TripEvents
@@ -87,7 +87,7 @@ def run_onboard(
                 while due and _first_step(loop, due[0].t_ns) <= loop.block:
                     action = due.pop(0).action
                     loop.apply_order(action)
-                    events = obeyed(events, action)
+                    events = operator_events(events, action)
                 # a change of the configuration or an operator command also ends a stretch
                 ends = [blocks, (loop.block // _STRETCH_BLOCKS + 1) * _STRETCH_BLOCKS]
                 ends += [_first_step(loop, part[0].t_ns) for part in (ahead, due) if part]

@@ -180,4 +180,5 @@ def header(scenario: Scenario, role: str, lockstep: bool) -> wire.Header:
         schema_version=SCHEMA_VERSION,
         configuration=json.dumps(configuration, sort_keys=True),
         versions=json.dumps(versions(), sort_keys=True),
+        rig=scenario.rig.name,
     )

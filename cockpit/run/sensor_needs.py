@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
-from controller.config import ControllerConfig, candidate_frequencies_Hz
+from controller.config import ControllerConfig, candidate_frequencies_Hz, cheapest_frequency_Hz
 from plant.config import RigConfig, SensorsConfig
 from plant.drive_motion import DriveMotion, lowest_mps, reach_m
 from plant.records import build
@@ -186,18 +186,15 @@ def _base(
 ) -> None:
     """Check range, bandwidth, noise and resolution of the accelerometers at the frequency that the controller would choose."""
     sensors, limits = rig.sensors, controller.limits
-    candidates_Hz = np.array(candidate_frequencies_Hz(controller))
+    frequency_Hz, lowest_Hz = cheapest_frequency_Hz(controller), candidate_frequencies_Hz(controller)[0]
+    omega = math.tau * frequency_Hz
 
-    def accel_mps2(v_d_mps: float) -> tuple[float, float]:
-        """Acceleration of the base at this feed, and the vibration frequency that `controller.policy.frequency` would choose."""
-        v_a_mps = min(limits.v_ratio * v_d_mps, limits.velocity_max_mps)
-        omega = 2.0 * math.pi * candidates_Hz
-        needed_mps2 = omega * v_a_mps / controller.amplitude.accel_range_mps2
-        best = int(np.argmin((v_a_mps / omega / limits.amplitude_max_m) ** 2 + needed_mps2**2))
-        reached_mps = min(v_a_mps, float(omega[best]) * min(limits.amplitude_max_m, rig.piezo.amplitude_max_m))
-        return float(omega[best]) * reached_mps, float(candidates_Hz[best])
+    def accel_mps2(v_d_mps: float) -> float:
+        """Acceleration of the base at this feed."""
+        reached_mps = omega * min(limits.amplitude_max_m, rig.piezo.amplitude_max_m)
+        return omega * min(limits.v_ratio * v_d_mps, limits.velocity_max_mps, reached_mps)
 
-    base_mps2, frequency_Hz = accel_mps2(fastest_mps)
+    base_mps2 = accel_mps2(fastest_mps)
     if (most_mps2 := max(base_mps2, slip_mps2)) > sensors.accel_range_mps2:
         why = f"base and slide accelerate with {most_mps2:.3g} m/s2, this sensor ends at {sensors.accel_range_mps2:g} m/s2"
         _refuse("sensors.accel_range_mps2", sensors.accel_range_mps2, why, f"{_above(2.0 * most_mps2):g}")
@@ -207,10 +204,10 @@ def _base(
         known = f"or, for a sensor of {band_Hz:g} Hz, set controller.amplitude.accel_bandwidth_Hz = {band_Hz:g}"
         remedy = f"{_above(2.0 * frequency_Hz):g}, {known}: the controller then corrects v_a"
         _refuse("sensors.accel_bandwidth_Hz", band_Hz, why, remedy)
-    if sensors.accel_lowest_Hz > 0.5 * candidates_Hz[0]:
-        why = f"the base vibrates from {candidates_Hz[0]:g} Hz on"
-        _refuse("sensors.accel_lowest_Hz", sensors.accel_lowest_Hz, why, f"{_below(0.1 * float(candidates_Hz[0])):g}")
-    least_mps2, _ = accel_mps2(slowest_mps)
+    if sensors.accel_lowest_Hz > 0.5 * lowest_Hz:
+        why = f"the base vibrates from {lowest_Hz:g} Hz on"
+        _refuse("sensors.accel_lowest_Hz", sensors.accel_lowest_Hz, why, f"{_below(0.1 * lowest_Hz):g}")
+    least_mps2 = accel_mps2(slowest_mps)
     least = f"the base vibrates with {least_mps2:.3g} m/s2 at {slowest_mps * 1e3:.3g} mm/s"
     _resolves(sensors, "accel", "mps2", least_mps2 / _NOISES_AN_AMPLITUDE, least_mps2, least)
 

@@ -1,19 +1,19 @@
 """Conditioning of the samples, and the faults that one channel shows.
 
-Each channel has a small memory. A bin of samples is compared with the line of the bins before it, and the mean deviation is the
-channel's noise. A bin beyond 6 sigma is replaced by the line, as no slide, drive or spring moves away and back within a bin. If
-the next bin deviates as far, the signal has stepped: a step of the drive position is an error of its encoder and is subtracted
-from then on. If the deviations differ, the noise has grown or the motion has changed, and both are followed.
+A bin of samples is compared with the line of the bins before it; the mean deviation is the channel's noise. A bin beyond 6 sigma
+is replaced by the line, as no slide, drive or spring moves away and back within a bin. If the next bin deviates as far, the
+signal has stepped: a step of the drive position is an error of its encoder and is subtracted from then on. If the deviations
+differ, the noise has grown or the motion has changed, and both are followed.
 """
 
 import math
 
 from bridge.kernel import Record, kernel
 from bridge.layouts import ControllerMemory, ControllerParams, SensorRow
-from bridge.wire.stickslip_pb2 import DRIVE_DOUBTED, FORCE_DOUBTED, FROZEN, SLIDE_DOUBTED
+from bridge.wire.stickslip_pb2 import DRIVE_DOUBTED, FROZEN
 from controller.estimate.compliance import spring_force
 from controller.estimate.windows import DRIVE, FORCE, ROWS, SLIDE, WELL_KNOWN
-from controller.trips.doubts import ACCELEROMETER, CONTACT, OF_BASE, trip
+from controller.trips.doubts import ACCELEROMETER, CONTACT, trip
 from controller.trips.doubts import DRIVE as DRIVE_DOUBT
 
 # Deviation of a replaced bin, over the mean deviation: a step of 16 sigma is subtracted in six of ten times. Larger: an encoder
@@ -26,30 +26,31 @@ _ROUNDED = 2e-7  # relative rounding of a float32 in a message, the finest resol
 _FOLLOW, _LEARN = 0.25, 0.015625
 _MOST_BINS = 3  # bins until a deviation other than a step is followed; smaller: a step within a bin is missed
 _MEMORY_S = 1.0  # time constant of the counts and of the usual noise; time of a report
-_SPIKE, _MOST = 0.25, 2.5  # count of a spike (a step counts 1), and the count from which a channel is doubted
+_MOST_STEPS = 2.5  # count of steps from which the drive position is doubted
 # Time of repeated blocks or grown noise. Larger: at 0.015 an accelerometer that drops out for 5 % of the time is reported after
 # 0.9 s (0.3 s). Smaller: bursts of noise of 3 ms count as grown noise.
 HOLD_S = 0.01
-_GROWN = (
-    8.0  # growth of the drive position's noise from which it counts in all windows; smaller: an acceleration is noise
-)
+_GROWN = 8.0  # growth of the drive position's noise that counts in all windows; smaller: an acceleration is noise
 _STEPS_LOOK = 16  # steps between two measurements of the resolution of the samples
 _LARGEST = 1e15  # sum of a block's samples that shows no number
+BASE = 2  # index of the base acceleration in the counts of repeated blocks, after FORCE and SLIDE
 
 
 @kernel
 def is_usable(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> bool:
     """Whether all used samples are numbers. Counts the blocks that repeat the block before them, by a weighted sum."""
-    force, slide, drive, base = 0.0, 0.0, 0.0, 0.0  # together, as the sums do not wait for each other
+    force, slide, drive, base, unused = 0.0, 0.0, 0.0, 0.0, 0.0  # together, as the sums do not wait for each other
     for i in range(block.base_accel_mps2.shape[0]):
         weight = float((i + 1) * (i + 1))
         force += weight * float(block.drive_force_N[i])
         slide += weight * float(block.mass_position_m[i])
         drive += weight * float(block.drive_position_m[i])
         base += weight * float(block.base_accel_mps2[i])
+        unused += float(block.mass_accel_mps2[i])
     _note(p, s, FORCE, force, s.moving == 1 and s.usual[FORCE] > _STEPS * s.resolution[FORCE])
     _note(p, s, SLIDE, slide, s.moving == 1 and s.usual[SLIDE] > _STEPS * s.resolution[SLIDE])
-    _note(p, s, OF_BASE, base, s.least_mps.min() > 0.0)
+    _note(p, s, BASE, base, s.least_mps.min() > 0.0)
+    s.slide_accel_unread = 0 if math.isfinite(unused) else 1
     used = math.fabs(drive) + math.fabs(base)
     used += math.fabs(force) if p.use_force == 1 else 0.0
     used += math.fabs(slide) if p.use_slide_position == 1 else 0.0
@@ -105,8 +106,7 @@ def _condition(s: ControllerMemory, row: int, bins: int) -> None:
             rate += _FOLLOW * off
             if off != 0.0:  # a repeated number gives no information on the noise
                 scatter += _LEARN * (math.fabs(off) - scatter)
-            if far > 0:
-                s.spikes[row], far = s.spikes[row] + _SPIKE, 0
+            far = 0
             continue
         last += rate
         is_held = far == 0 and before == 0.0  # a channel without noise, or slower than the bins, moves in steps
@@ -144,46 +144,37 @@ def note_resolution(s: ControllerMemory, row: int, samples: Record) -> None:
 
 @kernel
 def watch_channels(p: ControllerParams, s: ControllerMemory) -> None:
-    """Trip on channels that repeat their blocks, spike or step too often; learn the noise again if it has grown. Once a block."""
+    """Trip on channels that repeat blocks or step too often; learn the drive's noise again if it has grown. Once a block."""
     share = p.block_s / _MEMORY_S
     if s.stepped & 1 << DRIVE:  # two channels at once: their common reference
-        s.spikes[DRIVE] += 1.0 if s.stepped == 1 << DRIVE else 1.0 + _MOST
+        s.jumps += 1.0 if s.stepped == 1 << DRIVE else 1.0 + _MOST_STEPS
     s.stepped = 0
-    for row in range(ROWS):
-        if s.spikes[row] > _MOST:
-            _doubt(s, row)
-        s.spikes[row] -= share * s.spikes[row]
-        s.usual[row] += (share if s.usual[row] > 0.0 else 1.0) * (s.scatter[row] - s.usual[row])
-    if s.repeats[OF_BASE] > p.frozen_steps:
+    if s.jumps > _MOST_STEPS:
+        trip(s, DRIVE_DOUBTED, DRIVE_DOUBT)
+    s.jumps -= share * s.jumps
+    if s.repeats[BASE] > p.frozen_steps:
         trip(s, FROZEN, ACCELEROMETER)
     if max(s.repeats[FORCE], s.repeats[SLIDE]) > p.frozen_steps:
         trip(s, FROZEN, CONTACT)
-    if s.scatter[DRIVE] > _GROWN * max(s.usual[DRIVE], s.resolution[DRIVE]):
-        s.grown_s += p.block_s
-        if s.grown_s > HOLD_S:
-            factor = s.scatter[DRIVE] / max(s.usual[DRIVE], s.resolution[DRIVE])
-            for level in range(p.levels):
-                s.sigma[DRIVE, level], s.noise[DRIVE, level] = (
-                    factor * s.sigma[DRIVE, level],
-                    factor * s.noise[DRIVE, level],
-                )
-            s.usual[DRIVE], s.grown_s = s.scatter[DRIVE], _MEMORY_S
-    else:
+    scatter_m = s.scatter[DRIVE]
+    for row in range(ROWS):
+        s.usual[row] += (share if s.usual[row] > 0.0 else 1.0) * (s.scatter[row] - s.usual[row])
+    usual_m = max(s.usual[DRIVE], s.resolution[DRIVE])
+    if scatter_m <= _GROWN * usual_m:
         s.grown_s = max(s.grown_s - p.block_s, 0.0)
-
-
-@kernel
-def _doubt(s: ControllerMemory, row: int) -> None:
-    if row == DRIVE:
-        trip(s, DRIVE_DOUBTED, DRIVE_DOUBT)
-    else:
-        trip(s, FORCE_DOUBTED if row == FORCE else SLIDE_DOUBTED, CONTACT)
+        return
+    s.grown_s += p.block_s
+    if s.grown_s > HOLD_S:
+        for level in range(p.levels):
+            s.sigma[DRIVE, level] *= scatter_m / usual_m
+            s.noise[DRIVE, level] *= scatter_m / usual_m
+        s.usual[DRIVE], s.grown_s = scatter_m, _MEMORY_S
 
 
 @kernel
 def has_jumped(s: ControllerMemory) -> bool:
     """Whether the drive position stepped a short time ago."""
-    return s.spikes[DRIVE] > 1.0 - _SPIKE
+    return s.jumps > 0.5
 
 
 @kernel

@@ -85,14 +85,16 @@ def _expect(p: ControllerParams, s: ControllerMemory, force_N: float, tick_s: fl
     along_N = s.direction * force_N
     s.time_to_slip_s, s.drive_unseen = -1.0, 0
     if s.moving == 0:
-        moves_mps = math.fabs(s.slope[SLIDE, p.spring_level])
-        unseen = (
-            moves_mps > max(SIGMAS * s.noise[SLIDE, p.spring_level], _UNSEEN_MPS)
-            and min(s.stood_s, s.silent_s) > _STANDS_S
-        )
-        s.drive_unseen = 1 if unseen and s.guard_state != CHECKING else 0  # vibration relaxes the spring
+        limit_mps = max(SIGMAS * s.noise[SLIDE, p.spring_level], _UNSEEN_MPS)
+        # vibration relaxes the spring
+        rests = min(s.stood_s, s.silent_s) > _STANDS_S and s.guard_state != CHECKING
+        s.drive_unseen = 1 if rests and math.fabs(s.slope[SLIDE, p.spring_level]) > limit_mps else 0
         s.unseen_s = 0.0
-        s.blind = 1 if _feeds_unseen(p, s) else 0  # an unseen feed looks like a drive at rest
+        # a feed that the noise over one second hides looks like a drive at rest; that noise is extrapolated from the shortest
+        # windows as white noise, as a stop disturbs the long windows for seconds
+        white_mps = s.noise[DRIVE, 0] * (p.window_s[0] / _LONGEST_WINDOW_S) ** 1.5
+        seen_mps = SIGMAS * hypot(white_mps, OF_STEP * s.resolution[DRIVE] / _LONGEST_WINDOW_S)
+        s.blind = 1 if white_mps > 0.0 and seen_mps > p.least_feed_mps else 0
         return
     if s.slip_began == 1 and s.allowed_m == 0.0:
         s.breakaway_N[way] = s.peak_N
@@ -105,17 +107,3 @@ def _expect(p: ControllerParams, s: ControllerMemory, force_N: float, tick_s: fl
     in_time = s.level >= 0 and (s.window_s < s.expected_stick_s or sticks or s.slipping == 1)
     s.unseen_s = 0.0 if in_time else s.unseen_s + tick_s
     s.blind = 1 if s.unseen_s > _BLIND_S else 0
-
-
-@kernel
-def _feeds_unseen(p: ControllerParams, s: ControllerMemory) -> bool:
-    """Whether the noise of the drive's position over one second exceeds the least feed that counts as motion.
-
-    The noise of the best windows is extrapolated to one second as white noise, as a stop disturbs the long windows for seconds.
-    """
-    seen_mps = math.inf
-    for level in range(p.levels):
-        if s.noise[DRIVE, level] > 0.0:
-            seen_mps = min(seen_mps, s.noise[DRIVE, level] * (p.window_s[level] / _LONGEST_WINDOW_S) ** 1.5)
-    seen_mps = SIGMAS * hypot(seen_mps, OF_STEP * s.resolution[DRIVE] / _LONGEST_WINDOW_S)
-    return p.least_feed_mps < seen_mps < math.inf

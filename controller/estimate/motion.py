@@ -11,6 +11,8 @@ _STEADY = 0.04  # smallest relative change of v_d that restarts the time of cons
 # Sigmas from an extrapolated v_d down to the v_d that v_a is for, while v_d changes. Larger: at 5 an axis of 10 N/um slips at two
 # of five reversals. Smaller: noise raises v_a, which releases a wound-up spring.
 _RISES = 4.0
+# Longer windows that are extrapolated, too. Larger: at 3 `stops-moves` has 5 slips. Smaller: at 1 `stops-stiff` has 3 (1).
+_LEVELS = 2
 _HUM_S = 0.1  # five periods of mains hum, after which its noise is known
 _HOLD_S = 0.1  # time constant of the held velocity, as a slide still moves after a step of the drive
 
@@ -42,7 +44,7 @@ def drive_velocity(p: ControllerParams, s: ControllerMemory, tick_s: float) -> N
         velocity_mps, sigma_mps = slope_mps, noise_mps
         along_mps, sigmas = slope_mps * sign, SIGMAS
         # a drive that accelerates evenly is faster now by the difference from the window of twice the length
-        if s.steady_s < _HOLD_S and level <= first + 1 and level + 1 < p.levels and s.pushed[level + 1] >= BINS:
+        if s.steady_s < _HOLD_S and level <= first + _LEVELS and level + 1 < p.levels and s.pushed[level + 1] >= BINS:
             along_mps += max(along_mps - max(s.slope[DRIVE, level + 1] * sign, 0.0), 0.0)
             sigmas = _RISES
         rising_mps = max(rising_mps, along_mps - sigmas * noise_mps)

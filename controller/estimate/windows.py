@@ -7,7 +7,7 @@ The noise of a level is measured: the slopes of three successive windows lie on 
 deviation), so it contains hum, drift and quantisation as well as white noise, but not a swing that is slow against the window.
 The scale is the lower quartile of the deviations, which a minority of disturbances by slips and re-sticks changes little.
 
-A vibrated slide that swings with about the period of the windows bends their slopes as noise does, but in force and position
+A slide that swings or slips with about the period of the windows bends their slopes as noise does, but in force and position
 alike, by the spring's law x_d' - x_s' = c F'. So the deviation from this law and the drive's noise together bound the noise.
 """
 
@@ -28,7 +28,7 @@ WHITE = 2.0**-1.5  # noise of a slope over the noise at half the window, for whi
 # extrapolated as white noise. Smaller: with 7 a resting drive moves once in the first second of one run of eight. Larger: the
 # start of a run is seen later, by 5 ms from 7 to 10.
 FEWEST = 10
-WELL_KNOWN = 40  # differences after which the error of a level's noise is only some per cent
+WELL_KNOWN = 40  # bins after which a channel's noise is known
 _LEAST_STEP = 0.00125  # least relative change of sigma by a difference, at which it scatters by 6 %
 SIGMAS = 6.0  # detection limit of every window: error rate of 1e-9, one in 100 hours of windows of 1 ms at most
 # A quantisation step q causes an error of a slope of at most q / W in a window W; its sigma is 0.29 of that.
@@ -76,20 +76,17 @@ def _note_window(p: ControllerParams, s: ControllerMemory, level: int, learn: bo
     """Use the slopes of a window that begins at the end of the last window: their differences give the noise."""
     slope, before, sigma = s.slope, s.slope_before, s.sigma
     if learn:
-        has_law = p.use_force == 1 and p.use_slide_position == 1 and s.stiffness_learnt == 1
-        s.differences[level] += 1
-        law_mps = 0.0
+        c, count = s.compliance_m_per_N, s.differences[level] + 1
+        s.differences[level], law_mps = count, 0.0
         for row in range(ROWS):
             bend = slope[row, level] - 2.0 * before[row, level, 0] + before[row, level, 1]
-            law_mps += bend * (s.compliance_m_per_N if row == FORCE else 1.0 if row == SLIDE else -1.0)
-            sigma[row, level] = _moved(sigma[row, level], math.fabs(bend), s.differences[level])
-        if has_law:
-            s.agreements[level] += 1
-            s.law_mps[level] = _moved(s.law_mps[level], math.fabs(law_mps), s.agreements[level])
+            law_mps += bend * (c if row == FORCE else 1.0 if row == SLIDE else -1.0)
+            sigma[row, level] = _moved(sigma[row, level], math.fabs(bend), count)
+        s.law_mps[level] = _moved(s.law_mps[level], math.fabs(law_mps), count)
         _note_noise(p, s, level)
-        if has_law and s.allowed_m > 0.0:  # without vibration the swing after a slip would count as further slips
-            off_mps = hypot((1.0 + FEWEST / s.agreements[level]) * s.law_mps[level], s.noise[DRIVE, level])
-            s.noise[FORCE, level] = min(s.noise[FORCE, level], off_mps / s.compliance_m_per_N)
+        if c > 0.0 and p.use_force == 1 and p.use_slide_position == 1:
+            off_mps = hypot((1.0 + FEWEST / count) * s.law_mps[level], s.noise[DRIVE, level])
+            s.noise[FORCE, level] = min(s.noise[FORCE, level], off_mps / c)
             s.noise[SLIDE, level] = min(s.noise[SLIDE, level], off_mps)
     for row in range(ROWS):
         before[row, level, 1] = before[row, level, 0]

@@ -6,8 +6,8 @@ from bridge.kernel import kernel
 from bridge.layouts import ControllerMemory
 from bridge.wire import stickslip_pb2 as wire
 from controller.estimate.channels import has_jumped, is_noisy
-from controller.policy.decide import slips_at_end
-from controller.policy.need import is_needless, way_of
+from controller.exciter import HOLD_S
+from controller.policy.trial import AT_END, is_needless
 
 WEAK_S = 0.05  # time of too small a v_a at the exciter's end until it is reported
 
@@ -30,8 +30,10 @@ def reason_of(s: ControllerMemory) -> int:
         return wire.NOT_ENABLED if armed or s.mode == wire.STOPPED else wire.NOT_ARMED
     if s.mode == wire.PROBE:
         return wire.TRIAL
-    if s.mode == wire.EXCITE and (s.weak_s > WEAK_S or slips_at_end(s)):
+    if s.mode == wire.EXCITE and (s.weak_s > WEAK_S or s.failed > AT_END):
         return wire.EXCITER_END
+    if s.low_s > HOLD_S:
+        return wire.GAIN_OTHER
     if s.drive_unseen == 1:
         return wire.DRIVE_UNSEEN
     if s.blind == 1 and (s.mode == wire.EXCITE or s.moving == 0):
@@ -40,6 +42,6 @@ def reason_of(s: ControllerMemory) -> int:
         return s.why
     if s.moving == 0:
         return wire.DRIVE_STANDS
-    if s.off_left_s[way_of(s)] > 0.0:
+    if s.off_left_s > 0.0:
         return wire.CANNOT_HELP
     return wire.NOT_NEEDED if is_needless(s, math.fabs(s.drive_velocity_mps)) else wire.NOTHING_TO_DO

@@ -41,7 +41,6 @@ def watch_law(p: ControllerParams, s: ControllerMemory) -> None:
     off_mps = math.fabs(drive_mps - slide_mps - wound_mps)
     sigma_mps = hypot(noise_mps, s.compliance_sigma * s.slope[FORCE, level])
     more_s = some_s * ((off_mps - _SIGMAS * sigma_mps) / fastest_mps - _OFF)
-    s.spring_level = level
     s.most_drive_mps = max(s.agreed_mps, math.fabs(slide_mps + wound_mps))
     if s.evidence_s == 0.0:
         if more_s <= 0.0:

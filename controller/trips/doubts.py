@@ -9,8 +9,6 @@ from bridge.kernel import kernel
 from bridge.layouts import ControllerMemory
 
 ACCELEROMETER, CONTACT, DRIVE = 1, 2, 4  # bits of `s.doubted`
-OF_FORCE, OF_SLIDE, OF_DRIVE, OF_BASE = range(4)  # channels: indices of `s.repeats`
-CHANNELS = 4
 SOME = 4  # steps between two slow checks
 
 

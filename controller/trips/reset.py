@@ -39,7 +39,7 @@ def begin_motion(p: ControllerParams, s: ControllerMemory) -> None:
 def begin_policy(p: ControllerParams, s: ControllerMemory) -> None:
     """Set the memory of the policy whose initial value is not zero."""
     s.top = -1.0
-    s.ratio[:] = p.v_ratio
+    s.ratio = p.v_ratio
 
 
 @kernel
@@ -55,6 +55,6 @@ def end_trips(p: ControllerParams, s: ControllerMemory, memory: Records, events:
         begin_policy(p, s)
     elif events & RESET:  # some needs may have been learnt with the exciter off; the vibration continues
         words[_NEEDS[0] : _NEEDS[1]] = 0
-        s.ratio[:] = p.v_ratio
+        s.ratio = p.v_ratio
     words[_TRIPS[0] : _TRIPS[1]] = 0
-    s.gain_off_s, s.repeats[:], s.spikes[:] = 0.0, 0.0, 0.0
+    s.gain_off_s, s.repeats[:], s.jumps = 0.0, 0.0, 0.0

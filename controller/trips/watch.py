@@ -1,9 +1,7 @@
 """All trips, once a block: the checks before the policy, and after it the limits of the wanted v_a by a doubt."""
 
-import math
-
-from bridge.kernel import Record, kernel
-from bridge.layouts import ControllerMemory, ControllerParams, SensorRow
+from bridge.kernel import kernel
+from bridge.layouts import ControllerMemory, ControllerParams
 from bridge.wire.stickslip_pb2 import POSITIONS_APART
 from controller.estimate.channels import is_noisy
 from controller.estimate.windows import DRIVE as DRIVE_ROW
@@ -12,28 +10,18 @@ from controller.trips.doubts import CONTACT, DRIVE, SOME
 
 
 @kernel
-def watch(p: ControllerParams, s: ControllerMemory, block: SensorRow) -> None:
+def watch(p: ControllerParams, s: ControllerMemory) -> None:
     """Detect faults in a block after its estimate, and hide doubted signals from the policy."""
     s.outside = 0 if p.travel_low_m <= s.last[DRIVE_ROW] <= p.travel_high_m else 1
-    turn, all_three = s.steps % SOME, p.use_force == 1 and p.use_slide_position == 1
+    all_three = p.use_force == 1 and p.use_slide_position == 1
     if not all_three or (s.doubted & (CONTACT | DRIVE) != 0 and s.trip != POSITIONS_APART):
         s.evidence_s = 0.0
-    elif turn == 0:
+    elif s.steps % SOME == 0:
         watch_law(p, s)
-    if turn == 3:
-        _look_at_slide_accel(s, block.mass_accel_mps2)
     if s.doubted & (CONTACT | DRIVE) != 0:
         s.slip_began, s.stick_began = 0, 0
         s.blind = 1
-        s.ratio[:] = p.v_ratio  # false slips may have raised the ratio, and a false swing may have lowered it
-
-
-@kernel
-def _look_at_slide_accel(s: ControllerMemory, samples: Record) -> None:
-    total = 0.0
-    for i in range(samples.shape[0]):
-        total += float(samples[i])
-    s.slide_accel_unread = 0 if math.isfinite(total) else 1
+        s.ratio = p.v_ratio  # false slips may have raised the ratio, and a false swing may have lowered it
 
 
 @kernel

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from bridge.faults import Fault
 from cockpit.run.child_process import end_like_ctrl_c, exit_status_of
 from cockpit.run.writable import check_writable, writing
 
@@ -61,6 +62,34 @@ def make(
         with writing(), watched() as progress:
             make_set(out, key, generator.value, cases, seed, jobs or cpu_count(), progress)
         print(f"{cases} cases    {out}\nkey         {key}\nnext        python -m bench blind run {out}")
+
+    sys.exit(exit_status_of(work))
+
+
+@app.command("develop")
+def develop(
+    out: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the sets; finished cases stay.")],
+    sets: Annotated[
+        list[str] | None, typer.Option("--set", help="plant, foreign, machines, opened, measured; all. Repeatable.")
+    ] = None,
+    count: Annotated[int, typer.Option(min=5, help="Cases of a set that is drawn.")] = 30,
+    seed: Annotated[int, typer.Option(min=0, help="Another seed draws other cases.")] = 1,
+    limits: Annotated[bool, typer.Option("--limits", help="Measure detection limits: 20 s of CPU an effect.")] = False,
+    jobs: Annotated[int, typer.Option(min=1, help="Processes to use.")] = 1,
+) -> None:
+    """Make cases with known answers for `python -m bench judge`."""
+
+    def work() -> None:
+        from tests.blind.judge_sets import SETS
+        from tests.blind.judge_sets import develop as made
+
+        end_like_ctrl_c()
+        unknown = set(sets or ()) - SETS.keys()
+        if unknown:
+            raise Fault("CONFIG", f"--set {min(unknown)}: no such set; there are {', '.join(SETS)}")
+        with writing():
+            for number, name in enumerate(made(out, sets or list(SETS), count, seed, jobs, limits), 1):
+                print(f"{number:4d}  {name}", flush=True)
 
     sys.exit(exit_status_of(work))
 

@@ -37,10 +37,9 @@ def test_moves_that_need_no_vibration_have_none_after_a_trial(move_s: float) -> 
     assert loop.slips(0.0) == 0
 
 
-def test_the_ratio_starts_above_the_set_point_and_falls_to_the_least() -> None:
+def test_the_ratio_starts_at_the_set_point_and_falls_to_the_least() -> None:
     loop = close_the_loop(25.0)
-    assert loop.trace["velocity_ratio"][loop.t_s < 0.2].max() == pytest.approx(1.25 * 1.2)
-    assert loop.trace["velocity_ratio"][loop.t_s > 0.5][0] == pytest.approx(1.2)
+    assert loop.trace["velocity_ratio"][loop.t_s < 0.5].max() == pytest.approx(1.2)
     assert loop.trace["velocity_ratio"][-1] == pytest.approx(1.07)
     assert loop.slips(0.0) == 0
     assert loop.ratio(24.0).mean() ** 2 < 1.17

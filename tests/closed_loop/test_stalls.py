@@ -62,7 +62,6 @@ def test_an_accelerometer_that_fails_while_the_computer_stalls_all_the_time_is_r
     dead = {"kind": "off", "target": "base_accel_mps2", "from_s": FROM_S}
     blamed_stalls = list(blamed(run(tmp_path / "run.mcap", 3.0, *stalls, dead)))
     assert FROM_S < blamed_stalls[0][0] < FROM_S + 0.5
-    assert "the computer or the link stalled" in blamed_stalls[0][2]
 
 
 @pytest.mark.parametrize(("role", "every_s"), [("controller", 0.3), ("plant", 0.8)])

@@ -13,7 +13,7 @@ from google.protobuf.message_factory import GetMessageClass
 from websockets.asyncio.client import connect
 from websockets.typing import Subprotocol
 
-from bridge.faults import Fault
+from bridge.faults import Fault, install
 from cockpit.live.view import View
 from cockpit.run.child_process import exit_status_of
 from tests.unit.cockpit.live.made import Rig
@@ -94,4 +94,4 @@ def test_without_the_extra_its_install_command_is_named(monkeypatch: pytest.Monk
     monkeypatch.setitem(sys.modules, "foxglove", None)
     assert exit_status_of(lambda: Foxglove(0) and None) != 0
     assert "MISSING_EXTRA" in (answer := capsys.readouterr().err)
-    assert "pip install 'stickslip[foxglove]'" in answer
+    assert install("foxglove") in answer

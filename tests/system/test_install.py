@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.faults import FAULTS
+from bridge.faults import FAULTS, install
 from cockpit.run.child_process import EXTRA_MODULES
 from tests import made_up
 from tests.patience import PATIENCE_S
@@ -126,7 +126,7 @@ def test_a_command_names_the_extra_that_is_missing(tmp_path: Path, plain: Path, 
     )
     assert done.returncode == kind.exit_status
     assert re.fullmatch(
-        r"stickslip: MISSING_EXTRA: this command needs (\w+), which is not installed; pip install 'stickslip\[all\]'\n",
+        rf"stickslip: MISSING_EXTRA: this command needs (\w+), which is not installed; {re.escape(install('all'))}\n",
         done.stderr,
     )
     assert done.stdout == ""
@@ -137,7 +137,7 @@ def test_the_missing_extra_as_json(tmp_path: Path, plain: Path) -> None:
     output = call(tmp_path, "reproduce", "--json", status=kind.exit_status, search=plain)
     assert json.loads(output) == {
         "fault": kind.code,
-        "line": "this command needs jinja2, which is not installed; pip install 'stickslip[all]'",
+        "line": f"this command needs jinja2, which is not installed; pip install -e '{ROOT}[all]'",
         "exit_status": kind.exit_status,
     }
 

@@ -21,7 +21,7 @@ def test_a_command_without_a_plant_fails_with_one_line() -> None:
     command = [sys.executable, "-m", "cockpit", "controller", "--endpoint", free_endpoint()]
     result = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert result.returncode == FAULTS["NO_PEER"].exit_status
-    assert "no plant answers" in result.stderr
+    assert "no plant answered" in result.stderr
     assert len(told(result.stderr)) == 1
 
 

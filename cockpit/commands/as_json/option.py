@@ -15,6 +15,7 @@ from bridge.files import JSON, refuse_to_replace
 from bridge.plain import plain
 from bridge.provenance import COMMAND
 from bridge.results import strict_json, write_json
+from cockpit.first_stop import CUT_AMPLIFIER
 from cockpit.run.child_process import exit_status_of, report
 from cockpit.run.writable import check_output, writing
 
@@ -54,7 +55,10 @@ class JsonGroup(TyperGroup):
             command = wrong.ctx.command_path if wrong.ctx else "stickslip"
             message = wrong.format_message().rstrip(".")
             line = f"{command}: {message}{_perhaps_meant(message)}; see {command} --help"
-            status = exit_status_of(lambda: report(Fault("CONFIG", line), as_json=True))
+            fault = Fault("CONFIG", line)
+            if given[:1] == ["stop"]:  # its status, as of each stop that was not sent
+                fault = Fault("NO_PEER", f"{line}; STOP NOT DELIVERED: {CUT_AMPLIFIER}")
+            status = exit_status_of(lambda: report(fault, as_json=True))
         sys.exit(status or 0)
 
 

@@ -106,7 +106,6 @@ class SimulatedRun:
         session = cast(Any, Session(self._hub, "controller"))
         self._hub.down.discard("controller")
         process = ControllerProcess(scenario.controller, self.controller_node(), session, lockstep=False, inbox=inbox)
-        process.prepare()
         self._hub.announce("controller")
         self._players["controller"] = stage.enter(Player("controller", lambda: process.loop(self._stop, _GRANTED)))
 

@@ -1,14 +1,17 @@
 """The passwords of a rig on loopback: private, kept between runs, and never read from a file of another user."""
 
 import os
+import shutil
+import socket
 from pathlib import Path
 
 import pytest
 
 from bridge.faults import Fault
-from bridge.wire import loopback_users
-from bridge.wire.bus_config import BusConfig, address, is_loopback
+from bridge.wire import loopback_users, zenoh_link
+from bridge.wire.bus_config import BusConfig, address, is_free, is_loopback
 from bridge.wire.session import rig_security, role_security
+from tests.system.ports import free_endpoint
 
 ENDPOINT = "tcp/127.0.0.1:7447"
 
@@ -105,6 +108,37 @@ def test_which_endpoints_are_this_machines_alone(place: Path, endpoint: str, alo
 def test_a_name_and_its_number_are_one_rig() -> None:
     assert address("tcp/localhost:1") in {"127.0.0.1", "::1"}
     assert loopback_users.file_name("tcp/[::1]:7447") == "__1-7447.users"
+
+
+def test_a_running_rig_makes_a_removed_file_again_with_its_passwords(place: Path) -> None:
+    kept = loopback_users.KeptUsers(ENDPOINT)
+    word = loopback_users.password(ENDPOINT, "operator")
+    shutil.rmtree(place.parents[1])
+    kept.keep()
+    assert (place.is_file(), loopback_users.password(ENDPOINT, "operator")) == (True, word)
+
+
+def test_a_missing_file_is_named_while_a_process_listens(place: Path) -> None:
+    endpoint = free_endpoint()
+    assert (is_free(endpoint), loopback_users.absence(endpoint)) == (True, "")
+    with socket.create_server(("127.0.0.1", BusConfig(endpoint=endpoint).port)):
+        assert not is_free(endpoint)
+        assert f"{loopback_users.file_name(endpoint)} is in none of {place.parent}" in loopback_users.absence(endpoint)
+        loopback_users.make(endpoint)
+        assert loopback_users.absence(endpoint) == ""
+
+
+def test_without_a_password_nothing_is_dialled_before_a_process_listens(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A rig counts each attempt without its password as a refused session: its recorder and controller made 14."""
+
+    def refuse(_config: object) -> None:
+        pytest.fail("dialled")
+
+    monkeypatch.setattr(zenoh_link.zenoh, "open", refuse)
+    with pytest.raises(Fault, match="no plant answered"):
+        zenoh_link.Bus(BusConfig(endpoint=free_endpoint()), "recorder", lockstep=False, patience_s=0.05)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="modes of files")

@@ -235,3 +235,21 @@ def test_a_process_that_listens_and_does_not_read_is_frozen(monkeypatch: pytest.
         ) as raised:
             operator.send_command(config, "STOP")
     assert raised.value.kind is FAULTS["NO_PEER"]
+
+
+@pytest.mark.parametrize(("word", "advice"), [("STOP", "cut its amplifier"), ("ARM", "cut its amplifier")])
+def test_a_missing_password_is_named_instead_of_a_missing_rig(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, word: str, advice: str
+) -> None:
+    for name in ("XDG_RUNTIME_DIR", "XDG_CACHE_HOME", "TMPDIR"):
+        monkeypatch.setenv(name, str(tmp_path))
+    monkeypatch.setattr("cockpit.live.listener.is_frozen", lambda _config: False)
+    monkeypatch.setattr(operator, "_DIAL_S", 0.1)
+    config = BusConfig(endpoint=free_endpoint())
+    with (
+        socket.create_server(("127.0.0.1", config.port)),
+        pytest.raises(
+            Fault, match=rf"{word} NOT DELIVERED: a process listens .*{config.port}\.users is in none .*; .*{advice}"
+        ),
+    ):
+        operator.send_command(config, word)

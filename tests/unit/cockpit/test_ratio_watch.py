@@ -11,7 +11,6 @@ from bridge.wire.messages import APPLIED, GAP, LATE, STALE, TRACE
 from bridge.wire.stickslip_pb2 import EXCITE
 from cockpit.judge.ratio_watch import MOST_ABOVE_S, RatioVerdict, RatioWatch
 from cockpit.judge.setup import Setup
-from cockpit.judge.watches import StepWatch
 from cockpit.judge.window import APPLIED_ROW, TRACE_ROW, JudgedBlocks, Window, rows_of
 from tests.logs import verdict_of
 
@@ -120,15 +119,3 @@ def test_a_run_without_vibration_has_no_ratio_lines() -> None:
     seen = watched(applied, trace)
     assert seen.ok
     assert seen.in_words() == ""
-
-
-def test_a_configured_stiffness_far_from_the_learnt_one_is_a_warning() -> None:
-    steps, trace = StepWatch(), TRACE.blank(3)
-    assert steps.other_stiffness(1e6) == []
-    trace["drive_stiffness_N_per_m"], trace["drive_stiffness_sigma"] = [9e9, 1.5e4, 9e9], [0.5, 0.1, 0.5]
-    steps.add(trace)
-    assert [steps.other_stiffness(given) for given in (0.0, 1e4, 2.9e4)] == [[], [], []]
-    (warning,) = steps.other_stiffness(2e7)
-    assert warning.startswith(
-        "controller.drive_stiffness_N_per_m = 2e+07: the run shows 1.5e+04, more than a factor of 2"
-    )

@@ -336,16 +336,33 @@ def test_a_trip_after_lost_commands_names_the_link(run: RunData, at_s: float, bl
 
 def test_equal_warnings_are_one_line_with_a_count(run: RunData) -> None:
     storm = [wire.Event(source="controller", code="STALE", text=f"for {k} ms") for k in range(100)]
-    injected = wire.Event(source="plant", code="INJECTED", text="a pause")
+    injected = [
+        wire.Event(source="plant", code=code, text=text, t_ns=3_000_000_000)
+        for code, text in [*(("INJECTED", f"fault {k} for 1 s") for k in range(4)), ("INJECTION_ENDED", "fault 0")]
+    ]
     trip = wire.Event(source="controller", code="FROZEN", text="a channel repeats one number")
-    verdict = verdict_of(run._replace(events=[*run.events, *storm, injected, trip]))
+    verdict = verdict_of(run._replace(events=[*run.events, *storm, *injected, trip]))
     assert verdict.warnings == ["STALE: for 0 ms (the first of 100)"]
-    assert verdict.injected == ["INJECTED: a pause"]
+    assert verdict.injected[0] == "INJECTED: fault 0 for 1 s, at 3.00 s"
+    assert verdict.injected[3:] == ["INJECTED: fault 3 for 1 s, at 3.00 s", "INJECTION_ENDED: fault 0, at 3.00 s"]
     assert verdict.trips == ["FROZEN: a channel repeats one number"]
     assert (verdict.control, verdict.reason) == (NOT_OK, "FROZEN: a channel repeats one number")
     words = in_words(verdict, verbose=False)
     assert [line.partition(" ")[0] for line in words[1:6]] == ["control", "data", "computer", "before", "after"]
+    assert words[6].startswith("injected fault 0 for 1 s, at 3.00 s; fault 1 for 1 s, at 3.00 s; fault 2 for")
+    assert words[6].endswith("; and 1 more: --verbose")
     assert len(words) <= 9
+
+
+def test_a_controller_of_another_rig_is_a_warning(run: RunData) -> None:
+    """It was in no line, although its contact resonance and stiffness belong to the other rig."""
+    assert run.headers["controller"]["rig"] == run.headers["plant"]["rig"] == "paper-c45-c45"
+    assert (verdict_of(run).warnings, verdict_of(run).planned_s) == ([], 6.0)
+    for rig, named in (("drill-string", True), ("unnamed", False), ("", False)):
+        headers = {**run.headers, "controller": {**run.headers["controller"], "rig": rig}}
+        warnings = verdict_of(run._replace(headers=headers)).warnings
+        line = "controller: its scenario describes the rig drill-string, but the rig is paper-c45-c45"
+        assert [warning.partition(";")[0] for warning in warnings] == [line] * named
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ import pytest
 
 from bridge.log.check.channel import channels_of
 from bridge.log.logfile import RunData, read_run
+from bridge.wire import stickslip_pb2 as wire
 from cockpit.judge import judged
 from cockpit.judge.judged import judge_log
 from cockpit.judge.sensor_watch import ChannelRelations, SensorVerdict
@@ -219,7 +220,7 @@ def test_a_slow_accelerometer_that_the_controller_corrects_is_sound() -> None:
         assert {finding.code for finding in findings} == codes
 
 
-def codes_of(step_m: float = 0.0, **columns: Any) -> list[str]:
+def codes_of(step_m: float = 0.0, v_a_mps: float = 0.0, **columns: Any) -> list[str]:
     """Of the relations that do not hold in 20 s of vibration at 4 kHz, 10 m/s2, with a drive that creeps."""
     count = 20_000
     number, omega = np.arange(count), 2.0 * np.pi * 4000.0
@@ -236,7 +237,9 @@ def codes_of(step_m: float = 0.0, **columns: Any) -> list[str]:
         )
     rig = {"sensors": SensorsConfig(position_resolution_m=step_m).model_dump(), "drive": {"stiffness_N_per_m": 1.2e4}}
     relations = ChannelRelations(described({"rig": rig}, {}), 1e-3)
-    relations.add(Window(blocks, np.zeros(0, TRACE_ROW), applied, 0, count, 0, False, 0, is_last=True))
+    trace = np.zeros(count, TRACE_ROW)
+    trace["block"], trace["mode"], trace["vibration_velocity_mps"] = number, wire.EXCITE, v_a_mps
+    relations.add(Window(blocks, trace, applied, 0, count, 0, False, 0, is_last=True))
     return [doubt.code for doubt in relations.doubts()]
 
 
@@ -247,6 +250,16 @@ def test_one_second_of_noise_in_a_long_run_is_a_doubt() -> None:
     assert codes_of(base_mps2=base_mps2) == ["SENSOR_SWAPPED"]
 
 
+def test_the_noise_of_a_dead_exciter_is_not_compared() -> None:
+    """The noise of the base was SENSOR_OTHER, a noisier slide SENSOR_SWAPPED."""
+    noise_mps2 = np.full(20_000, 0.0015)
+    assert codes_of(v_a_mps=2e-9, base_mps2=noise_mps2, slide_mps2=2.0 * noise_mps2) == []
+    assert codes_of(v_a_mps=4e-4, base_mps2=noise_mps2, slide_mps2=2.0 * noise_mps2) == [
+        "SENSOR_SWAPPED",
+        "SENSOR_OTHER",
+    ]
+
+
 def test_positions_of_coarse_steps_that_are_described_are_sound() -> None:
     assert codes_of(step_m=3e-6) == []
 
@@ -255,3 +268,22 @@ def test_the_control_line_names_a_gain_that_nothing_confirmed() -> None:
     verdict = verdict_of(golden("stop-and-go"))
     assert in_words(verdict, verbose=False)[1] == "control  ok; the exciter's gain was not verified"
     assert in_words(verdict._replace(gain_verified=True), verbose=False)[1] == "control  ok"
+
+
+@pytest.mark.parametrize("role", ["plant", "recorder"])
+@pytest.mark.parametrize(
+    ("given_N_per_m", "warned"), [(3.0, True), (8e3, False), (2e4, False), (1e5, True), (1e99, True)]
+)
+def test_a_configured_stiffness_far_from_the_slope_of_the_force_is_a_warning(
+    given_N_per_m: float, warned: bool, role: str
+) -> None:
+    """Also a k_d that the controller does not learn: a value thousands of times too small had no warning."""
+    run = golden("slip-then-control")
+    controller = run.configuration("controller") | {"drive_stiffness_N_per_m": given_N_per_m}
+    headers = {**run.headers, "controller": {"configuration": json.dumps(controller)}}
+    headers = {name: table for name, table in headers.items() if name != "plant" or role == "plant"}
+    trace = run.trace.copy()
+    trace["drive_stiffness_sigma"] = 0.5
+    verdict = verdict_of(run._replace(headers=headers, trace=trace))
+    line = f"controller.drive_stiffness_N_per_m = {given_N_per_m:.3g}: the run shows 1.16e+04, more than a factor of 2"
+    assert [warning.partition(" away")[0] for warning in verdict.warnings] == [line] * warned

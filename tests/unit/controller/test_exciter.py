@@ -12,7 +12,7 @@ from bridge.kernel import Record, kernel
 from bridge.wire.messages import BLOCK, NO_BLOCK, RESET, sensor_block
 from bridge.wire.stickslip_pb2 import CHECKING, OPEN_LOOP
 from controller.config import ControllerConfig
-from controller.exciter import accept_weaker, begin_gain, listen, note_applied, note_check, restart_gain, stroke
+from controller.exciter import begin_gain, listen, note_applied, note_check, restart_gain, stroke
 from controller.limits import allow
 from controller.policy.reason import WEAK_S
 from controller.records import build
@@ -200,17 +200,19 @@ def test_a_gain_outside_of_its_band_is_limited_or_reported(factor: float) -> Non
 
 def test_a_warm_exciter_is_followed_to_its_floor_where_the_contact_agrees() -> None:
     p, s, _ = run(SILENT + 1000, 0, lambda step: 1.0 if step < SILENT + 500 else 0.65)
-    accept_weaker(p, s)
+    s.stick_began, s.in_force_s, s.held_mps, s.vibration_velocity_mps = 1, 1.0, WANTED_MPS, WANTED_MPS
+    stroke(p, s)
+    assert s.banded == 1
     stroke(p, s)
     assert s.banded == 0
     assert s.wanted_m == pytest.approx(WANTED_MPS / 0.65 / (2.0 * math.pi * FREQUENCY_HZ), rel=0.02)
-    s.gain = 0.1
-    accept_weaker(p, s)
-    assert s.accepted_share == p.gain_floor
+    s.gain, s.gain_off_s = 0.4, 0.01
     before = s.accepted_share
-    s.gain_off_s, s.gain = 0.01, 0.01
-    accept_weaker(p, s)  # a leap is a plug
+    stroke(p, s)  # a leap is a plug
     assert s.accepted_share == before
+    s.gain, s.gain_off_s = 0.1, 0.0
+    stroke(p, s)
+    assert s.accepted_share == p.gain_floor
 
 
 TONES_HZ = (1250.0, 2000.0, 2750.0, 3500.0, 4250.0)

@@ -13,8 +13,8 @@ def fresh() -> Freshness:
     return blocks
 
 
-def codes_of(blocks: Freshness, count: int, late: bool = False) -> list[str]:
-    return [code for _ in range(count) for code, _ in blocks.heard(1.0, late)]
+def codes_of(blocks: Freshness, count: int, in_time: bool = True) -> list[str]:
+    return [code for _ in range(count) for code, _ in blocks.heard(1.0, in_time)]
 
 
 def test_a_silence_is_published_once_and_ramps_one_step_a_block() -> None:
@@ -32,7 +32,7 @@ def test_blocks_count_as_back_once_twenty_in_a_row_are_in_time() -> None:
     blocks = fresh()
     blocks.missing(STALE_AFTER_S)
     assert codes_of(blocks, 19) == []
-    assert codes_of(blocks, 5, late=True) == []
+    assert codes_of(blocks, 5, in_time=False) == []
     assert not blocks.is_fresh
     assert codes_of(blocks, 20) == ["FRESH"]
     assert blocks.is_fresh
@@ -44,7 +44,7 @@ def test_a_stall_of_the_controller_does_not_count_as_silence_of_the_rig_where_bl
     blocks.stalled(0.5)
     blocks.stalled(0.3)
     assert blocks.missing(1.0) == (20, [])
-    blocks.heard(1.0, late=True)
+    blocks.heard(1.0, in_time=False)
     events = [event for _ in range(20) for event in blocks.heard(1.0)]
     assert [code for code, _ in events] == ["PAUSED", "FRESH"]
     assert "stalled for 0.80 s" in events[0][1]

@@ -77,7 +77,7 @@ def test_v_a_is_for_a_v_d_that_still_rises() -> None:
     drive_m, v_mps = _started(5e-3, 5e-4, 1.4)
     trace = listen(drive_m, np.zeros_like(drive_m), policy={"mode": "moving"})
     rises = slice(1050, 1090)
-    assert (trace["wanted_velocity_mps"][rises] / v_mps[rises]).mean() > 1.2
+    assert (trace["wanted_velocity_mps"][rises] / v_mps[rises]).mean() > 1.0
 
 
 def test_hum_of_the_force_moves_no_resting_drive_and_slips_no_slide() -> None:

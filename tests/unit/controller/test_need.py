@@ -1,4 +1,4 @@
-"""The speeds at which vibration is needed or not, for each direction."""
+"""The speeds at which vibration is needed or not."""
 
 from typing import Any
 
@@ -6,14 +6,12 @@ import pytest
 
 from bridge.config import validate
 from controller.config import ControllerConfig
-from controller.policy.need import is_needed, is_needless, note_needed, note_needless
+from controller.policy.trial import is_needed, is_needless, note_needed, note_needless
 from controller.records import build
 
 
-def _start(way: int = 1) -> Any:
-    s: Any = build(validate(ControllerConfig, {}, "test"))[1][0]
-    s.direction = way
-    return s
+def _start() -> Any:
+    return build(validate(ControllerConfig, {}, "test"))[1][0]
 
 
 def test_a_ratio_needed_at_a_speed_is_needed_below_it() -> None:
@@ -34,20 +32,6 @@ def test_a_ratio_needless_at_a_speed_is_needless_above_it() -> None:
     assert not is_needless(s, 0.79e-3)
 
 
-def test_each_direction_has_its_own_memory() -> None:
-    s = _start(way=-1)
-    note_needed(s, 1e-3)
-    assert is_needed(s, 5e-4)
-    s.direction = 1
-    assert is_needed(s, 5e-4)  # nothing else is known there
-    note_needless(s, 2e-4)
-    assert not is_needed(s, 5e-4)
-    note_needless(s, 2e-3)
-    s.direction = -1
-    assert is_needed(s, 5e-4)
-    assert not is_needless(s, 2e-3)
-
-
 @pytest.mark.parametrize("speed_mps", [2e-4, 1e-3, 5e-3])
 def test_no_speed_is_both_needed_and_needless(speed_mps: float) -> None:
     s = _start()
@@ -60,14 +44,3 @@ def test_no_speed_is_both_needed_and_needless(speed_mps: float) -> None:
     assert is_needless(s, speed_mps)
     for at in (1e-4, 1e-3, 1e-2):
         assert not (is_needed(s, at) and is_needless(s, at))
-
-
-def test_an_unknown_direction_has_the_results_of_the_known_direction() -> None:
-    s = _start()
-    note_needless(s, 1e-3)
-    s.direction = -1
-    assert is_needless(s, 1e-3)
-    note_needed(s, 1e-3)
-    assert not is_needless(s, 1e-3)
-    s.direction = 1
-    assert is_needless(s, 1e-3)

@@ -10,7 +10,7 @@ from controller.trips.doubts import ACCELEROMETER, DRIVE
 from controller.trips.reset import end_trips
 
 MOTION = {"bins", "sigma", "differences", "drive_velocity_mps", "shown", "breakaway_N", "mode"}
-ANY_RESET = {"trip", "doubted", "kept_mps", "evidence_s", "repeats", "gain_off_s", "needless_from_mps", "off_s"}
+ANY_RESET = {"trip", "doubted", "kept_mps", "evidence_s", "repeats", "gain_off_s", "needless_from_mps", "off_left_s"}
 KEPT = {"slips", "surges", "gain", "known_gain", "loop_delay_steps", "in_force_s", "steps", "block", "phase_rad"}
 
 

@@ -41,7 +41,7 @@ def test_the_end_of_the_exciter_is_reported_with_its_limit() -> None:
 
 
 def test_every_trip_is_an_event_with_a_letter() -> None:
-    assert all(EVENTS[code].letter in "FS" and EVENTS[code].sources == "controller" for code in TRIPS)
+    assert all(EVENTS[code].letter in "FSM" and EVENTS[code].sources == "controller" for code in TRIPS)
 
 
 def test_an_exciter_that_is_too_weak_is_an_event_of_the_log(tmp_path: Path) -> None:

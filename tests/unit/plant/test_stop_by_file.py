@@ -2,20 +2,24 @@
 
 import threading
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
+from bridge.faults import Fault
 from bridge.guard.keeper import Keeper
 from bridge.guard.kept import StopLatch
+from bridge.guard.states import HOLD
 from bridge.guard.stop_file import RigFile, confirmed, order
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.bus_config import BusConfig
 from bridge.wire.inbox import Received
 from bridge.wire.messages import APPLIED
 from bridge.wire.topics import OPERATOR, Outgoing
 from cockpit.run.scenario import load_rig
-from plant.app import PlantProcess
+from plant.app import PlantProcess, run
+from plant.node import PlantNode
 from tests.unit.plant.test_fade import Commanded, Wire
 
 HERE = "tcp/127.0.0.1:7447"
@@ -60,6 +64,35 @@ def test_a_stop_by_file_ramps_the_vibration_down_and_is_confirmed(kept: Keeper) 
     assert "OPERATOR STOP by Ada, by file" in events(bus)
 
 
+def test_a_stop_file_that_exists_holds_a_rig_that_is_not_stopped(kept: Keeper) -> None:
+    """The file came while the rig compiled, after the rig had looked for one: the rig vibrated with the file on the disk."""
+    order(HERE, "Ada")
+    node = PlantNode(load_rig("paper-c45-c45", []), 1, arm=True)
+    bus: Any = Wire()
+    process = PlantProcess(node, bus, kept)
+    kept._look()
+    for _ in range(2):
+        process._apply_orders()
+        kept._look()
+    assert (node.is_stopped, events(bus)) == (True, ["OPERATOR STOP by Ada, by file"])
+    reset = wire.Operator(action="RESET", who="Ada").SerializeToString()
+    process._operator_orders.push(Received(OPERATOR, reset, 0))
+    for _ in range(2):
+        process._apply_orders()
+        kept._look()
+    assert (node.is_stopped, kept.latch.is_set) == (False, False)
+
+
+def test_a_stop_of_an_earlier_run_keeps_its_cause(kept: Keeper) -> None:
+    order(HERE, "Ada")
+    node, bus = PlantNode(load_rig("paper-c45-c45", []), 1, arm=True), Wire()
+    process = PlantProcess(node, cast(Any, bus), kept)
+    node.apply_order(HOLD)
+    kept._look()
+    process._apply_orders()
+    assert (node._guard_state["cause"][0], kept.holder, bus.sent["event/plant"]) == (wire.STOP_KEPT, "Ada", [])
+
+
 def test_a_flood_of_orders_is_one_event_for_each_action_and_no_thread(kept: Keeper) -> None:
     bus: Any = Wire()
     node = Stopped(load_rig("paper-c45-c45", []), 1, arm=True)
@@ -74,3 +107,12 @@ def test_a_flood_of_orders_is_one_event_for_each_action_and_no_thread(kept: Keep
     assert threading.active_count() == threads
     process.end()
     assert events(bus)[2:4] == [f"OPERATOR {action} by Eve (199 times, 200 in all)" for action in ("STOP", "RESET")]
+
+
+def test_a_second_rig_of_a_name_is_refused(kept: Keeper) -> None:
+    config, unused = load_rig("paper-c45-c45", ["name=lathe"]), threading.Event()
+    other = BusConfig(endpoint="tcp/127.0.0.1:7448")
+    with pytest.raises(
+        Fault, match=rf"'lathe': a rig of this name runs at {HERE}: .*another name \(--set rig.name=WORD\)"
+    ):
+        run(config, 1, 1.0, other, wire.Header(), [], False, unused, True, kept.latch)

@@ -36,8 +36,7 @@ def opened_set(number: int) -> OpenedSet:
         case("no-gap", [], {"none": 0.9}, name=f"b{number}", seed=seed + 1),
         case("outside", ["loose-screw"], {"unexplained": 0.6, "none": 0.4}, name=f"c{number}", seed=seed + 2),
     ]
-    trees = {f"a{number}": {"none": 1.0}, f"b{number}": {"none": 1.0}, f"c{number}": {"drive-damping": 1.0}}
-    return OpenedSet(cases, sealed=True, tool="1", oracle={f"a{number}": 0.85}, trees=trees)
+    return OpenedSet(cases, sealed=True, tool="1", oracle={f"a{number}": 0.85})
 
 
 def kept(folder: Path, number: int, **other) -> Path:
@@ -55,15 +54,15 @@ def pool(*files):
 def test_scores_are_the_same_again(tmp_path):
     sealed_set = opened_set(1)
     assert scored(pooled([kept(tmp_path, 1)])) == scored(sealed_set)
-    without = sealed_set._replace(oracle=None, trees=None)
-    assert scored(pooled([kept(tmp_path, 2, oracle=None, trees=None)])).keys() == scored(without).keys()
+    without = sealed_set._replace(oracle=None)
+    assert scored(pooled([kept(tmp_path, 2, oracle=None)])).keys() == scored(without).keys()
 
 
 @pytest.mark.slow
 def test_several_sets_count_as_one(tmp_path):
     files = [kept(tmp_path, number) for number in (1, 2)]
     together, alone = scored(pooled(files)), scored(opened_set(1))
-    assert list(together) == list(alone) == ["diagnosis", "parameters", "BIC", "flexible", "trees", "oracle"]
+    assert list(together) == list(alone) == ["diagnosis", "parameters", "BIC", "flexible", "oracle"]
     for name, scores in together.items():
         assert scores.cases == 2 * alone[name].cases
         assert scores.visible.top_1.n == 2
@@ -84,7 +83,7 @@ def test_one_opened_set_makes_all_development_data(tmp_path):
 
 @pytest.mark.slow
 def test_a_score_that_one_set_lacks_is_left_out_of_the_pool(tmp_path):
-    assert "oracle" not in scored(pooled([kept(tmp_path, 1), kept(tmp_path, 2, oracle=None, trees=None)]))
+    assert "oracle" not in scored(pooled([kept(tmp_path, 1), kept(tmp_path, 2, oracle=None)]))
 
 
 @pytest.mark.slow

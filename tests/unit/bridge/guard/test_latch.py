@@ -2,6 +2,8 @@
 
 import os
 import stat
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -45,6 +47,12 @@ def test_a_folder_that_cannot_be_made_is_reported(folder: Path) -> None:
         StopLatch("lathe").set("Ada")
 
 
+def test_a_full_disk_that_takes_names_and_no_content_is_reported(folder: Path) -> None:
+    code = "from bridge.guard.kept import StopLatch; print(StopLatch('lathe').can_be_set())"
+    full = ["sh", "-c", 'ulimit -f 0; exec "$@" | cat', "sh", sys.executable, "-c", code]
+    assert subprocess.run(full, check=True, capture_output=True, text=True).stdout == f"{folder}: File too large\n"
+
+
 def test_any_file_in_place_of_the_latch_counts_as_a_stop(folder: Path) -> None:
     latch = StopLatch("lathe")
     folder.mkdir(parents=True)
@@ -57,4 +65,5 @@ def test_a_folder_that_cannot_be_looked_into_holds_too(folder: Path, monkeypatch
         raise PermissionError
 
     monkeypatch.setattr(os.path, "lexists", refuse)
-    assert StopLatch("lathe").is_set
+    monkeypatch.setattr(Path, "lstat", refuse)
+    assert (StopLatch("lathe").is_set, StopLatch("lathe").set_ns) == (True, 1)

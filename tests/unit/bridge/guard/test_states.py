@@ -9,7 +9,7 @@ from bridge.guard.check import follow_check, gain_change, gain_report
 from bridge.guard.config import GuardConfig, Level
 from bridge.guard.core import NO_COMMAND
 from bridge.guard.records import FIRST, build
-from bridge.guard.states import ACCEPT_GAIN, ARM, DISARM, LEAVE, RESET, STOP, apply_order, enter, trip
+from bridge.guard.states import ACCEPT_GAIN, ARM, DISARM, HOLD, LEAVE, RESET, STOP, apply_order, enter, trip
 from bridge.wire.messages import sensor_block
 from bridge.wire.stickslip_pb2 import (
     ACTIVE,
@@ -109,7 +109,8 @@ def test_a_new_state_resets_the_counters_of_the_state_and_the_same_state_does_no
 
 
 def test_a_stop_that_was_kept_holds_at_power_up_even_where_the_scenario_arms() -> None:
-    _, state = build(real(GuardConfig()), EXCITER, 1, arm=True, stop_kept=True)
+    _, state = build(real(GuardConfig()), EXCITER, 1, arm=True)
+    assert apply_order(state[0], HOLD)
     assert (state[0].state, state[0].cause) == (FAULT, STOP_KEPT)
 
 

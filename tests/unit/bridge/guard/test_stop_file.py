@@ -1,5 +1,6 @@
 """A stop without the bus: which rigs it stops, and the confirmation that counts."""
 
+import json
 import os
 import subprocess
 import sys
@@ -110,8 +111,19 @@ def test_a_rig_that_starts_removes_the_files_of_ended_rigs_at_its_port(folder: P
     ended = started("lathe")
     child = subprocess.Popen([sys.executable, "-S", "-c", ""])
     child.wait()
-    ended.path.write_text(ended.path.read_text().replace(str(os.getpid()), str(child.pid)))
+    ended.path.write_text(ended.path.read_text().replace(f'"process": {os.getpid()}', f'"process": {child.pid}'))
     (folder / "rig-damaged.json").write_text("[1")
     (folder / "rig-other.json").write_text('{"latch": 1, "endpoint": "", "process": 1}')
     started("mill")
     assert stopped(HERE) == ["mill"]
+
+
+def test_a_rig_sees_a_running_rig_of_its_name_and_no_ended_one() -> None:
+    other, rig = started("lathe", "tcp/127.0.0.1:7448"), started("lathe")
+    started("mill", "tcp/127.0.0.1:7450")
+    assert rig.namesake == "tcp/127.0.0.1:7448"
+    text = other.path.read_text()
+    table = json.loads(text)
+    # the same process number after a start of the computer
+    other.path.write_text(text.replace(f'"started": {table["started"]}', f'"started": {table["started"] + 1}'))
+    assert rig.namesake == ""
