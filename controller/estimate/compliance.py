@@ -47,17 +47,14 @@ def learn_compliance(p: ControllerParams, s: ControllerMemory, tick_s: float) ->
         # step is not connected, and would make every spring soft
         moves = math.fabs(drive_mps) > SIGMAS * drive or math.fabs(slide_mps) > SIGMAS * slide
         if slide > 0.0 and moves and math.fabs(rate) > SIGMAS * force:
-            # the given c does not count here: if it is far too large, it hides every window that contradicts it
-            by_force = (
-                s.compliance_m_per_N if s.stiffness_learnt == 1 else math.fabs((drive_mps - slide_mps) / rate)
-            ) * force
+            by_force = s.compliance_m_per_N * force
             now = (slide * slide + drive * drive + by_force * by_force) / (rate * rate)
             if now < variance:
                 best, variance = level, now
     if best < 0 or (s.stiffness_learnt == 1 and not _is_stuck(s, best)):
         return
     c = (s.slope[DRIVE, best] - s.slope[SLIDE, best]) / s.slope[FORCE, best]
-    least = _LEAST_SIGMA * max(math.fabs(c), s.compliance_m_per_N if s.stiffness_learnt == 1 else 0.0)
+    least = _LEAST_SIGMA * max(math.fabs(c), s.compliance_m_per_N)
     weight = 1.0 / (variance + least * least)
     share = min(tick_s / p.window_s[best], 1.0)  # successive windows overlap
     keep = 1.0 - tick_s / _FORGETS_S
