@@ -156,9 +156,8 @@ def follow_trial(p: ControllerParams, s: ControllerMemory, force_N: float, speed
     s.untried_s, s.tried_s, s.tried_mps = 0.0, 0.0, 0.0
     s.failed = min(s.failed, AT_END)
     if needed:
-        note_needed(
-            s, max(speed_mps, tried_mps)
-        )  # a slide that slips as its drive brakes needs vibration at the speed before
+        # a slide that slips as its drive brakes needs vibration at the speed before
+        note_needed(s, max(speed_mps, tried_mps))
         s.why = wire.STILL_NEEDED
         return wire.EXCITE
     if helpless:

@@ -389,29 +389,3 @@ def test_a_run_that_a_fault_ends_is_judged_on_its_recorded_part(
     words = ["run", "--in-process", "--scenario", "from-the-start", "--log", str(tmp_path / "run.mcap")]
     result = CliRunner().invoke(app, words)
     assert (result.exit_code, "control  ok" in result.stderr, "data     whole: " in result.stderr) == (2, True, True)
-
-
-@pytest.mark.parametrize(
-    ("profile", "why"),
-    [
-        ("[[0.0, 0.0005], [2.9, 0.0005], [2.95, 0.0]]", "the drive did not move"),
-        ("[[0.0, 0.0005], [5.0, 0.0005], [5.1, 0.0]]", "between two slips before"),
-    ],
-)
-@pytest.mark.slow
-def test_a_drive_that_rests_while_the_controller_is_in_charge_shows_nothing(
-    tmp_path: Path, profile: str, why: str
-) -> None:
-    settings = ["duration_s=6.0", "controller.policy.enabled_from_s=3.0", f"rig.drive.profile={profile}"]
-    run_onboard(load_scenario("paper-c45-c45", settings), tmp_path / "run.mcap", {})
-    verdict = judge(tmp_path / "run.mcap")
-    assert verdict.control == NOT_JUDGED
-    assert why in verdict.reason
-
-
-def test_a_run_with_faults_in_one_process_prints_its_expected_speed(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    fault = "fault=[{kind='scaled', target='drive_force_N', value=0.5}]"  # 40 times slower than without
-    run_scenario("from-the-start", ["duration_s=0.1", fault], False, True, tmp_path / "run.mcap")
-    assert "with faults, message by message: 0.4 s per simulated second" in capsys.readouterr().err

@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from bridge.log.logfile import RunData, read_run
+from cockpit.judge.judged import judge
+from cockpit.judge.verdict import NOT_JUDGED
 from cockpit.judge.verdict_words import in_words
+from cockpit.run.in_process import run_onboard
+from cockpit.run.scenario import load_scenario
 from tests.logs import Tables, cycles_of, doctored, verdict_of
 
 STIFFNESS_N_PER_M = 1e6
@@ -88,3 +92,21 @@ def test_a_place_that_froze_hides_no_slip(tmp_path: Path) -> None:
     cycles = cycles_of(run._replace(sensors=frozen))
     assert cycles is not None
     assert cycles.slips == 10
+
+
+@pytest.mark.parametrize(
+    ("profile", "why"),
+    [
+        ("[[0.0, 0.0005], [2.9, 0.0005], [2.95, 0.0]]", "the drive did not move"),
+        ("[[0.0, 0.0005], [5.0, 0.0005], [5.1, 0.0]]", "between two slips before"),
+    ],
+)
+@pytest.mark.slow
+def test_a_drive_that_rests_while_the_controller_is_in_charge_shows_nothing(
+    tmp_path: Path, profile: str, why: str
+) -> None:
+    settings = ["duration_s=6.0", "controller.policy.enabled_from_s=3.0", f"rig.drive.profile={profile}"]
+    run_onboard(load_scenario("paper-c45-c45", settings), tmp_path / "run.mcap", {})
+    verdict = judge(tmp_path / "run.mcap")
+    assert verdict.control == NOT_JUDGED
+    assert why in verdict.reason
