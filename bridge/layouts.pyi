@@ -25,20 +25,20 @@ class ControllerMemory:
     far:npt.NDArray[Any]; fast_mps:float; followed_gain:float; force_rate:float; fresh:npt.NDArray[Any]; gain:float;
     gain_off_s:float; grown_s:float; guard_state:int; held_mps:float; in_force_s:float; in_phase_mps2:float;
     jumps:float; kept_mps:npt.NDArray[Any]; known_gain:float; last:npt.NDArray[Any]; law_mps:npt.NDArray[Any];
-    least_mps:npt.NDArray[Any]; level:int; limit:int; listened:int; longest_m:float; loop_delay_steps:int; low_s:float;
-    memory_s:float; missing_blocks:int; mode:int; mode_s:float; most_drive_mps:float; most_mps:npt.NDArray[Any];
-    moved_s:float; moving:int; needed_to_mps:float; needless_from_mps:float; noise:npt.NDArray[Any]; noise_mps:float;
-    off:npt.NDArray[Any]; off_left_s:float; offset_m:float; outside:int; peak_N:float; phase_rad:float;
-    pushed:npt.NDArray[Any]; quadrature_mps2:float; rate:npt.NDArray[Any]; ratio:float; ratio_now:float;
-    relaxed_m:float; repeats:npt.NDArray[Any]; resolution:npt.NDArray[Any]; resonates:int; rising_mps:float; run:int;
-    scatter:npt.NDArray[Any]; shortest_m:float; shown:float; shown_c:float; shown_square:float; shown_windows:float;
-    sigma:npt.NDArray[Any]; silent_s:float; since_stick_s:float; slide_accel_unread:int; sliding_mps:float;
-    slip_began:int; slipped_s:float; slipping:int; slips:int; slope:npt.NDArray[Any]; slope_before:npt.NDArray[Any];
-    steady_mps:float; steady_s:float; stepped:int; steps:int; stick_began:int; stiffness_learnt:int; stood_s:float;
-    stopped:int; stretched:int; surges:int; swing:float; time_to_slip_s:float; top:float; tried_mps:float;
-    tried_s:float; trip:int; unexplained:int; unseen_s:float; untried_s:float; usual:npt.NDArray[Any];
-    vibration_velocity_mps:float; waiting_s:float; wanted_m:float; wanted_speed_mps:float; wanted_velocity_mps:float;
-    weak_s:float; why:int; window_s:float
+    learnt:npt.NDArray[Any]; least_mps:npt.NDArray[Any]; level:int; limit:int; listened:int; longest_m:float;
+    loop_delay_steps:int; low_s:float; memory_s:float; missing_blocks:int; mode:int; mode_s:float; most_drive_mps:float;
+    most_mps:npt.NDArray[Any]; moved_s:float; moving:int; needed_to_mps:float; needless_from_mps:float;
+    noise:npt.NDArray[Any]; noise_mps:float; off:npt.NDArray[Any]; off_left_s:float; offset_m:float; outside:int;
+    peak_N:float; phase_rad:float; pushed:npt.NDArray[Any]; quadrature_mps2:float; rate:npt.NDArray[Any]; ratio:float;
+    ratio_now:float; relaxed_m:float; repeats:npt.NDArray[Any]; resolution:npt.NDArray[Any]; resonates:int;
+    rising_mps:float; run:int; scatter:npt.NDArray[Any]; shortest_m:float; shown:float; shown_c:float;
+    shown_square:float; shown_windows:float; sigma:npt.NDArray[Any]; silent_s:float; since_stick_s:float;
+    slide_accel_unread:int; sliding_mps:float; slip_began:int; slipped_s:float; slipping:int; slips:int;
+    slope:npt.NDArray[Any]; slope_before:npt.NDArray[Any]; steady_mps:float; steady_s:float; stepped:int; steps:int;
+    stick_began:int; stiffness_learnt:int; stood_s:float; stopped:int; stretched:int; surges:int; swing:float;
+    time_to_slip_s:float; top:float; tried_mps:float; tried_s:float; trip:int; unexplained:int; unseen_s:float;
+    untried_s:float; usual:npt.NDArray[Any]; vibration_velocity_mps:float; waiting_s:float; wanted_m:float;
+    wanted_speed_mps:float; wanted_velocity_mps:float; weak_s:float; why:int; window_s:float
 
 class GuardParams:
     abort:npt.NDArray[Any]; alarm:npt.NDArray[Any]; announced_keep:float; band_Hz:npt.NDArray[Any]; bands:int;

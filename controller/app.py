@@ -12,7 +12,7 @@ from bridge.wire.clock import time
 from bridge.wire.complaints import BAD_MESSAGE, FLOOD, FOREIGN, Complaints
 from bridge.wire.event_codes import is_listed
 from bridge.wire.inbox import WAITING
-from bridge.wire.payloads import parsed
+from bridge.wire.payloads import other_rig, parsed
 from bridge.wire.session import LEASE_S
 from bridge.wire.topics import (
     ANNOUNCE,
@@ -61,7 +61,8 @@ def run(
     report("waiting", f"for a rig at {bus_config.endpoint}, at most {bus_config.wait_s:g} s")
     with Bus(bus_config, "controller", lockstep, stop) as bus:
         _refuse_a_second(bus, bus_config.endpoint)
-        config = for_rig(bus.headers(["plant"], _WAIT_S, stop).get("plant"), config)
+        of_rig = bus.headers(["plant"], _WAIT_S, stop).get("plant")
+        config = for_rig(of_rig, config)
         node.reconfigure(config)
         header.configuration = json.dumps(config.model_dump(mode="json"), sort_keys=True)  # a replay needs them
         bus.serve_header(header)
@@ -75,6 +76,8 @@ def run(
             granted = realtime.claim(realtime.core(1))  # before the announcement, as the rig may begin right after
         bus.announce()
         report("joined", f"the rig at {bus_config.endpoint}; waiting for its first block")
+        if of_rig is not None and (text := other_rig(of_rig.rig, header.rig)):
+            report("warning", text)
         process.loop(stop, granted)
     report("ended", "stopped" if stop.is_set() else "with the rig")
     return node.steps

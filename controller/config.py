@@ -90,8 +90,8 @@ class AmplitudeConfig(Strict):
 class LimitsConfig(Strict):
     """Limits that no policy can exceed, and the set point of v_a / v_d.
 
-    Amplitude, velocity, slew and frequencies are the rig's, from its header; a given value must be tighter. The defaults hold for
-    a rig whose header states none.
+    Amplitude, velocity, slew and frequencies are the rig's, from its header; a given value must be tighter. Without a velocity or
+    slew in the header, the given value or the default holds, within the rig's guard.
     """
 
     v_ratio: Annotated[float, Field(ge=1.05, le=3.0)] = Field(default=1.2, description="Set point of v_a / v_d.")
@@ -134,7 +134,7 @@ class ControllerConfig(Strict):
 
     @model_validator(mode="after")
     def _fits_together(self) -> "ControllerConfig":
-        _refuse_unfit(self)
+        _refuse_unfit(self, LimitsConfig.model_fields["frequency_max_Hz"].default)
         return self
 
 
@@ -144,8 +144,8 @@ _STEP_HZ = 100.0  # between two candidates of the vibration's frequency
 _ABOVE_RESONANCE = 2.2
 
 
-def _refuse_unfit(config: ControllerConfig) -> None:
-    """Raise ValueError for values that do not fit together."""
+def _refuse_unfit(config: ControllerConfig, most_Hz: float) -> None:
+    """Raise ValueError for values that do not fit together; up to `most_Hz` the highest frequency may be raised."""
     limits = config.limits
     nyquist_Hz = 0.5 * config.samples_per_block / config.block_s
     if limits.frequency_max_Hz >= nyquist_Hz:
@@ -162,9 +162,10 @@ def _refuse_unfit(config: ControllerConfig) -> None:
     lowest_Hz, from_where = _lowest_candidate(config)
     above_Hz = _STEP_HZ * math.ceil(lowest_Hz / _STEP_HZ)
     if above_Hz > limits.frequency_max_Hz:
+        raises = f"raise it to {above_Hz:g} or more, or " if above_Hz <= most_Hz and above_Hz < nyquist_Hz else ""
         raise ValueError(
             f"limits.frequency_max_Hz = {limits.frequency_max_Hz:g}: no multiple of {_STEP_HZ:g} Hz lies between "
-            f"{from_where} and it; raise it to {above_Hz:g} or more"
+            f"{from_where} and it; {raises}lower the other value"
         )
     if not candidate_frequencies_Hz(config):
         raise ValueError(
@@ -205,21 +206,20 @@ def within(config: ControllerConfig, rig: guard.VibrationLimits) -> ControllerCo
     stated["forbidden_Hz"] = guard.merged_bands_Hz([*limits.forbidden_Hz, *rig.forbidden_Hz])
     # without a validation, which would count every value as given
     made = config.model_copy(update={"limits": LimitsConfig.model_construct(given, **dict(limits) | stated)})
-    _refuse_unfit(made)
+    _refuse_unfit(made, rig.frequency_max_Hz)
     return made
 
 
 def _lowest_candidate(config: ControllerConfig) -> tuple[float, str]:
     """The lower end of the candidates [Hz], and its origin as a text for messages."""
-    limits = config.limits
-    above_Hz = _ABOVE_RESONANCE * config.contact_resonance_Hz
-    if limits.frequency_min_Hz < above_Hz < limits.frequency_max_Hz:
-        return above_Hz, f"{above_Hz:g} Hz, {_ABOVE_RESONANCE:g} x contact_resonance_Hz,"
-    return limits.frequency_min_Hz, f"limits.frequency_min_Hz = {limits.frequency_min_Hz:g}"
+    lowest_Hz, resonance_Hz = config.limits.frequency_min_Hz, config.contact_resonance_Hz
+    if (above_Hz := _ABOVE_RESONANCE * resonance_Hz) > lowest_Hz:
+        return above_Hz, f"{above_Hz:g} Hz, {_ABOVE_RESONANCE:g} x contact_resonance_Hz = {resonance_Hz:g},"
+    return lowest_Hz, f"limits.frequency_min_Hz = {lowest_Hz:g}"
 
 
 def candidate_frequencies_Hz(config: ControllerConfig) -> list[float]:
-    """The allowed frequencies to choose from, lowest first [Hz]; above the contact resonance where the range allows."""
+    """The allowed frequencies to choose from, lowest first [Hz]; from 2.2 times the contact resonance on."""
     bands = guard.merged_bands_Hz(config.limits.forbidden_Hz)
     first = math.ceil(_lowest_candidate(config)[0] / _STEP_HZ)
     last = math.floor(config.limits.frequency_max_Hz / _STEP_HZ)

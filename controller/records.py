@@ -96,10 +96,9 @@ STATE = np.dtype(
         # bins since the windows were last emptied; slope differences from which law_mps and sigma were learnt
         *_i8("pushed", "differences", shape=(LEVELS,)),
         # channels: quantisation step of a sample, 0: unknown; last conditioned bin; change from bin to bin; deviation of the last
-        # bin from the line of the bins before it; mean of its absolute value, the noise; the same with a time constant of 1 s,
-        # 0: unknown
+        # bin from the line of the bins before it; mean of its absolute value, the noise; the same with a time constant of 1 s
         *_f8("resolution", "last", "rate", "off", "scatter", "usual", shape=(ROWS,)),
-        *_i8("far", shape=(ROWS,)),  # number of replaced bins in a row
+        *_i8("far", "learnt", shape=(ROWS,)),  # numbers of replaced bins in a row, and of bins in `scatter`
         *_f8("grown_s"),  # time for which the drive position's noise has grown, then for which this is reported
         *_f8("jumps"),  # count of steps of the drive position; decays with 1 s
         *_i8("stepped"),  # bits of the rows that stepped in this block

@@ -157,8 +157,10 @@ def find_cycles(
 
     Raises ValueError when the two differ in length.
     """
+    if minimum_drop_N is None:
+        minimum_drop_N = smallest_drop_N(t_s, drive_force_N)
     t_s, force_N = _binned(np.asarray(t_s, np.float64), np.asarray(drive_force_N, np.float64))
-    at = turning_points(force_N, _smallest_drop_N(force_N) if minimum_drop_N is None else minimum_drop_N)
+    at = turning_points(force_N, minimum_drop_N)
     tops, bottoms = at[::2], at[1::2]
     ends = [*bottoms, len(force_N) - 1]
     steep = [steep_part(force_N, top, end) for top, end in zip(tops, ends, strict=False)]
@@ -169,9 +171,17 @@ def find_cycles(
 def smallest_drop_N(t_s: npt.ArrayLike, drive_force_N: npt.ArrayLike) -> float:
     """The larger of 3 % of the median magnitude of the force and ten times the noise of the record, both [samples].
 
+    Noise of the means over 1 ms, in which slips are searched, or of neighbouring samples, whichever is smaller: slips of 80 N at
+    193 Hz look like 27 N of noise in the means, and like 0.08 N in samples at 20 kHz.
+
     Raises ValueError when the two differ in length.
     """
-    return _smallest_drop_N(_binned(np.asarray(t_s, np.float64), np.asarray(drive_force_N, np.float64))[1])
+    samples_N = np.asarray(drive_force_N, np.float64)
+    force_N = _binned(np.asarray(t_s, np.float64), samples_N)[1]
+    if len(force_N) < 3:
+        return 0.0
+    noise_N = min(float(noise_of(force_N)), float(noise_of(samples_N)))
+    return max(_SHARE * median(np.abs(force_N)), NOISE_SPANS * noise_N)  # a drive may turn
 
 
 def _binned(t_s: Floats, force_N: Floats) -> tuple[Floats, Floats]:
@@ -183,12 +193,6 @@ def _binned(t_s: Floats, force_N: Floats) -> tuple[Floats, Floats]:
     width = max(1, round(_BIN_S * (len(t_s) - 1) / float(t_s[-1] - t_s[0])))
     kept = len(t_s) // width * width
     return t_s[:kept].reshape(-1, width).mean(axis=1), force_N[:kept].reshape(-1, width).mean(axis=1)
-
-
-def _smallest_drop_N(force_N: Floats) -> float:
-    if len(force_N) < 3:
-        return 0.0
-    return max(_SHARE * median(np.abs(force_N)), NOISE_SPANS * float(noise_of(force_N)))  # a drive may turn
 
 
 def steep_part(force_N: Floats, top: int, end: int) -> tuple[int, int]:

@@ -14,6 +14,7 @@ from bridge.faults import FAULTS
 from bridge.wire.event_codes import EVENTS, SEVERITIES
 from bridge.wire.words import words
 from cockpit import cli
+from cockpit.judge.finding_codes import FINDINGS
 from cockpit.run.scenario import Scenario
 from diagnosis.evidence.import_table import ImportMap
 from diagnosis.evidence.manifest import Manifest
@@ -211,6 +212,10 @@ def _faults() -> list[str]:
     lines += _table(
         ("code", "from", "NE 107", "meaning"),
         ([f"`{event.code}`", event.sources, SEVERITIES[event.letter], event.help] for event in EVENTS.values()),
+    )
+    lines += ["## Findings of a verdict", "", "Codes that a verdict gives to what it finds in the log itself.", ""]
+    lines += _table(
+        ("code", "meaning"), ([f"`{row.code}`", f"{SEVERITIES[row.letter]}: {row.help}"] for row in FINDINGS.values())
     )
     return lines
 

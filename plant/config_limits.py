@@ -22,6 +22,17 @@ def refuse_what_no_rig_does(rig: RigConfig) -> None:
     _ripple(rig)
 
 
+def refuse_a_spring_of_another_rig(rig: RigConfig) -> None:
+    """Raise ValueError for a rig whose slide and contact are given and whose drive has the default stiffness."""
+    is_own = "mass_kg" in rig.slide.model_fields_set and not rig.contact.pair
+    if is_own and "stiffness_N_per_m" not in rig.drive.model_fields_set:
+        k_d = rig.drive.stiffness_N_per_m
+        raise ValueError(
+            "drive.stiffness_N_per_m: must be given, as slide.mass_kg and the contact are: the paper's spring of "
+            f"{k_d:g} N/m gives by {1e3 * rig.contact.static_force_N / k_d:.2g} mm before this slide breaks away"
+        )
+
+
 def _contact_damping(rig: RigConfig) -> None:
     damping, mass_kg, step_s = rig.contact.damping_Ns_per_m, rig.slide.mass_kg, rig.solver.step_s
     most = _MOST_DAMPING * mass_kg / step_s

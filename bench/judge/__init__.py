@@ -10,6 +10,8 @@ lines      straight lines over all samples, ranked by evidence
 columns    their columns, by relation
 trees      trees on rigs that the plant simulates under the campaign at hand
 features   the inputs of the trees
+linear/    evidence of the linearised, then refitted rig, of relations and of kept runs
+simulated/ witnesses weighed on simulated rigs
 scoring    right, wrong and cost of every method
 command    the command line
 """

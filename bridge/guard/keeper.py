@@ -71,9 +71,9 @@ class Keeper:
         finally:
             self._over.set()
             thread.join(_LAST_WRITES_S)
-            with contextlib.suppress(OSError):
-                self.rig.remove()
-                if not self.latch.outlasts:
+            if not self.latch.outlasts:  # else its file stays, so that a stop is kept while it starts again
+                with contextlib.suppress(OSError):
+                    self.rig.remove()
                     self.latch.clear()
 
     def keep(self, state: StateFile, write: Callable[[], None], lost: str) -> None:

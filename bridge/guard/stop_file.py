@@ -1,7 +1,7 @@
 """A stop without the bus, on the rig's computer: the command sets the rig's latch, and the rig confirms it in the same folder.
 
-A running rig has a file next to its latch, with its endpoint. Once it is at rest after a stop, it gives this file the time of the
-latch. That needs no room on the disk. This module imports nothing slow: `stickslip stop` calls it before all else.
+A rig has a file next to its latch, with its endpoint, which stays for a stop while it starts again. At rest after a stop, the rig
+gives it the time of the latch, which needs no room on the disk. This module imports nothing slow: a stop calls it first.
 """
 
 import contextlib
@@ -21,7 +21,7 @@ _POLL_S = 0.01  # interval at which the confirmation is looked for
 
 
 class RigFile(StateFile):
-    """The file of a running rig; its time repeats the time of the stop after which the rig is at rest.
+    """The file of a rig; its time repeats the time of the stop after which the rig is at rest.
 
     Args:
         rig: name of the rig's latch.
@@ -34,9 +34,10 @@ class RigFile(StateFile):
         self.rig, self.endpoint = rig, endpoint
 
     def make(self, run: int) -> None:
-        """Write the file of a rig that starts, and remove files of ended rigs at its port. Raises OSError, Fault LOG_WRITE."""
+        """Write the file of a rig that starts; ended rigs of its port or name lose theirs. Raises OSError, Fault LOG_WRITE."""
         for path, table in _tables():
-            if _port(table["endpoint"]) == _port(self.endpoint) and not _runs(table):
+            replaced = _port(table["endpoint"]) == _port(self.endpoint) or table["latch"] == self.rig
+            if replaced and not _runs(table):
                 path.unlink(missing_ok=True)
         process = {"process": os.getpid(), "started": started(os.getpid())}
         self._write({"latch": self.rig, "endpoint": self.endpoint, "run": run} | process)
@@ -65,7 +66,7 @@ class RigFile(StateFile):
             return -1
 
     def remove(self) -> None:
-        """Remove the file of a rig that ends. Raises OSError."""
+        """Remove the file of a rig that does not start again. Raises OSError."""
         self.path.unlink(missing_ok=True)
 
 

@@ -50,7 +50,8 @@ def checked(role: str, place: Path) -> RoleFiles:
         if not path.is_file():
             line = f"{path}: no such file: role {role} needs it at a tls/ endpoint"
             raise Fault(
-                "NOT_SECURE", f"{line}; make it with `stickslip certs FOLDER`, and name the folder with --certs"
+                "NOT_SECURE",
+                f"{line}; `stickslip certs FOLDER` makes it once; copy it here, name its folder with --certs",
             )
     if files.key.stat().st_mode & (stat.S_IRWXG | stat.S_IRWXO):
         raise Fault(

@@ -22,7 +22,7 @@ class EventCode(NamedTuple):
     """One row of `EVENTS`."""
 
     code: str
-    sources: str  # senders: plant, controller, recorder
+    sources: str  # senders: plant, controller, recorder; or the verdict
     letter: str  # severity, a key of SEVERITIES
     help: str
 

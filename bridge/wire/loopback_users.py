@@ -52,8 +52,16 @@ def password(endpoint: str, role: str) -> str | None:
 
 
 def absence(endpoint: str) -> str:
-    """The reason why a rig that listens at an endpoint refuses this user: the file is missing; empty if it is not."""
-    if not is_loopback(endpoint) or is_free(endpoint) or password(endpoint, "viewer") is not None:
+    """The reason why a rig that listens at an endpoint refuses this user: the file is missing; empty if it is not.
+
+    A rig at a tls/ endpoint has no such file.
+    """
+    if (
+        not endpoint.startswith("tcp/")
+        or not is_loopback(endpoint)
+        or is_free(endpoint)
+        or password(endpoint, "viewer") is not None
+    ):
         return ""
     places = ", ".join(str(folder) for folder in folders())
     return (

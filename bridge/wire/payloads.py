@@ -54,6 +54,14 @@ def refuse_other_schema(header: wire.Header) -> None:
         raise Fault("BAD_MESSAGE", f"{line}; use versions of stickslip that agree on both sides")
 
 
+def other_rig(rig: str, of_controller: str) -> str:
+    """A warning about a controller whose scenario names another rig; empty without one, and for rigs without a name."""
+    if rig == of_controller or {rig, of_controller} & {"", "unnamed"}:
+        return ""
+    line = f"controller: its scenario describes the rig {of_controller}, but the rig is {rig}"
+    return f"{line}; start `stickslip controller` with the scenario of this rig"
+
+
 def sequence_and_time(payload: bytes, message: type[Message]) -> tuple[int, int]:
     """Sequence and t_ns of a message that has both; read directly if the bytes are canonical. Raises Fault BAD_MESSAGE."""
     if len(payload) >= 18 and payload[0] == 0x09 and payload[9] == 0x11:

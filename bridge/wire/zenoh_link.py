@@ -24,7 +24,7 @@ from bridge.processes import this_process
 from bridge.threads import repeat
 from bridge.wire import certificates, loopback_users
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.bus_config import BusConfig, is_free
+from bridge.wire.bus_config import BusConfig, is_free, is_loopback
 from bridge.wire.inbox import Inbox, Received
 from bridge.wire.payloads import largest_bytes, parsed
 from bridge.wire.session import DIAL_S, rig_security, role_security, session_config, zenoh
@@ -116,21 +116,30 @@ def _dialled(
     raise Fault("NO_PEER", f"{config.endpoint}: no plant answered before the stop")
 
 
-def is_frozen(config: BusConfig) -> bool:
-    """Whether the process that listens at an endpoint does not read: it is frozen, or gets no processor time.
+# A client learns nothing of the cause of a refusal: Zenoh closes the connection.
+REFUSES = (
+    "a process listens there: if it is a rig, it refused this session (another password or authority), and its event REFUSED "
+    "gives the cause"
+)
+
+
+def reads(config: BusConfig) -> bool | None:
+    """Whether the process that listens at an endpoint reads; None without one. False: frozen, or without processor time.
 
     Call it after a missing answer. A running rig ends a connection whose first bytes do not follow its protocol.
     """
     host, _, port = config.endpoint.partition("/")[2].rpartition(":")
+    listens = None
     try:
         with socket.create_connection((host.strip("[]"), int(port)), _READS_S) as link:
+            listens = True
             link.sendall(_NO_PROTOCOL)
             link.recv(64)
     except TimeoutError:
-        return True
+        return False
     except OSError:
         pass
-    return False
+    return listens
 
 
 def _remedy(config: BusConfig) -> str:
@@ -139,7 +148,8 @@ def _remedy(config: BusConfig) -> str:
         return (
             f"{start}, and check the certificates: both sides need the same authority, and the rig's must name its host"
         )
-    return loopback_users.absence(config.endpoint) or start
+    is_held = is_loopback(config.endpoint) and not is_free(config.endpoint)
+    return loopback_users.absence(config.endpoint) or (REFUSES if is_held else start)
 
 
 class Bus:

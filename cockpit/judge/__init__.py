@@ -4,6 +4,7 @@ judged          judges a run from its log, or from the arrays of a log in memory
 run_judge       messages in, verdict out; sums over the windows; composed of the modules below
 verdict         the figures, and whether control is ok, not ok or not judged
 verdict_words   the same in words
+finding_codes   meaning of the verdict's own codes, for `stickslip explain`
 setup           numbers that the judge takes from the configurations in a log, with the description of sensors and axis
 window          pending rows, and the windows in which they are judged
 phases          stretches of a run: before the controller, hand-over, after; interruptions; whether it tests its controller

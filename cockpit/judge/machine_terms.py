@@ -24,6 +24,9 @@ from bridge.wire import stickslip_pb2 as wire
 from cockpit.judge.window import HasMoved, Window
 
 _FOLLOWS = 0.5  # a slide that moves by more than this share of the drive's travel no longer sticks
+# Time over which both travels are compared. Shorter: noise decides, as it may be a fifth of the drive's travel in this time
+# (cockpit/run/sensor_needs.py). Longer: a short stroke on a soft spring seems to stick.
+_TRAVEL_S = 0.125
 _AT_TURN_SIGMAS = 6.0  # the drive turns within this distance of its extreme position, in rms noises of the position
 # Reversals that the controller reports in this time before the end of a window are left to the next: it reports early or late.
 _CHANGE_S = 0.25
@@ -40,6 +43,7 @@ class Following(NamedTuple):
     reversals: int  # changes of sign of the drive's velocity
     reversal_stick_s: float  # longest time from a reversal until the slide follows; 0 without reversals
     quadrant_error_m: float  # largest of all reversals; 0 without reversals
+    following_s: float  # part of `moving_s` in which the slide no longer sticks: it makes most of the drive's travel
 
 
 class Reversal(NamedTuple):
@@ -59,6 +63,7 @@ class BlockMotion(NamedTuple):
     direction: npt.NDArray[np.int64]  # direction of the drive: 1, -1, 0 at rest
     dose_m2_per_s: Floats  # v_a^2 times the block duration, 0 while the exciter rests
     reversals: list[Reversal]
+    follows: Bools  # the slide has made most of the drive's travel in the last 0.125 s
 
 
 class FollowingSum:
@@ -66,7 +71,7 @@ class FollowingSum:
 
     def __init__(self) -> None:
         self.moving = 0  # blocks with a moving drive, with or without a position of the slide
-        self._blocks = 0
+        self._blocks = self._follows = 0
         self._squares_m2 = self._peak_m = self._dose_m2_per_s = 0.0
         self._ways = {-1: (0, 0.0, 0.0), 1: (0, 0.0, 0.0)}  # by direction: blocks, mean error, squares about the mean
         self._reversals = 0
@@ -79,6 +84,7 @@ class FollowingSum:
         self.moving += int(np.count_nonzero(counted & (motion.direction != 0)))
         if motion.error_m is None:
             return
+        self._follows += int(np.count_nonzero(counted & motion.follows))
         for way, before in self._ways.items():
             error_m = motion.error_m[counted & (motion.direction == way)]
             if not len(error_m):
@@ -109,6 +115,7 @@ class FollowingSum:
             reversals=self._reversals,
             reversal_stick_s=self._stick_s,
             quadrant_error_m=self._quadrant_m,
+            following_s=self._follows * block_s,
         )
 
     @property
@@ -140,7 +147,9 @@ class MotionOf:
         measured = slide_moved and drive_moved and len(rows) > 0  # a missing transducer never moves
         reversals = self._reversals(window, t_s, slide_m, drive_m, direction) if measured else []
         error_m = (drive_m - slide_m)[judged] if measured else None
-        return BlockMotion(t_s[judged], error_m, direction[judged], dose[judged], reversals)
+        before = np.maximum(np.arange(len(rows)) - round(_TRAVEL_S / block_s), 0)
+        follows = direction * (slide_m - slide_m[before]) > _FOLLOWS * direction * (drive_m - drive_m[before])
+        return BlockMotion(t_s[judged], error_m, direction[judged], dose[judged], reversals, follows[judged])
 
     def _reversals(
         self, window: Window, t_s: Floats, slide_m: Floats, drive_m: Floats, direction: npt.NDArray[np.int64]

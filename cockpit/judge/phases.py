@@ -10,12 +10,18 @@ from bridge.log.in_charge import GONE_S, ChargeWatch
 from cockpit.judge.machine_terms import BlockMotion, Following, FollowingSum
 from cockpit.judge.setup import SETTLING_S, Setup
 from cockpit.judge.slips import Forces, Swing
-from cockpit.judge.watches import StepWatch
+from cockpit.judge.watches import RigWatch, StepWatch
 
 Stretches = list[tuple[float, float]]
 
 # First seconds of a phase, at most half of it, that do not count for swing and mean force: a run starts with an unloaded spring.
 _RAMP_S = 4.0
+# Longest motion of the drive after the last slip, in longest motions between two slips, with which slips go on. Larger: slips of
+# a first start that ended are taken for stick-slip that the controller removed. Smaller: irregular stick-slip counts as ended.
+_GOES_ON = 2.0
+# Least share of the motion in which the slide must follow its drive. Smaller: a slide that never breaks away passes, as it
+# catches up where the drive stops. Larger: short strokes on a soft spring are not judged.
+_MUST_FOLLOW = 0.1
 
 
 class Phase(NamedTuple):
@@ -29,6 +35,7 @@ class Phase(NamedTuple):
     mean_force_N: float  # mean drive force of the stretch, without its first 4 s, or first half if that is shorter
     following: Following | None  # None without motion of the drive or without a measured position
     vibration_dose_mm2_per_s: float  # integral of v_a^2
+    slips_went_on: bool  # slips up to the end of the stretch, not only e.g. at the first start of the drive
 
 
 class PhaseSum:
@@ -40,6 +47,7 @@ class PhaseSum:
         self.unsure = 0  # slips during which blocks are missing
         self.slips = 0
         self._blocks = 0
+        self._between = self._last = 0  # blocks with a moving drive: most without a slip, and up to the last slip
         self._whole, self._steady = Swing(), Swing()
         self._following = FollowingSum()
 
@@ -61,6 +69,11 @@ class PhaseSum:
         slips = (breakaway_s >= self.from_s) & (breakaway_s < self.to_s) & ~within(breakaway_s, [*without, *doubted])
         self.slips += int(np.count_nonzero(slips))
         self.unsure += int(np.count_nonzero(slips & forces.unsure))
+        if motion is not None and slips.any():
+            moving_s = motion.t_s[counts(motion.t_s) & (motion.direction != 0)]
+            at = self.moving + np.searchsorted(moving_s, breakaway_s[slips])
+            self._between = max(self._between, int(np.diff(at, prepend=self._last).max()))
+            self._last = int(at[-1])
         later = inside & (forces.t_s > min(self.from_s + _RAMP_S, 0.5 * (self.from_s + self.to_s)))
         self._steady.add(forces.mean_N[later], forces.part[later])
         if not self._steady.blocks:
@@ -84,6 +97,7 @@ class PhaseSum:
             mean_force_N=swing.mean_N,
             following=self._following.result(block_s),
             vibration_dose_mm2_per_s=self._following.dose_mm2_per_s,
+            slips_went_on=self.slips > 0 and self.moving - self._last <= _GOES_ON * self._between,
         )
 
 
@@ -156,7 +170,7 @@ def untested(
     steps: StepWatch,
     seconds: float,
     unreadable: str,
-    answered: bool,
+    rig: RigWatch,
     after: Phase | None,
     in_charge_s: float,
 ) -> str:
@@ -165,7 +179,7 @@ def untested(
     Args:
         seconds: end of the last block; 0 without any.
         unreadable: error of the first unreadable block; empty without any.
-        answered: at least one block had a fresh command.
+        rig: the rig's answers and its fault at the end.
         in_charge_s: time in which the controller was in charge, including its settling.
 
     """
@@ -180,6 +194,8 @@ def untested(
     if not steps.steps:
         return "no step of a controller was recorded: nothing was tested"
     if not steps.armed:
+        if rig.fault:
+            return f"the rig was never armed, in FAULT by {rig.fault}: `stickslip reset` when it is safe, then `stickslip arm`"
         return "the rig was never armed: `stickslip arm`, or `arm = true` in the scenario of a simulated rig"
     if not steps.moved:
         return "the drive never moved: nothing was tested"
@@ -187,7 +203,7 @@ def untested(
         return ""
     if seconds < setup.enabled_from_s:
         return f"ended before the controller was enabled (at {setup.enabled_from_s:.1f} s)"
-    if in_charge_s <= 0.0 or not answered:
+    if in_charge_s <= 0.0 or not rig.answered:
         return "the controller was not in charge in this run"
     why = f"too short to judge: it has {SETTLING_S:g} s to settle"
     if in_charge_s > SETTLING_S:  # no finite force, or stops and stalls left no second to settle
@@ -196,7 +212,7 @@ def untested(
 
 
 def too_little(after: Phase | None, phases: Mapping[str, PhaseSum], block_s: float) -> str:
-    """Reason for which the controlled motion is too short to show a slip; empty if it is long enough."""
+    """Reason for which the controlled motion cannot show a slip: too short, or the slide rests; else empty."""
     if after is None:
         return ""
     moving_s, before = phases["after"].moving * block_s, phases["before"]
@@ -205,4 +221,8 @@ def too_little(after: Phase | None, phases: Mapping[str, PhaseSum], block_s: flo
     if before.slips and moving_s < (period_s := before.moving * block_s / before.slips):
         line = f"the drive moved for {moving_s:.2g} s with the controller in charge"
         return f"{line}, less than the {period_s:.2g} s between two slips before: make the run longer"
+    following, broke_away = after.following, before.slips + phases["taking_over"].slips > 0
+    if following is not None and not broke_away and following.following_s < _MUST_FOLLOW * following.moving_s:
+        line = f"the slide followed its drive for {following.following_s:.2g} of {following.moving_s:.2g} s"
+        return f"{line} with the controller in charge: make the run longer, or correct the stiffness of the drive"
     return ""

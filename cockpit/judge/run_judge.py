@@ -22,6 +22,7 @@ from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.channels import SENSOR_CHANNELS
 from bridge.wire.event_codes import SEVERITIES, TESTS, WEAK_REASONS, harms, is_listed
+from bridge.wire.payloads import other_rig
 from cockpit.judge.machine_terms import MotionOf
 from cockpit.judge.pauses import CommandSum, StallSum
 from cockpit.judge.phases import (
@@ -37,7 +38,7 @@ from cockpit.judge.phases import (
 )
 from cockpit.judge.ratio_watch import RatioWatch
 from cockpit.judge.sensor_watch import SensorWatch
-from cockpit.judge.setup import SETTLING_S, Described, Setup, described, is_known, other_rig, plant_of, setup_of
+from cockpit.judge.setup import SETTLING_S, Described, Setup, described, is_known, plant_of, setup_of
 from cockpit.judge.slips import Forces, bins_of, forces_of
 from cockpit.judge.verdict import IN_CHARGE_SHARE, MISSING_SHARE, RunVerdict
 from cockpit.judge.watches import FrozenWatch, LatencyWatch, Losses, RigWatch, StepWatch, clock_fault, losses_of
@@ -206,12 +207,13 @@ class RunJudge:
         not_watched = events.not_watched if latency is not None else ""
         damaged = [f"{finding.kind}: {finding.text}" for finding in damage_findings(damage, self._path)]
         faults, others = self._lines(charge, gaps.fallbacks(), damaged, checksums, foreign)
-        others += [*windows.sensors.other_stiffness(setup.stiffness_N_per_m), *other_rig(self._headers)]
+        named = (self._headers.get(role, {}).get("rig", "") for role in ("plant", "controller"))
+        others += [*windows.sensors.other_stiffness(setup.stiffness_N_per_m), *filter(None, [other_rig(*named)])]
         ratio = windows.ratio.result() if windows.checked else None
         slips_s = self.cycles.breakaway_t_s if self.cycles is not None else np.empty(0)
         judged_s = apart((setup.settled_from_s, seconds), gaps.all(is_last=True))
         unreadable = damage.first_bad if damage.first_bad.startswith("/sensors") else ""
-        why = untested(setup, steps, seconds, unreadable, self._rig.answered, after, in_charge_s)
+        why = untested(setup, steps, seconds, unreadable, self._rig, after, in_charge_s)
         disarmed = self._rig.disarmed()
         return RunVerdict(
             log=str(self._path),

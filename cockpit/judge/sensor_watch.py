@@ -148,7 +148,9 @@ class ChannelRelations:
         per_omega_s = np.divide(1.0, omega, out=np.zeros(at.shape), where=vibrates)
         # expected vibration of the slide: transmitted by a sticking contact, limited by the sliding friction
         shaken_mps2 = np.minimum(self._of.contact_per_s2 * base_mps2 * per_omega_s**2, force_N / self._of.mass_kg)
-        shakes = vibrates & (shaken_mps2 > _SHAKEN * noise_mps2)
+        # friction reverses, and shakes the slide, only where the base is faster than the drive
+        reverses = math.sqrt(2.0) * base_mps2 * per_omega_s > np.abs(trace["drive_velocity_mps"])
+        shakes = vibrates & reverses & (shaken_mps2 > _SHAKEN * noise_mps2)
         text = "mass_accel_mps2 shows {:.3g} m/s2, its noise, where friction shakes the slide by {:.3g} m/s2: is it connected?"
         compare("SENSOR_DEAD", shakes, slide_mps2 >= _QUIET * noise_mps2, text, slide_mps2, shaken_mps2)
         both = vibrates & (v_a_mps > 0.0)

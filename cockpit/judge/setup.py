@@ -88,15 +88,6 @@ def plant_of(headers: Metadata, path: Path) -> Any:
     return configuration_of(headers, "plant", path) if "plant" in headers else {}
 
 
-def other_rig(headers: Metadata) -> list[str]:
-    """A warning about a controller whose scenario describes another rig; empty without one, and for rigs without a name."""
-    rig, of_controller = (headers.get(role, {}).get("rig", "") for role in ("plant", "controller"))
-    if rig == of_controller or {rig, of_controller} & {"", "unnamed"}:
-        return []
-    line = f"controller: its scenario describes the rig {of_controller}, but the rig is {rig}"
-    return [f"{line}; start `stickslip controller` with the scenario of this rig"]
-
-
 def absent_channels(headers: Metadata, path: Path) -> list[str]:
     """Channels missing in the source file of an imported log; they are zeros in the log. Raises Fault BAD_LOG."""
     return texts_of(headers, "import", "missing", path)

@@ -31,12 +31,12 @@ def in_words(verdict: RunVerdict, verbose: bool, without: Phase | None = None) -
         lines.append(computer_in_words(v.computer, v.not_watched))
     if v.before is not None:
         rate = f" ({v.before.slips_per_min:.0f} per minute{'' if v.imported else ' of this phase'})"
-        lines.append(f"{'whole' if v.imported else 'before':<8} {_slips(v.before, rate)}")
+        lines.append(f"{'whole' if v.imported else 'before':<8} {_slips(v, v.before, rate)}")
     if v.after is not None:
-        lines.append(f"after    {_slips(v.after)}")
+        lines.append(f"after    {_slips(v, v.after)}")
     if without is not None:
         lines.append(
-            f"without  {_slips(without)}{_errors(without)}: the stretch after, simulated without the controller"
+            f"without  {_slips(v, without)}{_errors(without)}: the stretch after, simulated without the controller"
         )
     if verbose:
         return [*lines, *_figures(v)]
@@ -63,7 +63,7 @@ def _figures(verdict: RunVerdict) -> list[str]:
         lines.append(f"settling {counted(v.taking_over.slips, 'slip')} {when}")
     lines.extend(_machine_terms(v.before, v.after))
     if v.alone is not None:
-        lines.append(f"alone    {_slips(v.alone, ' without a controller')}")
+        lines.append(f"alone    {_slips(v, v.alone, ' without a controller')}")
     if v.stalled_slips:
         when = "while the rig had no fresh command for a moment, or in the second after"
         lines.append(f"stalled  {counted(v.stalled_slips, 'slip')} {when}")
@@ -160,7 +160,9 @@ def _errors(without: Phase) -> str:
     return f", {_error(following)}{reversal}"
 
 
-def _slips(phase: Phase, more: str = "") -> str:
+def _slips(verdict: RunVerdict, phase: Phase, more: str = "") -> str:
+    if verdict.blind and not phase.slips:
+        return f"slips cannot be judged in {phase.seconds:.1f} s, {_swing(phase)}"
     return f"{counted(phase.slips, 'slip')} in {phase.seconds:.1f} s{more}, {_swing(phase)}"
 
 
@@ -212,11 +214,14 @@ def _answer(verdict: RunVerdict) -> str:
     if v.control != OK:
         blind = f"; slips cannot be judged: {v.blind[0]}" if v.control == NOT_OK and v.blind else ""
         return f"{v.control}: {v.reason.partition('; ')[0]}{blind}{rest}"
-    if v.before is not None and v.before.slips:
+    if v.before is not None and v.before.slips_went_on:
         then = v.taking_over.slips if v.taking_over is not None else 0
         over = f"{then} while the controller took over, none after" if then else "none with the controller in charge"
         return f"stick-slip is gone: {counted(v.before.slips, 'slip')} before, {over}{rest}"
-    return f"no stick-slip with the controller in charge{rest}"
+    ended = ""
+    if v.before is not None and v.before.slips:
+        ended = f"; the {counted(v.before.slips, 'slip')} before had ended without it"
+    return f"no stick-slip with the controller in charge{ended}{rest}"
 
 
 def _imported_answer(verdict: RunVerdict) -> str:

@@ -14,6 +14,7 @@ from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.channels import CHANNELS
 from bridge.wire.messages import STALE
+from bridge.wire.words import word_of
 from cockpit.judge.setup import SETTLING_S, Setup
 
 STANDSTILL_MPS = 2e-5  # a slower drive is at standstill; the default of the controller
@@ -57,11 +58,12 @@ class LatencyWatch:
 
 
 class RigWatch:
-    """Whether commands reached the rig, whether its gain was verified, and whether it disarmed itself."""
+    """Whether commands reached the rig, whether its gain was verified, its present fault, and whether it disarmed itself."""
 
     def __init__(self) -> None:
         self.answered = False  # some block has a fresh command
         self.gain_seen = False  # a loop check confirmed the exciter's gain
+        self.fault = ""  # cause of the FAULT in the latest row
         self.end_ns = 0  # time of the latest row
         self.checking = 0  # blocks of loop checks
         self._disarmed_s = np.inf  # first time at which the rig disarmed itself without a fresh command
@@ -72,6 +74,8 @@ class RigWatch:
         self.gain_seen |= bool(np.isin(records["cause"], (wire.CHECK_PASSED, wire.GAIN_ACCEPTED)).any())
         self.checking += int((records["guard_state"] == wire.CHECKING).sum())
         self.end_ns = max(self.end_ns, int(records["t_ns"].max()))
+        last = records[-1]
+        self.fault = word_of("cause", int(last["cause"])) if last["guard_state"] == wire.FAULT else ""
         disarmed = (records["guard_state"] == wire.DISARMED) & (records["cause"] == wire.COMMAND_LOST)
         if disarmed.any():
             self._disarmed_s = min(self._disarmed_s, 1e-9 * float(records["t_ns"][disarmed.argmax()]))

@@ -53,6 +53,7 @@ def rows(now: Mapping[str, Any]) -> list[tuple[str, str]]:
     forecast = "no slip expected" if now.get("time_to_slip_s") is None else f"slip in {now['time_to_slip_s']:.2f} s"
     missing = "".join(f"; no {role}" for role in ROLES if role not in roles)
     return [
+        *([("warning", now["other_rig"])] if now["other_rig"] else []),
         ("rig", f"{now['rig'] or 'of unknown name'} at {now['endpoint']}" if "plant" in roles else _UNKNOWN),
         ("on bus", (", ".join(role for role in ROLES if role in roles) or "no process") + missing),
         ("run", f"{now['t_s']:.1f} s, {slips}" if live else _UNKNOWN),

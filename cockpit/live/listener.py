@@ -12,7 +12,7 @@ from bridge.faults import Fault
 from bridge.wire import realtime
 from bridge.wire.loopback_users import absence
 from bridge.wire.topics import APPLIED, CONTROLLER_EVENT, PLANT_EVENT, RECORDER_EVENT, SENSORS, TRACE
-from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, is_frozen
+from bridge.wire.zenoh_link import REFUSES, Bus, BusConfig, Inbox, reads
 
 EVENTS = (PLANT_EVENT, CONTROLLER_EVENT, RECORDER_EVENT)
 ROLES = ("plant", "controller", "recorder")
@@ -39,7 +39,15 @@ class Source:
 
     inbox: Inbox  # received signals and events
     presence: Presence
-    headers: dict[str, Any] = field(default_factory=dict)  # configurations of rig and controller by role
+    headers: dict[str, Any] = field(default_factory=dict)  # readable configurations of rig and controller by role
+    rigs: dict[str, str] = field(default_factory=dict)  # the rig that each of them names, by role
+
+    def read_headers(self, bus: Bus, roles: Sequence[str], timeout_s: float, stop: threading.Event) -> None:
+        """Read the headers of those `roles` that answer in time."""
+        for role, header in bus.headers(roles, timeout_s, stop).items():
+            self.rigs[role] = header.rig
+            with contextlib.suppress(ValueError, RecursionError):  # header of a foreign program
+                self.headers[role] = json.loads(header.configuration)
 
 
 def connected(config: BusConfig, role: str, patience_s: float, frozen: str, absent: str, about: str = "") -> Bus:
@@ -54,12 +62,15 @@ def connected(config: BusConfig, role: str, patience_s: float, frozen: str, abse
         if fault.kind.code != "NO_PEER":
             raise
     where = config.endpoint
-    if is_frozen(config):
+    reading = reads(config)
+    if reading is False:
         line = f"{about}the rig at {where} accepts connections but does not answer (frozen or overloaded)"
         raise Fault("NO_PEER", f"{line}: must run; {frozen}")
     if refusal := absence(where):
         raise Fault("NO_PEER", f"{about}{refusal}; {frozen}")
     line = f"{about}no rig answered at {where} within {patience_s:g} s: {config.must_be} of a running rig"
+    if reading:
+        line += f"; {REFUSES}"
     raise Fault("NO_PEER", f"{line}; {absent}")
 
 
@@ -69,15 +80,6 @@ def listen(bus: Bus, inbox: Inbox) -> None:
         bus.listen(topic, inbox.push)
     for topic in EVENTS:
         bus.listen(topic, inbox.keep)
-
-
-def configurations(bus: Bus, roles: Sequence[str], timeout_s: float, stop: threading.Event) -> dict[str, Any]:
-    """The configurations of those `roles` that answer in time, without unreadable ones."""
-    readable: dict[str, Any] = {}
-    for role, header in bus.headers(roles, timeout_s, stop).items():
-        with contextlib.suppress(ValueError, RecursionError):  # header of a foreign program
-            readable[role] = json.loads(header.configuration)
-    return readable
 
 
 class Listener(Source):
@@ -106,7 +108,7 @@ class Listener(Source):
                     realtime.raise_priority()
                     self._while_linked(bus)
             except Fault as fault:
-                trouble = "" if fault.kind.code == "NO_PEER" else fault.line
+                trouble = absence(self._config.endpoint) if fault.kind.code == "NO_PEER" else fault.line
             self.presence = Presence(False, frozenset(), trouble)
             self._over.wait(_AGAIN_S)
 
@@ -127,4 +129,4 @@ class Listener(Source):
             if linked and counts != arrivals:
                 arrivals = counts
                 alive = [role for role in ROLES[:2] if bus.alive(role)]
-                self.headers |= configurations(bus, alive, _HEADER_S, self._over)
+                self.read_headers(bus, alive, _HEADER_S, self._over)

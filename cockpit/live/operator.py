@@ -159,7 +159,9 @@ def stop_rig(by_bus: Callable[[], CommandOutcome], orders: list[StopOrder]) -> C
         fault = error if isinstance(error, Fault) else Fault("NO_PEER", f"the bus failed: {error}; {CUT_AMPLIFIER}")
         problems = "; ".join(order.problem for order in orders if order.problem)
         if not confirmed(orders, BY_FILE_S):
-            unconfirmed = "; the stop file of the rig is set, but the rig did not confirm it"
+            unconfirmed = (
+                "; the stop file of the rig is set, but the rig did not confirm it: if it starts, it is in FAULT"
+            )
             if problems:
                 unconfirmed = f"; the stop file of the rig could not be set: {problems}"
             advice = "" if fault.kind.code == "NO_PEER" else f"; STOP NOT DELIVERED: {CUT_AMPLIFIER}"

@@ -20,6 +20,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from bridge.faults import Fault
+from bridge.plain import print_line
 from bridge.results import strict_json
 from bridge.wire.channels import CHANNELS
 from bridge.wire.words import words
@@ -76,6 +77,7 @@ class Server:
         self._connections = 0
         self._silent: dict[ServerConnection, None] = {}  # connections without a page yet, oldest first
         self._latency_s = 0.0  # time of the last histogram
+        self._trouble = ""  # printed last
 
     def run(self, sock: socket.socket, stop: threading.Event, ready: Callable[[], None]) -> None:
         """Serve until `stop` is set; `ready` is called once requests are accepted."""
@@ -147,6 +149,9 @@ class Server:
 
     def _tick(self) -> None:
         step = self._view.step()
+        if (trouble := self._listener.presence.trouble) not in ("", self._trouble):
+            self._trouble = trouble
+            print_line(f"warning  {trouble}")
         if self._also is not None:
             self._also(step)
         if not len(self._viewers):

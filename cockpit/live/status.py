@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from bridge.faults import Fault
 from bridge.wire.zenoh_link import BusConfig, Inbox
-from cockpit.live.listener import LIMIT, ROLES, Presence, Source, configurations, connected, listen
+from cockpit.live.listener import LIMIT, ROLES, Presence, Source, connected, listen
 
 _DIAL_S = 0.4  # a rig on this computer answers within milliseconds, in the same network within tens of milliseconds
 _ROLES_S = 0.2  # wait for the roles on the bus; only a missing role costs this time
@@ -39,6 +39,7 @@ class Status(NamedTuple):
     guard_limit: str | None  # limit of the guard that restricts the command now
     heat_share: float | None  # modelled temperature rise of the exciter, as a share of the largest allowed
     events: list[str]  # received while listening: 0.3 s, or longer on a busy computer
+    other_rig: str | None  # warning about a controller whose scenario describes another rig
 
     @property
     def controlled(self) -> bool:
@@ -63,9 +64,10 @@ def look(bus_config: BusConfig) -> tuple[Status, list[str]]:
         if not roles:
             line = f"{where}: neither rig nor controller is on this bus: --prefix must equal the prefix of the run"
             raise Fault("NO_PEER", f"{line}; give the --prefix of the run")
-        headers = configurations(bus, [role for role in ROLES[:2] if role in roles], _HEADER_S, threading.Event())
+        source = Source(inbox, Presence(True, frozenset(roles), ""))
+        source.read_headers(bus, [role for role in ROLES[:2] if role in roles], _HEADER_S, threading.Event())
         time.sleep(max(0.0, began_s + _LISTEN_S - time.monotonic()))
-        view = View(Source(inbox, Presence(True, frozenset(roles), ""), headers), where)
+        view = View(source, where)
         events = view.step().events  # the first step loads code, for a second on a busy computer
         until_s = time.monotonic() + _BUSY_S
         while view.phase() != LIVE and "plant" in roles and time.monotonic() < until_s:
@@ -78,6 +80,7 @@ def look(bus_config: BusConfig) -> tuple[Status, list[str]]:
 def _status(now: dict[str, Any], events: list[str]) -> Status:
     figures: dict[str, Any] = {name: now.get(name) for name in Status._fields} | {
         "rig": now["rig"] or None,
+        "other_rig": now["other_rig"] or None,
         "roles": [role for role in ROLES if role in now["roles"]],
         "contact": now.get("state"),
         "state": now.get("guard_state"),

@@ -19,7 +19,7 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.complaints import WINDOW, Complaints
 from bridge.wire.event_codes import FAILURE, SEVERITIES, TRIPS, WEAK_REASONS, event_code, harms
 from bridge.wire.messages import APPLIED, TRACE
-from bridge.wire.payloads import parsed
+from bridge.wire.payloads import other_rig, parsed
 from bridge.wire.words import OUTSIDE, help_of, word_of
 from bridge.wire.zenoh_link import Received
 from cockpit.figures.signals import SIGNALS, WORD_SIGNALS, stroke_limits
@@ -240,6 +240,7 @@ class View:
             "silent_s": round(self._clock() - self._heard_s.get("sensors", self._began_s), 1),
             "answer": self.answer(phase, figures)._asdict(),
             "rig": plain(str(value_at(self._source.headers, "plant.rig.name") or "")[:80]),
+            "other_rig": plain(other_rig(*(self._source.rigs.get(role, "")[:80] for role in ("plant", "controller")))),
             "roles": sorted(presence.roles),
             "limits": [{"words": label, "value": value} for label, value in stroke_limits(self._source.headers)],
             "slips_of_late": recent[0] if "slips" in figures else None,

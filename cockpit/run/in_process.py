@@ -40,10 +40,12 @@ _STRETCH_BLOCKS = SNAPSHOT_EVERY
 
 
 class TimedAction(NamedTuple):
-    """An operator command, a `wire.Operator.Action`, that rig and controller receive at `t_ns`."""
+    """An operator command, a `wire.Operator.Action` or HOLD, at `t_ns`. A stop by file reaches the rig alone."""
 
     t_ns: int
     action: int
+    to_rig: bool = True
+    to_controller: bool = True
 
 
 def run_onboard(
@@ -85,9 +87,11 @@ def run_onboard(
                     loop.reconfigure(ahead.pop(0).config)
                 events = 0
                 while due and _first_step(loop, due[0].t_ns) <= loop.block:
-                    action = due.pop(0).action
-                    loop.apply_order(action)
-                    events = operator_events(events, action)
+                    _, action, to_rig, to_controller = due.pop(0)
+                    if to_rig:
+                        loop.apply_order(action)
+                    if to_controller:
+                        events = operator_events(events, action)
                 # a change of the configuration or an operator command also ends a stretch
                 ends = [blocks, (loop.block // _STRETCH_BLOCKS + 1) * _STRETCH_BLOCKS]
                 ends += [_first_step(loop, part[0].t_ns) for part in (ahead, due) if part]

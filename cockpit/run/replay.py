@@ -10,6 +10,7 @@ import numpy as np
 
 from bridge.config import validate, with_overrides
 from bridge.faults import Fault
+from bridge.guard.states import HOLD
 from bridge.log.damage import damage_findings
 from bridge.log.log_reader import LogReader
 from bridge.log.logfile import Piece, RunData, check_log_file, iter_pieces, read_run
@@ -27,6 +28,13 @@ if TYPE_CHECKING:
 Headers = dict[str, dict[str, str]]
 
 _REPLAYED = frozenset({"sensors", "command", "trace", "announce", "snapshot"})  # topics that a replay needs
+_ORDERS: dict[int, int] = {  # the order that leads to a cause of the guard
+    wire.ARMED_BY_PERSON: wire.Operator.ARM,
+    wire.DISARMED_BY_PERSON: wire.Operator.DISARM,
+    wire.RESET_BY_PERSON: wire.Operator.RESET,
+    wire.STOP_BY_PERSON: wire.Operator.STOP,
+    wire.STOP_KEPT: HOLD,
+}
 _LATEST_S = 1e9  # 32 years; a log counts nanoseconds in 64 bits, 1.8e10 s
 
 
@@ -79,17 +87,21 @@ def _recorded_changes(headers: Headers, path: Path) -> list[str]:
 
 
 def _commands_of(run: RunData) -> "list[TimedAction]":
-    """Operator commands in a log, with their times: STOP and RESET from the trace, ARM and DISARM from the rig's causes."""
+    """Operator commands in a log, with their times: the controller's from its trace, the rig's from the causes of its guard."""
     from cockpit.run.in_process import TimedAction
 
     bits = ((STOP, wire.Operator.STOP), (RESET, wire.Operator.RESET))
     commands = [
-        TimedAction(int(row["t_ns"]), action) for row in run.trace for bit, action in bits if int(row["events"]) & bit
+        TimedAction(int(row["t_ns"]), action, to_rig=False)
+        for row in run.trace
+        for bit, action in bits
+        if int(row["events"]) & bit
     ]
-    causes: dict[int, int] = {wire.ARMED_BY_PERSON: wire.Operator.ARM, wire.DISARMED_BY_PERSON: wire.Operator.DISARM}
     began = run.applied[np.flatnonzero(np.diff(run.applied["cause"], prepend=0))]
     commands += [
-        TimedAction(int(row["t_ns"]), causes[int(row["cause"])]) for row in began if int(row["cause"]) in causes
+        TimedAction(int(row["t_ns"]), _ORDERS[int(row["cause"])], to_controller=False)
+        for row in began
+        if int(row["cause"]) in _ORDERS
     ]
     return sorted(commands)
 

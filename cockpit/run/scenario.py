@@ -19,7 +19,7 @@ from cockpit.run.scenario_file import RIG_FILE, find, rig_table, with_rig
 from cockpit.run.sensor_needs import refuse_blind_sensors, refuse_out_of_travel
 from controller.config import ControllerConfig, within
 from plant.config import RigConfig
-from plant.config_limits import refuse_what_no_rig_does
+from plant.config_limits import refuse_a_spring_of_another_rig, refuse_what_no_rig_does
 from plant.faults.kinds import PROCESS
 from plant.faults.table import FaultTable
 
@@ -83,10 +83,11 @@ class Scenario(Strict):
 
 
 class _Runnable(Scenario):
-    """A scenario whose sensors can show its motion: required of each started run, not of the bench and of replayed logs."""
+    """A scenario with a given spring, and sensors that show its motion: each started run, not the bench or a replayed log."""
 
     @model_validator(mode="after")
-    def _sensors_see(self) -> "_Runnable":
+    def _can_be_judged(self) -> "_Runnable":
+        refuse_a_spring_of_another_rig(self.rig)
         refuse_blind_sensors(self.rig, self.controller, self.duration_s)
         return self
 

@@ -1,8 +1,8 @@
 """Checks before a run that its sensors have the range, noise, resolution and bandwidth to show the described motion.
 
 So no verdict rests on a sensor that cannot show the motion. A refusal recommends a value with a margin: a range of 1.25 times the
-largest force or travel or twice the largest acceleration, a bandwidth of twice the frequency, half of the noise limit, a quarter
-of the resolution limit. Faults (`[[fault]]`) do not belong to the description. Figures below: docs/method/sensors.md.
+largest force or travel or twice the largest acceleration, twice the bandwidth limit, half of the noise limit, a quarter of the
+resolution limit. Faults (`[[fault]]`) do not belong to the description. Figures below: docs/method/sensors.md.
 """
 
 import math
@@ -30,9 +30,9 @@ _STEPS, _HIDDEN = 96.0, 2.0
 # A position's noise may be a fifth of a slip, or of the drive's travel in this time if that is longer. Larger: noise of 10 um
 # passes on a ball screw, and hides slips. Smaller: a feed of 0.02 mm/s without slips is refused, which the controller follows.
 _TRAVEL_S = 0.125
-# Least bandwidth of force and position sensors over the natural frequency of the slide on its spring. Larger: 0.5 is refused,
-# which shows each slip. Smaller: 0.46 passes.
-_LEAST_BAND = 0.5
+# Least bandwidth of force and position sensors over the natural frequency of the slide on its spring; slower ones lag in a slip,
+# and contradict each other. Larger: 2 is refused, which changes no verdict on 16 drawn axes. Smaller: 1.4 changes five.
+_LEAST_BAND = 2.0
 
 
 def refuse_out_of_travel(rig: RigConfig, duration_s: float) -> None:
@@ -111,7 +111,15 @@ def _needs(rig: RigConfig, duration_s: float) -> _Needs:
     # force to accelerate the slide; the spring limits it to the force for a step of the drive velocity
     begins_N = min(mass_kg * float(np.abs(motion.acceleration_mps2).max()), impedance_Ns_per_m * fastest_mps)
     viscous_N = (float(p.h_v) + float(p.quadratic_Ns2_per_m2) * fastest_mps) * fastest_mps
-    friction_N = max(level * float(p.F_s), level * float(p.F_c) + viscous_N + begins_N)
+    static_N, coulomb_N = level * float(p.F_s), level * float(p.F_c)
+    # The drive winds the spring up from its first velocity at the largest acceleration. At break-away it goes at this velocity;
+    # the slide then swings about the force that moves it. A step to the fastest velocity swings most.
+    winds_up_mps = math.hypot(float(motion.velocity_mps[0]), math.sqrt(2.0 * begins_N / mass_kg * static_N / k_d))
+    swing_N = min(
+        begins_N + math.hypot(static_N - coulomb_N - begins_N, impedance_Ns_per_m * min(winds_up_mps, fastest_mps)),
+        math.hypot(static_N - coulomb_N, impedance_Ns_per_m * fastest_mps),
+    )
+    friction_N = max(static_N, coulomb_N + max(swing_N, viscous_N + begins_N))
     # the travel of the drive limits the force, as the spring begins unloaded
     stiffest_N_per_m = k_d * (1.0 + max(float(p.knee_ratio), 0.0)) + float(p.h_d) * fastest_mps
     gain, bias_N = rig.sensors.force_gain * (1.0 + float(p.force_ratio)), float(p.force_bias_N)
@@ -168,9 +176,9 @@ def _resolves(sensors: SensorsConfig, channel: str, unit: str, most_noise: float
 
 
 def _band(sensors: SensorsConfig, name: str, natural_Hz: float) -> None:
-    if (value := getattr(sensors, name)) < _LEAST_BAND * natural_Hz:
+    if (value := getattr(sensors, name)) < (least_Hz := _LEAST_BAND * natural_Hz):
         why = f"the slide slips at {natural_Hz:.3g} Hz, which this sensor does not follow"
-        _refuse(f"sensors.{name}", value, why, f"{_above(2.0 * natural_Hz):g}")
+        _refuse(f"sensors.{name}", value, why, f"{_above(2.0 * least_Hz):g}")
 
 
 def _positions(sensors: SensorsConfig, slip_m: float, way_m: float, natural_Hz: float) -> None:

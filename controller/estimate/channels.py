@@ -105,7 +105,8 @@ def _condition(s: ControllerMemory, row: int, bins: int) -> None:
             last = fresh[row, i]
             rate += _FOLLOW * off
             if off != 0.0:  # a repeated number gives no information on the noise
-                scatter += _LEARN * (math.fabs(off) - scatter)
+                s.learnt[row] += 1
+                scatter += max(_LEARN, 1.0 / s.learnt[row]) * (math.fabs(off) - scatter)
             far = 0
             continue
         last += rate
@@ -158,7 +159,8 @@ def watch_channels(p: ControllerParams, s: ControllerMemory) -> None:
         trip(s, FROZEN, CONTACT)
     scatter_m = s.scatter[DRIVE]
     for row in range(ROWS):
-        s.usual[row] += (share if s.usual[row] > 0.0 else 1.0) * (s.scatter[row] - s.usual[row])
+        is_known = s.usual[row] > 0.0 and s.learnt[row] >= WELL_KNOWN
+        s.usual[row] += (share if is_known else 1.0) * (s.scatter[row] - s.usual[row])
     usual_m = max(s.usual[DRIVE], s.resolution[DRIVE])
     if scatter_m <= _GROWN * usual_m:
         s.grown_s = max(s.grown_s - p.block_s, 0.0)

@@ -85,10 +85,19 @@ def added(base: Hypothesis, more: Hypothesis) -> Hypothesis:
 
 def screened(fitter: Fitter, base: Fit, trials: list[Trial], jobs: int = 1, paired: bool = True) -> Screening:
     """What the trials promise in addition to the effects of `base`, and pairs of them where `paired`; in `jobs` processes."""
-    trials = [trial for trial in trials if not set(trial.hypothesis.effects) & set(base.hypothesis.effects)]
-    directions = Directions(base, fitter.most)
+    trials = beside(base, trials)
     # in the order of the trials: otherwise `jobs` would decide which of two equal trials comes first
-    changes = spread(jobs, _columns, (fitter, base), trials)
+    return of_changes(fitter, base, trials, spread(jobs, _columns, (fitter, base), trials), paired)
+
+
+def beside(base: Fit, trials: list[Trial]) -> list[Trial]:
+    """The trials of effects that a fit does not have."""
+    return [trial for trial in trials if not set(trial.hypothesis.effects) & set(base.hypothesis.effects)]
+
+
+def of_changes(fitter: Fitter, base: Fit, trials: list[Trial], changes: list[Floats], paired: bool = True) -> Screening:
+    """The promises of trials whose changes [compared] are known, in addition to the effects of `base`."""
+    directions = Directions(base, fitter.most)
     columns = [Column(trial, change, directions.freed(change)) for trial, change in zip(trials, changes, strict=True)]
     columns = [column for column in columns if float(column.direction @ column.direction) >= _LEAST_POWER]
     if not columns:

@@ -83,7 +83,9 @@ def test_twice_over_the_bus_and_in_one_process_are_the_same_bytes(tmp_path: Path
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("settings", [("duration_s=0.35", "controller.policy.enabled_from_s=0.0")])
+@pytest.mark.parametrize(
+    "settings", [("duration_s=0.35", "controller.policy.enabled_from_s=0.0", "rig.drive.stiffness_N_per_m=3e5")]
+)
 def test_compiled_equals_interpreted(tmp_path: Path, settings: tuple[str, ...]) -> None:
     compiled = onboard(tmp_path / "compiled.mcap", *settings)
     log = tmp_path / "interpreted.mcap"

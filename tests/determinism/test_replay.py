@@ -209,7 +209,10 @@ def test_an_operators_stop_is_repeated_in_the_closed_loop_and_no_stick_slip_of_t
     stopped, again = tmp_path / "stopped.mcap", tmp_path / "again.mcap"
     run = load_scenario("from-the-start", ["duration_s=14.0"])
     words = [
-        TimedAction(4_000_000_000, wire.Operator.STOP),
+        TimedAction(
+            3_960_000_000, wire.Operator.STOP, to_controller=False
+        ),  # by file: the trace shows only the one of 4.0 s
+        TimedAction(4_000_000_000, wire.Operator.STOP, to_rig=False),
         TimedAction(5_200_000_000, wire.Operator.RESET),
         TimedAction(5_300_000_000, wire.Operator.ARM),
     ]

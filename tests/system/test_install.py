@@ -21,6 +21,7 @@ pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
 STICKSLIP = Path(sys.executable).with_name("stickslip")
 # packages of the project, and modules that its packages, joblib and Python import before anything else
+SHORT = "--scenario from-the-start --set duration_s=0.5 --set rig.drive.stiffness_N_per_m=3e5"  # the slide follows its drive
 NAMES = ("bridge", "cockpit", "controller", "diagnosis", "joblib", "json", "numpy", "plant", "scipy", "typing")
 
 
@@ -48,7 +49,7 @@ def call(folder: Path, *arguments: str, status: int = 0, search: Path | None = N
 
 
 def test_a_run_in_a_folder_with_files_of_the_same_names(crowded: Path) -> None:
-    words = f"run --lockstep --scenario from-the-start --set duration_s=0.5 --endpoint {free_endpoint()}"
+    words = f"run --lockstep {SHORT} --endpoint {free_endpoint()}"
     output = call(crowded, *words.split())
     assert "data     whole: 500 blocks" in output
 
@@ -89,8 +90,8 @@ def plain(tmp_path: Path) -> Path:
 
 def test_a_plain_installation_needs_no_extra(tmp_path: Path, plain: Path) -> None:
     lines = [
-        "run --in-process --scenario from-the-start --set duration_s=0.5 --log run.mcap",
-        f"run --lockstep --scenario from-the-start --set duration_s=0.5 --log bus.mcap --endpoint {free_endpoint()}",
+        f"run --in-process {SHORT} --log run.mcap",
+        f"run --lockstep {SHORT} --log bus.mcap --endpoint {free_endpoint()}",
         "replay run.mcap",
         "log info run.mcap",
         "log check run.mcap",

@@ -13,6 +13,7 @@ from cockpit.run.scenario import load_rig, load_scenario
 from cockpit.run.scenario_file import rig_setting
 from controller.config import ControllerConfig, candidate_frequencies_Hz
 from plant.config import RigConfig
+from plant.config_limits import refuse_a_spring_of_another_rig
 
 
 @pytest.mark.parametrize("line", ["mass_kg = 2,0", "slide = { mass_kg = -2,0e-3 }"])
@@ -94,20 +95,23 @@ def test_a_misspelt_key_is_not_reported_as_missing_too() -> None:
             [
                 "forbidden_Hz",
                 "every multiple of 100 Hz",
-                "2516.8 Hz, 2.2 x contact_resonance_Hz",
+                "2516.8 Hz, 2.2 x contact_resonance_Hz = 1144,",
                 "frequency_max_Hz = 5000",
             ],
         ),
         (
-            ["controller.limits.frequency_max_Hz=2550.0"],
+            ["controller.contact_resonance_Hz=2300.0"],
             [
-                "limits.frequency_max_Hz = 2550: no multiple of 100 Hz lies between",
-                "2516.8 Hz, 2.2 x contact_resonance_Hz,",
-                "raise it to 2600 or more",
+                "limits.frequency_max_Hz = 5000: no multiple of 100 Hz lies between",
+                "5060 Hz, 2.2 x contact_resonance_Hz = 2300,",
+                "2300, and it; lower the other value",
             ],
         ),
         (
-            ["controller.limits.frequency_min_Hz=2420.0", "controller.limits.frequency_max_Hz=2490.0"],
+            [
+                "controller.limits.frequency_min_Hz=2420.0",
+                *("controller.limits.frequency_max_Hz=2490.0", "controller.contact_resonance_Hz=0.0"),
+            ],
             ["limits.frequency_max_Hz = 2490", "limits.frequency_min_Hz = 2420", "raise it to 2500 or more"],
         ),
         (
@@ -288,6 +292,15 @@ def test_every_rig_and_scenario_that_comes_along_is_valid() -> None:
         assert load_rig(path.stem, []).name == path.stem
     for path in deploy_folder().glob("scenarios/*.toml"):
         assert load_scenario(path.stem, []).description
+
+
+def test_a_slide_and_a_contact_without_a_stiffness_of_the_drive_are_refused() -> None:
+    """The paper's spring was taken in silence; it stretches by 7.7 mm before a slide of 90 N breaks away."""
+    contact = {"stiffness_N_per_m": 4.5e8, "damping_Ns_per_m": 2.7e5, "coulomb_force_N": 65.0, "static_force_N": 90.0}
+    table = {"contact": contact, "slide": {"mass_kg": 40.0}}
+    with pytest.raises(ValueError, match=r"drive\.stiffness_N_per_m: must be given.*7\.7 mm"):
+        refuse_a_spring_of_another_rig(validate(RigConfig, table, "test"))
+    refuse_a_spring_of_another_rig(validate(RigConfig, table | {"drive": {"stiffness_N_per_m": 1e7}}, "test"))
 
 
 def test_pair_fills_in_missing_values() -> None:

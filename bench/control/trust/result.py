@@ -12,11 +12,13 @@ from bench.control.suite import each, run_one, warm_up
 from bench.control.trust.disturbed import disturbances, disturbed_figures
 from bench.control.trust.never import never_axes, never_figures
 from bench.control.trust.restick import restick_figures, restick_runs
+from bench.control.trust.trials import long_axes, trial_figures
 from bridge.kernel_cache import compile_once
 
-PARTS = ("drawn", "never", "disturbed", "restick")
-# bars of a run, by figure: slips and surges that count, shares of the time of motion, time above 1.5 set points
+PARTS = ("drawn", "never", "disturbed", "restick", "trials")
+# bars of a run, by figure: slips and surges that count, shares of the time of motion, time above 1.5 set points, trials
 _BARS = {"wrong": 0.0, "above_2_v_d_share": 0.02, "excited_share": 0.05, "above_s": 0.2, "false": 0.0}
+_BARS |= {"in_trials_per_600_s": 1.0}
 
 
 class Case(NamedTuple):
@@ -64,7 +66,7 @@ class TrustResult(NamedTuple):
     cases: list[Case]
 
     def in_words(self) -> list[str]:
-        """The figures, then a line for each run with a false report or a figure above its bar."""
+        """The figures, then a line for each run with a false report or a figure above its bar, and for each run with trials."""
         lines: list[str] = []
         for group in self.groups:
             head = f"{group.part}, {group.group}: {group.runs} runs, {group.with_false_reports} with false reports"
@@ -73,14 +75,20 @@ class TrustResult(NamedTuple):
                 texts = f"mean {of.mean:<10.4g}median {of.median:<10.4g}worst {of.worst:<10.4g}total {of.total:<10.4g}"
                 lines.append(f"  {name:<20}{texts}{f'missed in {of.missed}' if name in _BARS else ''}".rstrip())
         missed = [case for case in self.cases if case.missed]
-        return lines + [f"{case.name:<30}{case.group}: {'; '.join(case.missed)}" for case in missed]
+        lines += [f"{case.name:<30}{case.group}: {'; '.join(case.missed)}" for case in missed]
+        trials = [case for case in self.cases if case.part == "trials"]
+        return lines + [
+            f"{case.name:<30}{of['in_trials']} slips and surges in {of['trials']} trials"
+            for case in trials
+            for of in [case.figures]
+        ]
 
 
 def trust(
     seed: int,
     parts: Sequence[str],
-    counts: tuple[int, int],
-    never_s: float,
+    counts: tuple[int, int, int],
+    durations_s: tuple[float, float],
     rule: bool,
     jobs: int,
     progress: Callable[[float, str], None],
@@ -90,8 +98,8 @@ def trust(
     Args:
         seed: seed of the drawn axes and of the axes that never stick.
         parts: names of `PARTS`.
-        counts: numbers of drawn axes, and of axes that never stick.
-        never_s: duration of the runs of axes that never stick.
+        counts: numbers of drawn axes, of axes that never stick, and of drawn axes with trials.
+        durations_s: duration of the runs of axes that never stick, and of those with trials.
         rule: run the rule "1.2 v_d while it moves" too.
         jobs: number of processes.
         progress: called with the share done and a line on the last run.
@@ -99,10 +107,11 @@ def trust(
     """
     subjects = (CONTROLLER, MOVING) if rule else (CONTROLLER,)
     axes = drawn_axes(seed, counts[0]) if "drawn" in parts else []
-    never = never_axes(seed, counts[1], never_s) if "never" in parts else []
+    never = never_axes(seed, counts[1], durations_s[0]) if "never" in parts else []
+    trials = long_axes(seed, counts[2], durations_s[1]) if "trials" in parts else []
     entries = disturbances() if "disturbed" in parts else []
-    if axes:
-        warm_up(axes[0])
+    if bank := [*axes, *never, *trials]:
+        warm_up(bank[0])
     if entries:
         short = entries[0].model_copy(update={"watch_s": 0.05})
         compile_once("the bench of disturbances", lambda: disturbed_figures(short, CONTROLLER))
@@ -111,6 +120,7 @@ def trust(
         *(("never", axis, CONTROLLER) for axis in never),
         *(("disturbed", entry, subject) for entry in entries for subject in subjects),
         *(("restick", run, CONTROLLER) for run in (restick_runs() if "restick" in parts else [])),
+        *(("trials", axis, CONTROLLER) for axis in trials),
     ]
     cases: list[Case] = []
     for case in each(_run, plan, jobs):
@@ -136,6 +146,8 @@ def _run(part: str, run: Any, rule: int) -> Case:
     elif part == "disturbed":
         figures, reports = disturbed_figures(run, rule)
         group += f", {run.about}"
+    elif part == "trials":
+        figures, group = trial_figures(run), "drawn"
     else:
         figures, group = restick_figures(run), run.family if run.family == "false" else run.name
     return Case(part, group, run.name, figures, reports, time.process_time() - started_s)

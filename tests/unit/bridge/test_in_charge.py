@@ -22,7 +22,7 @@ DIED = 300  # block after which the controller is gone
 @pytest.fixture(scope="module")
 def long_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("long") / "run.mcap"
-    run_onboard(load_scenario("from-the-start", ["duration_s=2.0"]), path, {})
+    run_onboard(load_scenario("from-the-start", ["duration_s=2.0", "rig.drive.stiffness_N_per_m=3e5"]), path, {})
     return path
 
 

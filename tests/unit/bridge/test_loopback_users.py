@@ -124,6 +124,7 @@ def test_a_missing_file_is_named_while_a_process_listens(place: Path) -> None:
     with socket.create_server(("127.0.0.1", BusConfig(endpoint=endpoint).port)):
         assert not is_free(endpoint)
         assert f"{loopback_users.file_name(endpoint)} is in none of {place.parent}" in loopback_users.absence(endpoint)
+        assert loopback_users.absence(endpoint.replace("tcp/", "tls/")) == ""
         loopback_users.make(endpoint)
         assert loopback_users.absence(endpoint) == ""
 

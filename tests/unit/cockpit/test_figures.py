@@ -149,13 +149,15 @@ def test_measured_data_of_another_program_are_judged_and_drawn(tmp_path: Path) -
 def test_slips_while_the_controller_takes_over_are_in_the_headline(log: Path) -> None:
     verdict = judge(log)
     assert verdict.before is not None
-    before = verdict.before._replace(slips=5)
+    before = verdict.before._replace(slips=5, slips_went_on=True)
     made = verdict._replace(
         untested="", before=before, taking_over=before._replace(slips=1), after=before._replace(slips=0)
     )
     assert headline(made) == "stick-slip is gone: 5 slips before, 1 while the controller took over, none after"
     assert "settling 1 slip in the first 0.4 s after hand-over" in "\n".join(in_words(made, verbose=True))
     assert "none with the controller in charge" in headline(made._replace(taking_over=None))
+    ended = made._replace(before=before._replace(slips_went_on=False))
+    assert headline(ended) == "no stick-slip with the controller in charge; the 5 slips before had ended without it"
 
 
 def test_every_slip_of_a_run_is_in_one_part_of_the_verdict(tmp_path: Path) -> None:

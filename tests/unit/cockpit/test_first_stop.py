@@ -82,7 +82,8 @@ def test_a_stop_that_no_rig_confirms_is_a_fault(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr("cockpit.live.operator.BY_FILE_S", 0.0)
     first_stop.stop_by_file(["stop"])
     with pytest.raises(
-        Fault, match=r"cut its amplifier; the stop file of the rig is set, but the rig did not confirm it"
+        Fault,
+        match=r"cut its amplifier; the stop file of the rig is set, but the rig did not confirm it: if it starts, it is in FAULT",
     ):
         stop_rig(no_bus, first_stop.ordered)
     first_stop.ordered[0].problem = "No space left on device"

@@ -1,6 +1,9 @@
 """`--json`: one rule for every command about its file and about the output to stdout and stderr."""
 
+import ast
+import inspect
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,11 +13,16 @@ import typer
 from typer.testing import CliRunner
 
 from bridge.faults import FAULTS
+from bridge.log import in_charge
 from bridge.log.finding import Finding
 from bridge.results import strict_json
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.event_codes import EVENTS
+from bridge.wire.words import words
+from cockpit import judge
 from cockpit.cli import app
 from cockpit.commands.as_json.option import with_places
+from cockpit.judge.finding_codes import FINDINGS
 from tests.logs import short_log
 
 pytestmark = pytest.mark.slow
@@ -230,6 +238,18 @@ def test_explain_knows_every_word_of_a_log() -> None:
     assert output.startswith(
         "reason 10  PIEZO_WEAK      until schema 2: v_a stays below 1.05 v_d with the amplitude at its limit"
     )
+
+
+def test_explain_knows_every_word_in_capitals_of_a_verdict() -> None:
+    texts = [file.read_text() for file in Path(judge.__path__[0]).glob("*.py")]
+    for text in [*texts, inspect.getsource(in_charge)]:
+        nodes = [*ast.walk(ast.parse(text))]
+        documentation = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
+        used = {node.value for node in nodes if isinstance(node, ast.Constant) and id(node) not in documentation}
+        codes = {code for value in used if isinstance(value, str) for code in re.findall(r"\b[A-Z_]{4,}\b", value)}
+        assert codes <= {*FINDINGS, *EVENTS, *FAULTS, *(word.word for word in words())}
+    for code in FINDINGS:
+        assert f"finding  {code}" in call("explain", code.lower()).stdout
 
 
 def test_a_named_tuple_becomes_an_object_and_a_not_finite_number_null() -> None:

@@ -74,7 +74,12 @@ def test_following_error_of_a_stretch() -> None:
     swing_m = np.where(np.arange(4000) % 2 == 0, 1e-5, -1e-5)
     error_m = np.where(T_S <= 2.0, 5e-5, -4e-5 + swing_m)
     motion = BlockMotion(
-        T_S, error_m, direction, np.full(4000, 4e-9), reversals_of(T_S, -error_m, 0.0 * T_S, direction)
+        T_S,
+        error_m,
+        direction,
+        np.full(4000, 4e-9),
+        reversals_of(T_S, -error_m, 0.0 * T_S, direction),
+        np.arange(4000) % 4 == 0,
     )
     back, _ = following(motion, 2.0)
     assert back is not None
@@ -82,6 +87,7 @@ def test_following_error_of_a_stretch() -> None:
     assert back.error_peak_m == pytest.approx(5e-5)
     assert back.error_rms_m == pytest.approx(np.sqrt((3e-5**2 + 5e-5**2) / 2))
     assert back.error_ripple_m == pytest.approx(1e-5)
+    assert back.following_s == pytest.approx(0.5)
     whole, _ = following(motion, 0.0)
     assert whole is not None
     assert whole.error_ripple_m == pytest.approx(1e-5 / np.sqrt(2.0))  # about the mean of each direction
@@ -93,11 +99,12 @@ def test_pieces_of_a_stretch_are_the_stretch() -> None:
     """A ripple of 1 nm on an error of 10 mm, whose squares alone would lose it."""
     direction = np.where(np.arange(4000) % 1000 < 700, 1, -1)
     error_m = 0.01 * direction + 1e-9 * np.sin(np.arange(4000.0))
-    whole = BlockMotion(T_S, error_m, direction, 0.0 * T_S, [])
+    follows = error_m > 0.0
+    whole = BlockMotion(T_S, error_m, direction, 0.0 * T_S, [], follows)
     pieces = FollowingSum()
     for part in np.split(np.arange(4000), [3, 900, 901, 3100]):
         pieces.add(
-            BlockMotion(T_S[part], error_m[part], direction[part], 0.0 * T_S[part], []),
+            BlockMotion(T_S[part], error_m[part], direction[part], 0.0 * T_S[part], [], follows[part]),
             lambda t_s: np.ones(len(t_s), bool),
         )
     terms, expected = pieces.result(1e-3), following(whole, 0.0)[0]
@@ -110,7 +117,8 @@ def test_pieces_of_a_stretch_are_the_stretch() -> None:
 def test_the_lines_of_a_stretch_compared_with_another() -> None:
     slide_m, drive_m = made_turn()
     direction = np.where(T_S < 2.0, 1, -1)
-    motion = BlockMotion(T_S, drive_m - slide_m, direction, 0.0 * T_S, reversals_of(T_S, slide_m, drive_m, direction))
+    reversals = reversals_of(T_S, slide_m, drive_m, direction)
+    motion = BlockMotion(T_S, drive_m - slide_m, direction, 0.0 * T_S, reversals, direction > 0)
     terms, _ = following(motion, 0.0)
     assert terms is not None
     error, reversal = following_in_words(terms, terms, "before")

@@ -15,7 +15,7 @@ from bridge.wire.inbox import Received
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import APPLIED, OPERATOR, PLANT_EVENT, Topic
 from bridge.wire.words import words
-from bridge.wire.zenoh_link import Bus, BusConfig, is_frozen
+from bridge.wire.zenoh_link import Bus, BusConfig, reads
 from cockpit.live import operator, status
 from cockpit.run.authority import make_certificates
 from tests.system.ports import free_endpoint
@@ -199,11 +199,22 @@ def test_where_no_rig_answers_a_certificate_the_authority_is_asked_about(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(operator, "_DIAL_S", 0.2)
-    make_certificates(tmp_path, [])
-    config = BusConfig(endpoint=free_endpoint().replace("tcp/", "tls/"), certificates=str(tmp_path))
-    for ask in (lambda: operator.send_command(config, "ARM"), lambda: status.look(config)):
-        with pytest.raises(Fault, match=r"no rig answered .*the authority of --certs must be those"):
-            ask()
+    for name in ("own", "other"):
+        make_certificates(tmp_path / name, [])
+    endpoint = free_endpoint().replace("tcp/", "tls/")
+    config, other = (BusConfig(endpoint=endpoint, certificates=str(tmp_path / name)) for name in ("own", "other"))
+
+    def refusals() -> list[str]:
+        lines: list[str] = []
+        for ask in (lambda: operator.send_command(config, "ARM"), lambda: status.look(config)):
+            with pytest.raises(Fault, match=r"no rig answered .*the authority of --certs must be those") as raised:
+                ask()
+            lines.append(raised.value.line)
+        return lines
+
+    assert not any("REFUSED" in line for line in refusals())
+    with Bus(other, "plant", lockstep=False):
+        assert all("it refused this session" in line and ".users" not in line for line in refusals())
 
 
 def test_a_rig_that_cannot_listen_reports_the_reason() -> None:
@@ -226,9 +237,9 @@ def test_the_help_of_a_mode_does_not_name_a_reason_that_is_not_there() -> None:
 @pytest.mark.slow
 def test_a_process_that_listens_and_does_not_read_is_frozen(monkeypatch: pytest.MonkeyPatch) -> None:
     config = BusConfig(endpoint=free_endpoint())
-    assert not is_frozen(config)
+    assert reads(config) is None
     with socket.create_server(("127.0.0.1", config.port)):
-        assert is_frozen(config)
+        assert reads(config) is False
         monkeypatch.setattr(operator, "_DIAL_S", 0.2)
         with pytest.raises(
             Fault, match=r"STOP NOT DELIVERED: .* does not answer .*: must run; assume that the exciter still vibrates"
@@ -243,7 +254,7 @@ def test_a_missing_password_is_named_instead_of_a_missing_rig(
 ) -> None:
     for name in ("XDG_RUNTIME_DIR", "XDG_CACHE_HOME", "TMPDIR"):
         monkeypatch.setenv(name, str(tmp_path))
-    monkeypatch.setattr("cockpit.live.listener.is_frozen", lambda _config: False)
+    monkeypatch.setattr("cockpit.live.listener.reads", lambda _config: True)
     monkeypatch.setattr(operator, "_DIAL_S", 0.1)
     config = BusConfig(endpoint=free_endpoint())
     with (

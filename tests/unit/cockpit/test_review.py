@@ -147,6 +147,7 @@ def test_the_answer_explains_why_a_run_without_a_slip_is_not_good(tmp_path: Path
         mean_force_N=0.0,
         following=None,
         vibration_dose_mm2_per_s=0.0,
+        slips_went_on=False,
     )
     verdict = judge(cut)._replace(after=still, untested="", alone=None)
     assert headline(verdict) == "not judged: the log ends at 0.32 s, the run was to end at 0.40 s"

@@ -20,6 +20,11 @@ HEAVY = [
 BLIND = {
     "force range below F_s": [*HEAVY, "rig.sensors.force_range_N=50.0"],
     "force range below F_s with effects": ["rig.effects.static-level.ratio=2.0"],
+    "force range below the overshoot at break-away": [
+        *HEAVY,
+        "rig.sensors.force_range_N=245.0",
+        "rig.drive.profile=[[0, 0.002]]",
+    ],
     "force range below the viscous force": ["rig.contact.viscous_damping_Ns_per_m=1e5"],
     "force of one sign, drive of two": [*TO_AND_FRO, "rig.sensors.force_lowest_N=0.0"],
     "force backwards too small": [*TO_AND_FRO, "rig.sensors.force_lowest_N=-10.0"],
@@ -134,7 +139,7 @@ def _refusal(scenario: str, settings: list[str]) -> str:
 def test_a_refusal_names_the_value_the_need_and_the_end() -> None:
     with pytest.raises(Fault) as caught:
         load_scenario("belt-axis", ["rig.sensors.force_range_N=50"])
-    line = "rig.sensors.force_range_N = 50: the drive pulls with 60 N, this sensor ends at 50 N; set it to 75"
+    line = "rig.sensors.force_range_N = 50: the drive pulls with 60.41 N, this sensor ends at 50 N; set it to 76"
     assert caught.value.line.endswith(line)
 
 

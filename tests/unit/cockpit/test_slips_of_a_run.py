@@ -94,6 +94,25 @@ def test_a_place_that_froze_hides_no_slip(tmp_path: Path) -> None:
     assert cycles.slips == 10
 
 
+def test_noise_of_the_positions_makes_no_slip_of_a_slow_fall_on_a_stiff_spring(tmp_path: Path) -> None:
+    """The slide outruns its drive by less than its noise: half of such falls were slips."""
+    run = made_run(tmp_path, SPEED_MPS * T_S, np.full(8000, 2e-5))
+    sensors = run.sensors.copy()
+    shape = sensors["drive_force_N"].shape
+    sensors["drive_force_N"] = (65.0 + 2.5 * np.sin(2.0 * np.pi * T_S / 0.04)).reshape(shape)
+    sensors["mass_position_m"] += 5e-7 * np.random.default_rng(1).standard_normal(shape)
+    cycles = cycles_of(run._replace(sensors=sensors))
+    assert cycles is not None
+    assert cycles.slips == 0
+
+
+@pytest.mark.parametrize(("until_s", "went_on"), [(0.1, False), (0.4, True)])
+def test_slips_that_ended_do_not_go_on(tmp_path: Path, until_s: float, went_on: bool) -> None:
+    before = verdict_of(made_run(tmp_path, SPEED_MPS * T_S, sawtooth_m(np.minimum(T_S, until_s)))).before
+    assert before is not None
+    assert (before.slips > 1, before.slips_went_on) == (True, went_on)
+
+
 @pytest.mark.parametrize(
     ("profile", "why"),
     [

@@ -15,6 +15,8 @@ from cockpit.run.replay import outcome
 from cockpit.run.scenario import load_scenario
 from tests.logs import doctored, short_log, verdict_of
 
+STIFF = "rig.drive.stiffness_N_per_m=1e5"  # the slide breaks away within 0.4 s, on the paper's spring after 3 s
+
 
 def test_a_log_that_begins_late_counts_from_its_first_block(tmp_path: Path) -> None:
     def begin_late(tables):
@@ -27,6 +29,18 @@ def test_a_log_that_begins_late_counts_from_its_first_block(tmp_path: Path) -> N
     assert verdict.before.seconds == pytest.approx(0.25)
     assert any("per minute of this phase)" in line for line in in_words(verdict, verbose=False))
     assert (verdict.lost_blocks, verdict.lost_messages) == (0, 0)
+
+
+def test_a_run_that_begins_stopped_names_the_reset(tmp_path: Path) -> None:
+    def stopped(tables):
+        tables["applied"]["guard_state"], tables["applied"]["cause"] = wire.FAULT, wire.STOP_KEPT
+        tables["trace"]["mode"], tables["trace"]["reason"] = wire.DISABLED, wire.NOT_ARMED
+
+    reason = verdict_of(read_run(doctored(tmp_path, stopped))).reason
+    assert (
+        reason
+        == "the rig was never armed, in FAULT by STOP_KEPT: `stickslip reset` when it is safe, then `stickslip arm`"
+    )
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
@@ -81,7 +95,7 @@ def test_a_slip_of_a_heavy_slide_is_slow_and_counts(tmp_path: Path) -> None:
 @pytest.mark.parametrize("code", ["STALE", "DROPPED", "GAP"])
 def test_a_stall_or_a_gap_in_the_log_is_a_warning_and_changes_no_status(tmp_path: Path, code: str) -> None:
     log = tmp_path / "run.mcap"
-    run_onboard(load_scenario("from-the-start", ["duration_s=1.0"]), log, {})
+    run_onboard(load_scenario("from-the-start", ["duration_s=1.0", STIFF]), log, {})
     run = read_run(log)
     event = wire.Event(sequence=1, t_ns=5, source="controller", code=code, text="for 24 ms")
     verdict = verdict_of(run._replace(events=[*run.events, event]))
@@ -108,6 +122,11 @@ def test_a_drive_beyond_the_end_of_its_transducer_is_not_ok(tmp_path: Path) -> N
     ("settings", "expected"),
     [
         (["rig.drive.profile=[[0.0, 0.0]]"], "the drive never moved: nothing was tested"),
+        (
+            [],
+            "not judged: the slide followed its drive for 0 of 0.49 s with the controller in charge: make the run longer, or "
+            "correct the stiffness of the drive",
+        ),
         (["controller.policy.enabled_from_s=100.0"], "ended before the controller was enabled (at 100.0 s)"),
         (
             ["controller.policy.enabled_from_s=0.1"],
@@ -132,7 +151,7 @@ def test_the_headline_reports_that_nothing_was_tested(tmp_path: Path, settings: 
 )
 def test_a_log_with_nothing_to_judge_is_not_good(tmp_path: Path, topic: str, rows: int, expected: str) -> None:
     log = tmp_path / "run.mcap"
-    run_onboard(load_scenario("from-the-start", ["duration_s=0.5"]), log, {})
+    run_onboard(load_scenario("from-the-start", ["duration_s=0.5", STIFF]), log, {})
     run = read_run(log)
     assert verdict_of(run).good
     verdict = verdict_of(run._replace(**{topic: getattr(run, topic)[:rows]}))

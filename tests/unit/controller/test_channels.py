@@ -24,25 +24,31 @@ N = np.arange(SAMPLES)
 class Ear:
     """A controller's memory, and blocks in noise that it conditions."""
 
-    def __init__(self, **estimator: Any) -> None:
-        params, state = build(validate(ControllerConfig, {"estimator": estimator}, "test"))
+    def __init__(self, seed: int = 7, samples: int = SAMPLES, blocks: int = 50, **estimator: Any) -> None:
+        table = {"estimator": estimator, "samples_per_block": samples, "block_s": 5e-5 * samples}
+        params, state = build(validate(ControllerConfig, table, "test"))
         self.p, self.s = params[0], state[0]
-        self.random = np.random.default_rng(7)
-        self.block = sensor_block(SAMPLES).blank()[0]
-        for _ in range(50):
+        self.random = np.random.default_rng(seed)
+        self.block = sensor_block(samples).blank()[0]
+        for _ in range(blocks):
             assert self.look()
 
     def look(self, **more: npt.NDArray[np.float64] | float) -> bool:
         """Condition a block of noise, with `more` added to its channels."""
         for channel, rms in NOISE.items():
-            self.block[channel] = 10.0 * rms + rms * self.random.standard_normal(SAMPLES) + more.get(channel, 0.0)
+            self.block[channel] = (
+                10.0 * rms + rms * self.random.standard_normal(len(self.block[channel])) + more.get(channel, 0.0)
+            )
         return self.again()
 
     def again(self) -> bool:
         usable = bool(is_usable(self.p, self.s, self.block))
         if usable:
-            bin_means(self.p, self.s, self.block, 0, BINS)
-            self.s.pushed[0] += BINS
+            samples, bin_samples = len(self.block["drive_force_N"]), int(self.p["bin_samples"])
+            for first in range(0, samples, BINS * bin_samples):
+                bins = min(BINS, (samples - first) // bin_samples)
+                bin_means(self.p, self.s, self.block, first, bins)
+                self.s.pushed[0] += bins
             watch_channels(self.p, self.s)
         return usable
 
@@ -127,6 +133,17 @@ def test_noise_of_the_drive_that_grows_counts_in_all_windows_and_is_reported(ear
     assert ear.s.noise[DRIVE, :10].min() > 8e-6
     assert ear.s.usual[DRIVE] > 1e-5
     assert ear.s.doubted == 0
+
+
+@pytest.mark.parametrize("samples", [6, SAMPLES, 100])
+def test_white_noise_neither_grows_nor_steps_as_a_rig_starts(samples: int) -> None:
+    for seed in range(30):
+        ear = Ear(seed, samples, blocks=0)
+        for _ in range(2000 // samples):
+            ear.look()
+            assert ear.s.grown_s == 0.0
+        assert ear.s.jumps == 0.0
+        assert ear.s.offset_m == 0.0
 
 
 @pytest.mark.parametrize("channel", ["drive_force_N", "mass_position_m", "base_accel_mps2"])

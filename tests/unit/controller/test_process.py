@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import Callable
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -17,8 +18,8 @@ from bridge.wire.inbox import WAITING
 from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
 from bridge.wire.messages import sensor_block
 from bridge.wire.topics import ANNOUNCE, COMMAND, CONTROLLER_EVENT, OPERATOR, PLANT_EVENT, SENSORS, Topic
-from bridge.wire.zenoh_link import Received
-from controller.app import ControllerProcess
+from bridge.wire.zenoh_link import BusConfig, Received
+from controller.app import ControllerProcess, run
 from controller.config import ControllerConfig
 from controller.node import ControllerNode
 from tests.patience import PATIENCE_S
@@ -332,6 +333,21 @@ def test_a_rig_that_leaves_without_an_end_is_reported_and_waited_for(link_cut: b
     thread.join(JOIN_S)
     codes = bus.codes()
     assert codes[:6] == ["START", "STALE", "RIG_LOST", "RIG_RESTARTED", "RIG_BACK", "FRESH"]
+
+
+def test_a_controller_of_another_rig_says_so_at_its_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    bus = MagicMock()
+    bus.__enter__.return_value, bus.claim.return_value, bus.alive.return_value = bus, ("", set), False
+    bus.headers.return_value = {"plant": wire.Header(role="plant", schema_version=3, configuration="{}", rig="lathe")}
+    monkeypatch.setattr("controller.app.Bus", lambda *_: bus)
+    monkeypatch.setattr(realtime, "claim", lambda *_: "")
+    stop, lines = threading.Event(), list[str]()
+    stop.set()
+    for rig in ("lathe", "mill"):
+        run(CONFIG, BusConfig(), wire.Header(rig=rig), False, stop, lambda *line: lines.append(" ".join(line)))
+    assert [line.partition(";")[0] for line in lines if line.startswith("warning")] == [
+        "warning controller: its scenario describes the rig mill, but the rig is lathe"
+    ]
 
 
 def test_another_rig_in_the_place_of_the_first_is_refused() -> None:

@@ -36,6 +36,7 @@ def test_limits_that_are_not_given_are_those_of_the_rig() -> None:
     params = build(taken)[0][0]
     assert params["bands"] == 2
     assert params["band_Hz"][:2].tolist() == [[3000.0, 3100.0], [4600.0, 5000.0]]
+    assert for_rig(header(), config(velocity_max_mps=2e-2)).limits.velocity_max_mps == 2e-2  # this rig states none
     assert for_rig(header(amplitude_max_m=4e-8), taken).limits.amplitude_max_m == 4e-8  # it is still not a given one
 
 
@@ -43,6 +44,11 @@ def test_limits_that_are_not_given_are_those_of_the_rig() -> None:
     ("given", "stated", "words"),
     [
         ({"amplitude_max_m": 1e-7}, {}, "limits.amplitude_max_m = 1e-07: must be at most 5e-08, the limit of the rig"),
+        (
+            {"velocity_max_mps": 2e-3},
+            {"velocity_max_mps": 1e-3},
+            "limits.velocity_max_mps = 0.002: must be at most 0.001",
+        ),
         ({"frequency_min_Hz": 500.0}, {}, "limits.frequency_min_Hz = 500: must be at least 600, the limit of the rig"),
         ({}, {"amplitude_max_m": -1.0}, "header/plant: limits.amplitude_max_m = -1.0: Input should be greater than 0"),
         ({}, {"slew_m_per_s": "fast"}, "header/plant: limits.slew_m_per_s = 'fast': Input should be a valid number"),

@@ -34,6 +34,17 @@ def test_a_trip_and_its_end_are_reported_once() -> None:
     assert reported[0][1].startswith("failure: v_a fell by more than amplitude.gain_band")
 
 
+def test_trips_that_alternate_do_not_flood_the_log_and_count_until_they_are_cleared() -> None:
+    flicker = [wire.TRAVEL_END, wire.HELD, wire.NOISE, wire.HELD] * 1000
+    codes = [code for code, _ in events_of([*flicker, wire.TRAVEL_END], [wire.NO_LIMIT] * 4001)]
+    assert codes[:4] == ["TRAVEL_END", "CLEARED", "NOISE", "TRAVEL_END"]
+    assert codes.count("CLEARED") == 4
+    assert len(codes) <= 3 * codes.count("CLEARED") + 2
+    assert codes[-1] == "TRAVEL_END"
+    ended = [*flicker, wire.TRAVEL_END, *[wire.HELD] * 1000]  # an end within a second of the last is reported after it
+    assert [code for code, _ in events_of(ended, [wire.NO_LIMIT] * len(ended))] == [*codes, "CLEARED"]
+
+
 def test_the_end_of_the_exciter_is_reported_with_its_limit() -> None:
     (reported,) = events_of([wire.STICK_SEEN] * 5 + [wire.EXCITER_END] * 250, [wire.RANGE] * 255)
     assert reported[0] == "EXCITER_END"

@@ -37,6 +37,13 @@ def test_every_slip_is_found_once_with_its_forces(rate_Hz, high_N, low_N, noise_
     assert cycles.stick_s == pytest.approx(1.0 - FALL_S, abs=0.012 + 2 * moved_s)
 
 
+def test_fast_slips_are_not_taken_for_noise():
+    """Slips at 155 Hz, as on a stiff axis of 40 kg: falls below 370 N were noise."""
+    t_s = np.arange(40000) / 20000.0
+    force_N = 65.0 + 40.0 * np.sin(2.0 * np.pi * 155.0 * t_s) + 0.02 * np.random.default_rng(1).standard_normal(40000)
+    assert find_cycles(t_s, force_N).slips == pytest.approx(310, abs=1)
+
+
 @pytest.mark.parametrize("rate_Hz", [100, 20000])
 @pytest.mark.parametrize("level_N", [1.0, 15.0, 50.0])
 def test_noise_alone_counts_as_no_slip(rate_Hz, level_N):

@@ -1,6 +1,8 @@
 """Effects of each kind of fault on samples, exciter numbers, times and messages in transit."""
 
 import math
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +15,7 @@ from bridge.wire.channels import CHANNELS
 from bridge.wire.messages import sensor_block
 from plant.config import RigConfig
 from plant.faults.exciter import FIELDS
-from plant.faults.kinds import KINDS, SENSORS
+from plant.faults.kinds import KINDS, SENSORS, group_of
 from plant.faults.line import Message
 from plant.faults.schedule import BEGAN, ENDED, Faults
 from plant.faults.table import FaultTable
@@ -290,6 +292,15 @@ def test_an_invalid_table_is_refused_with_the_reason(given: dict[str, Any], line
     with pytest.raises(Fault, match="CONFIG") as reported:
         validate(FaultTable, given, "scenario.toml")
     assert f"scenario.toml: {line}" in reported.value.line
+
+
+def test_the_guide_lists_every_kind() -> None:
+    guide = (Path(__file__).parents[3] / "docs/guides/inject-faults.md").read_text()
+    rows = [re.findall(r"`([\w-]+)`", line) for line in guide.partition("| kinds |")[2].split("\n\n")[0].splitlines()]
+    listed = {
+        (group_of(target), kind) for target, *rest in filter(None, rows) for kind in rest if group_of(kind) is None
+    }
+    assert listed == {*KINDS}
 
 
 def test_every_kind_of_a_sensor_is_made() -> None:

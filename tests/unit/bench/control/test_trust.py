@@ -14,11 +14,13 @@ from bench.control.run import Subject, judge, wrong_from
 from bench.control.trust.disturbed import disturbances
 from bench.control.trust.never import never_axes
 from bench.control.trust.reports import Reports
+from bench.control.trust.trials import long_axes
 from bench.schemas import FORMATS
 from bridge.faults import FAULTS
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import APPLIED, TRACE
 from cockpit.run.closed_loop import Stretch
+from cockpit.run.sensor_needs import refuse_out_of_travel
 
 
 @pytest.mark.slow
@@ -58,6 +60,17 @@ def test_axes_that_never_stick_move_smoothly_without_vibration() -> None:
         judged = judge(axis, Subject(NONE))
         assert not wrong_from(judged.events, 10.0).any(), axis.name
         assert np.abs(judged.coarse.rows[:, 2]).max() == pytest.approx(max(axis.rig.drive.speeds_mps()), rel=0.05)
+
+
+@pytest.mark.slow
+def test_trials_are_counted_on_axes_whose_sensors_reach_the_end_of_the_run() -> None:
+    for axis in long_axes(2, 4, 600.0):
+        refuse_out_of_travel(axis.rig, axis.duration_s)
+    result = CliRunner().invoke(app, ["trust", "--only", "trials", "--trials", "1", "--trials-s", "20", "--jobs", "1"])
+    assert result.exit_code == 0
+    assert "in_trials_per_600_s" in result.stdout
+    assert result.stdout.splitlines()[-1].startswith("axis-01")
+    assert "slips and surges in 0 trials" in result.stdout
 
 
 def test_disturbances_hold_lengths_and_patterns() -> None:

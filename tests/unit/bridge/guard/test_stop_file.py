@@ -107,15 +107,18 @@ def test_a_stop_that_cannot_be_set_is_reported(monkeypatch: pytest.MonkeyPatch) 
     assert not confirmed([stop], 0.0)
 
 
-def test_a_rig_that_starts_removes_the_files_of_ended_rigs_at_its_port(folder: Path) -> None:
+@pytest.mark.parametrize(("name", "endpoint"), [("mill", HERE), ("lathe", "tcp/127.0.0.1:7448")])
+def test_a_rig_that_starts_removes_the_files_of_ended_rigs_of_its_port_or_name(
+    name: str, endpoint: str, folder: Path
+) -> None:
     ended = started("lathe")
     child = subprocess.Popen([sys.executable, "-S", "-c", ""])
     child.wait()
     ended.path.write_text(ended.path.read_text().replace(f'"process": {os.getpid()}', f'"process": {child.pid}'))
     (folder / "rig-damaged.json").write_text("[1")
     (folder / "rig-other.json").write_text('{"latch": 1, "endpoint": "", "process": 1}')
-    started("mill")
-    assert stopped(HERE) == ["mill"]
+    started(name, endpoint)
+    assert (stopped(endpoint), ended.exists) == ([name], False)
 
 
 def test_a_rig_sees_a_running_rig_of_its_name_and_no_ended_one() -> None:

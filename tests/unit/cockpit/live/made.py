@@ -25,7 +25,7 @@ class Rig(Source):
 
     def __init__(self) -> None:
         rig = {"name": "lathe", "piezo": {"amplitude_max_m": 1e-7}}
-        super().__init__(Inbox(1 << 14), HERE, {"plant": {"rig": rig}})
+        super().__init__(Inbox(1 << 14), HERE, {"plant": {"rig": rig}}, {"plant": "lathe", "controller": "lathe"})
         self.now_s = 100.0
 
     def clock(self) -> float:

@@ -40,6 +40,16 @@ def test_a_live_rig_is_described_in_words(rig: Rig) -> None:
         assert part in words, words
 
 
+def test_a_controller_of_another_rig_is_a_warning(rig: Rig) -> None:
+    view = View(rig, "tcp/127.0.0.1:7447", rig.clock)
+    assert not any(line.startswith("warning") for line in frame_lines(view.now(), []))
+    rig.rigs["controller"] = "mill"
+    line = (
+        "warning  controller: its scenario describes the rig mill, but the rig is lathe; start `stickslip controller`"
+    )
+    assert any(words.startswith(line) for words in frame_lines(view.now(), []))
+
+
 def test_an_idle_rig_has_dashes_and_no_vibration(rig: Rig) -> None:
     view = View(rig, "tcp/127.0.0.1:7447", rig.clock)
     for number in range(30):

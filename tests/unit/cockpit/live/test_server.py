@@ -4,6 +4,7 @@ import asyncio
 import socket
 import stat
 import threading
+import time
 from collections.abc import Generator
 from typing import Any
 
@@ -301,6 +302,18 @@ def test_a_slow_reader_is_dropped_and_the_others_go_on(monkeypatch: pytest.Monke
 
     asyncio.run(look())
     assert aborted == ["slow"]
+
+
+@pytest.mark.slow
+def test_a_missing_password_is_printed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr("cockpit.live.listener.absence", "no password for {}".format)
+    made = Server(BusConfig(endpoint=free_endpoint()), TOKEN, 0)
+    with made._listener:
+        until_s = time.monotonic() + PATIENCE_S
+        while not made._trouble and time.monotonic() < until_s:
+            made._tick()
+    assert made._view.now()["answer"]["text"].startswith("no password for tcp/")
+    assert capsys.readouterr().err.startswith("warning  no password for tcp/")
 
 
 def test_the_token_is_in_a_file_of_this_user_alone(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
