@@ -107,6 +107,14 @@ def roughness_of(problem: Problem, drawn: Floats) -> Roughness:
 
     `drawn` [replicates, features] are features of the model on surfaces of `ROUGHNESS`.
     """
+    times = times_rougher(problem, drawn)
+    if times is None:
+        return ROUGHNESS
+    return ROUGHNESS._replace(ratio=min(max(_MARGIN * ROUGHNESS.ratio * times, _SMOOTHEST), _ROUGHEST))
+
+
+def times_rougher(problem: Problem, drawn: Floats) -> float | None:
+    """Scatter of the slips over the scatter on surfaces of `ROUGHNESS`, drawn towards 1; None where no scatter is known."""
     segments = {run.file: run.commands.segments for run in problem.runs}
     slips = squares = 0.0
     for i, (file, label) in enumerate(problem.labels):
@@ -118,6 +126,5 @@ def roughness_of(problem: Problem, drawn: Floats) -> Roughness:
             slips += count
             squares += count * problem.measured[i] / float(known.mean())
     if squares == 0.0:
-        return ROUGHNESS
-    ratio = _MARGIN * ROUGHNESS.ratio * math.sqrt(squares / slips) ** (slips / (slips + _SLIPS_OF_OTHERS))
-    return ROUGHNESS._replace(ratio=min(max(ratio, _SMOOTHEST), _ROUGHEST))
+        return None
+    return math.sqrt(squares / slips) ** (slips / (slips + _SLIPS_OF_OTHERS))

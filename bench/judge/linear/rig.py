@@ -4,11 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bench.judge.linear.surface import FIRST, surface_of
+from bench.judge.linear.surface import surface_of
 from bridge.faults import Fault
 from diagnosis.fits.batch import together
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
+from diagnosis.fits.retuning import ROUGHNESS
 from diagnosis.gap.measure import floor_of, replicates
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.hypothesis import NOTHING
@@ -32,7 +33,7 @@ def fitted_rig(problem: Problem) -> Rig:
     nuisances = Nuisances(problem.rig)
     described = np.zeros(len(nuisances))
     point = nuisances.point(described, {})
-    drawn = replicates(problem, point, FIRST, _FIRST, 1)
+    drawn = replicates(problem, point, ROUGHNESS, _FIRST, 1)
     floor = floor_of(problem, point, drawn)
     if not floor.compared.any():
         line = "the rig as described shows none of the measured features: check the friction and the stiffness of [rig]"

@@ -1,30 +1,29 @@
 """How rough the surface is, and over which length: from the scatter of the friction, less the share that a wave explains."""
 
 import math
-from typing import Final
 
 import numpy as np
 
 from bridge.arrays import Floats
 from diagnosis.features.force_drive import friction_share
 from diagnosis.features.grid import BLOCK_S
+from diagnosis.fits.retuning import ROUGHNESS, times_rougher
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.waves import WaveSeries, fitted, friction_series, strongest_waves
 from diagnosis.model.rig import Roughness
 
-FIRST: Final = Roughness(0.003, 1.5e-4, 0)  # surface of the first replicates, to which the scatter is compared
 _SMOOTHEST, _ROUGHEST = 1e-3, 0.15  # relative; of surfaces from polished to rubber on concrete
-_SLIPS_OF_OTHERS = 8.0  # weight of the usual roughness, in slips
 _FREEDOM = 5.0  # of a wave: sine, cosine, period and the choice among the periods
 _RELATED = 0.2  # correlation of neighbours below which the length is shorter than their distance
 _EVERY = 20  # blocks from one value of an axis to the next
 
 
 def surface_of(problem: Problem, drawn: Floats) -> Roughness:
-    """The surface; `drawn` [replicates, features] are features of the model on surfaces of `FIRST`."""
+    """The surface; `drawn` [replicates, features] are features of the model on surfaces of `ROUGHNESS`."""
     series = {over: _series(problem, over) for over in ("position", "time")}
     left = min(_left_by_waves(part) for part in series.values())
-    ratio = _of_axis(series["position"]) if problem.rig.drive == "force" else _of_slips(problem, drawn)
+    by_slips = ROUGHNESS.ratio * (times_rougher(problem, drawn) or 1.0)
+    ratio = _of_axis(series["position"]) if problem.rig.drive == "force" else by_slips
     ratio = min(max(math.sqrt(left) * ratio, _SMOOTHEST), _ROUGHEST)
     return Roughness(ratio, _length_m(series["position"]), 0)
 
@@ -41,23 +40,6 @@ def _series(problem: Problem, over: str) -> list[WaveSeries]:
         at = motion.position_m if over == "position" else np.arange(len(share)) * BLOCK_S
         series.append(WaveSeries(at[valid][::_EVERY], share[valid][::_EVERY], run=run.file))
     return series
-
-
-def _of_slips(problem: Problem, drawn: Floats) -> float:
-    """From the features of the scatter in the runs and in the replicates."""
-    segments = {run.file: run.commands.segments for run in problem.runs}
-    slips = squares = 0.0
-    for i, (file, label) in enumerate(problem.labels):
-        if label.name != "scatter" or not np.isfinite(problem.measured[i]):
-            continue
-        known = drawn[np.isfinite(drawn[:, i]), i]
-        if len(known) and known.mean() > 0.0:
-            count = segments[file][label.segment].slips
-            slips += count
-            squares += count * problem.measured[i] / float(known.mean())
-    if squares == 0.0:
-        return FIRST.ratio
-    return FIRST.ratio * math.sqrt(squares / slips) ** (slips / (slips + _SLIPS_OF_OTHERS))
 
 
 def _of_axis(series: list[WaveSeries]) -> float:
@@ -81,7 +63,7 @@ def _length_m(series: list[WaveSeries]) -> float:
     """Correlation length, from neighbours of the friction along the track."""
     apart = [np.abs(np.diff(part.at)) for part in series if len(part.at) > 2]
     if not apart:
-        return FIRST.length_m
+        return ROUGHNESS.length_m
     spacing = float(np.median(np.concatenate(apart)))
     about = [part.value - part.value.mean() for part in series]
     whole = sum(float(values @ values) for values in about)

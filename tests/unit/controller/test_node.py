@@ -6,7 +6,7 @@ from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import BLOCK, LATE, sealed, sensor_block
 from controller.node import ControllerNode
-from tests.unit.controller.test_process import CONFIG, MS, block
+from tests.unit.controller.fake_bus import CONFIG, MS, block
 
 
 @pytest.mark.parametrize("lockstep", [False, True])
