@@ -17,7 +17,8 @@ pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("bridge", "cockpit", "controller", "diagnosis", "plant")
-BASE_MB = 650.0
+BASE_MB = 640.0  # 634 on 30 November 2026: llvmlite 173, scipy 143, numpy 73, matplotlib with fonts and pictures 94, our code 11
+INSTALLER = {"pip", "setuptools", "pkg_resources"}  # 27 MB, which a new environment holds before any installation
 
 
 def run(*command: str | Path, cwd: Path, status: int = 0, **more: str) -> str:
@@ -72,7 +73,9 @@ def installed(at: Path, requirement: str) -> Path:
 @pytest.mark.timeout(1800)  # downloads
 def test_a_fresh_installation_is_small_and_runs(wheel: Path, tmp_path: Path) -> None:
     at = installed(tmp_path / "base", str(wheel))
-    files = [path for path in (tmp_path / "base" / "lib").rglob("*") if path.is_file()]
+    (packages,) = (tmp_path / "base" / "lib").glob("python*/site-packages")
+    ours = [each for each in packages.iterdir() if each.name.split("-")[0] not in INSTALLER]
+    files = [path for each in ours for path in (each, *each.rglob("*")) if path.is_file()]
     assert sum(path.stat().st_blocks * 512 for path in files) < BASE_MB * 2**20
     output = run(
         at / "stickslip", "run", "--lockstep", "--scenario", "from-the-start", "--set", "duration_s=1",
