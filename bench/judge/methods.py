@@ -53,6 +53,7 @@ def methods() -> dict[str, Method]:
     from bench.judge import lines, refits, trees
     from bench.judge.linear import answer as linear
     from bench.judge.simulated import answer as simulated
+    from bench.judge.weighed import answer as weighed
 
     return {
         "verdict": Method(refits.verdict, ("diagnosis", "plant", "bench/judge/refits.py")),
@@ -63,6 +64,7 @@ def methods() -> dict[str, Method]:
             (*_READERS, *_FITTED, "plant", "bench/judge/simulated", "bench/judge/simulated/model.json"),
         ),
         "trees": Method(trees.answer, (*_READERS, "plant", "bench/judge/trees.py", "bench/judge/features.py")),
+        "weighed": Method(weighed.answer, ("diagnosis", "plant", "bench/judge")),
         "linear": Method(linear.answer, ("diagnosis", "plant", "bench/judge/linear")),
     }
 

@@ -16,7 +16,8 @@ _FOREIGN = 0.8
 def judge(ledger: Ledger) -> dict[str, float]:
     """Probabilities of the effects and of `none`, which add up to 1, and of `outside`."""
     rows: dict[str, Row] = {}
-    for row in sorted(ledger.rows, key=lambda row: value(ledger, row)):
+    refitted = [row for row in ledger.rows if row.refitted]
+    for row in sorted(refitted, key=lambda row: value(ledger, row)):
         rows[" + ".join(sorted(row.names)) or NONE] = row
     leading = list(rows.values())[-1]
     most = value(ledger, leading)

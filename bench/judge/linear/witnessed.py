@@ -1,7 +1,6 @@
 """All that the judge needs of one evidence: the fits, their remainders in fitted and kept runs, and the relations."""
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 from bench.judge.linear.evidence import NOISE, cost_of_freedom, of_remainder
@@ -9,15 +8,16 @@ from bench.judge.linear.explanations import moved_by, nothing_again, pairs_of, s
 from bench.judge.linear.kept import left_of_kept
 from bench.judge.linear.rig import fitted_rig
 from bench.judge.linear.witnesses import beyond_library, evidence_of, shown, speaking
-from diagnosis.evidence.folder import load_evidence
+from diagnosis.evidence.run import Evidence
 from diagnosis.evidence.split import excerpt
 from diagnosis.fits.fit import Fit
+from diagnosis.fits.refits import best_of_each
 from diagnosis.gap.prepare import prepare
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.catalogue import cannot_show, trials
 from diagnosis.model.per_run import is_phase
 from diagnosis.model.rig import Roughness
-from diagnosis.relations.answer import Answered, relations_of
+from diagnosis.relations.answer import Answered, Relations
 from diagnosis.relations.decide import decision_of, ruled_out
 
 # Pairs are tried where the best single effect leaves more than this many times a right explanation's remainder,
@@ -34,6 +34,7 @@ class Row(NamedTuple):
     kept: float  # chi2 of the kept runs, predicted
     freedom: float  # logarithm of the volume that the data leave of the prior
     relations: float  # log evidence of the relations against no effect
+    refitted: bool = True  # False: only promised by the columns of the rig without effects
 
 
 class Ledger(NamedTuple):
@@ -45,13 +46,13 @@ class Ledger(NamedTuple):
     beyond: float  # share of the content of a relation that nothing in the library takes
     foreign: bool  # whether a run has a vibration that no effect makes
     surface: Roughness
+    moved: dict[str, float]  # numbers of the rig without effects, in tolerances
 
 
-def ledger_of(folder: Path) -> Ledger:
-    """Fit, predict and regress."""
-    evidence = excerpt(load_evidence(folder))
+def ledger_of(full: Evidence, relations: Relations) -> Ledger:
+    """Fit and predict. Raises Fault BAD_EVIDENCE where the rig as described shows none of the measured features."""
+    evidence = excerpt(full)
     runs = prepare(evidence)
-    relations = relations_of(evidence.rig, runs)
     decision = decision_of(relations, evidence.rig)
     answered = speaking(relations.answered, evidence.rig)
     problem = Problem(evidence.rig, [run for run in runs if not run.holdout])
@@ -82,9 +83,16 @@ def ledger_of(folder: Path) -> Ledger:
         )
         for fit, left in zip(fits, kept, strict=True)
     )
+    known = {row.names for row in rows}
+    rows += tuple(
+        Row(names, max(start.chi2, 0.0), kept[0], rows[0].freedom, evidence_of(answered, names), refitted=False)
+        for start in best_of_each([*promises.singles, *promises.pairs])
+        if (names := frozenset(start.hypothesis.effects)) not in known
+    )
     foreign = any(run.foreign for run in evidence.runs)
     beyond = beyond_library(relations.answered, decision.outside)
-    return Ledger(rows, features, of_kept, beyond, foreign, rig.surface)
+    numbers = dict(zip(rig.fitter.nuisances.names, nothing.deviations.tolist(), strict=True))
+    return Ledger(rows, features, of_kept, beyond, foreign, rig.surface, numbers)
 
 
 def _worth(fit: Fit, relations: Sequence[Answered]) -> float:

@@ -14,7 +14,6 @@ from diagnosis.evidence.folder import examine
 from diagnosis.evidence.manifest import RigTable, RunTable, rig_file_tables, rig_numbers
 from diagnosis.evidence.run import Evidence, MeasuredRun
 from diagnosis.features.grid import BLOCK_S
-from diagnosis.gap.prepare import Prepared, prepare
 from diagnosis.hypotheses.catalogue import CATALOGUE
 from diagnosis.hypotheses.hypothesis import LEVELS
 from diagnosis.synthetic.folder import TOLERANCES, Numbers
@@ -35,10 +34,9 @@ _TAIL = 0.4  # spread of the shape of the Stribeck curve, as the diagnosis allow
 
 
 class Rig(NamedTuple):
-    """A training rig: description, runs as prepared evidence, and the effects that the measured rig has."""
+    """A training rig: its evidence, and the effects that the measured rig has."""
 
-    described: RigTable
-    runs: list[Prepared]
+    evidence: Evidence
     effects: tuple[str, ...]
 
 
@@ -56,7 +54,7 @@ def drawn_rig(seed: int) -> Rig | None:
     try:
         rig = _true_rig(random, campaign, table, {name: _numbers(random, name, campaign) for name in names})
         runs = tuple(_measured(random, campaign, rig, table))
-        return Rig(table, prepare(Evidence(Path(), table, runs, ())), names)
+        return Rig(Evidence(Path(), table, runs, ()), names)
     except (Fault, ValidationError, ValueError):
         return None
 
@@ -132,7 +130,7 @@ def _measured(random: np.random.Generator, campaign: Campaign, rig: DrawnRig, ta
         columns = plan.columns(random, rig, start_m * (1.0 + 0.1 * random.standard_normal()))
         before_s += plan.duration_s
         speed_mps = plan.velocity[0][1] if len(plan.velocity) == 1 else None
-        of_run = RunTable(file=f"run-{number + 1:02d}.parquet", drive_velocity_mps=speed_mps)
+        of_run = RunTable(file=f"run-{number + 1:02d}.parquet", drive_velocity_mps=speed_mps, holdout=plan.holdout)
         kept = {name: values.astype(np.float64) for name, values in columns.items() if name not in campaign.leave_out}
         runs.append(examine(kept, table, of_run)[0])
     return runs

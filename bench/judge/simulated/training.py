@@ -18,6 +18,7 @@ from bench.judge.simulated.softmax import Softmax, trained
 from bench.judge.simulated.witnesses import Witnesses, baseline_of, witnesses_of
 from bridge.files import read_json
 from bridge.results import write_json
+from diagnosis.gap.prepare import prepare
 
 _KNOWN = 0.5  # probability from which the library names an effect: without it, the rig is outside
 _BEYOND = 0.15  # of the rigs have an effect that the library lacks. More: known effects are called unknown
@@ -47,8 +48,9 @@ def _example(seed: int) -> dict[str, Any]:
     rig = drawn_rig(seed)
     if rig is None:
         return {}
-    baseline = baseline_of(rig.described, rig.runs)
-    return {"effects": rig.effects, "witnesses": witnesses_of(rig.described, rig.runs, baseline)}
+    runs = [run for run in prepare(rig.evidence) if not run.holdout]
+    baseline = baseline_of(rig.evidence.rig, runs)
+    return {"effects": rig.effects, "witnesses": witnesses_of(rig.evidence.rig, runs, baseline)}
 
 
 def model_of(rigs: list[Example]) -> Model:

@@ -54,7 +54,8 @@ class Baseline(NamedTuple):
 
 def witnesses_of(rig: RigTable, runs: list[Prepared], baseline: Baseline | None) -> Witnesses:
     """All witnesses of the runs: 1.5 s of CPU, and 2 s for the effects in the simulated rig."""
-    evidence = [*_of_lines(rig, runs), *_of_waves(rig, runs), *_of_relations(rig, runs)]
+    of_waves = ((f"wave {place} {name}", value) for place, name, value in waves(rig, runs))
+    evidence = [*_of_lines(rig, runs), *of_waves, *_of_relations(rig, runs)]
     if baseline is not None:
         evidence += [*_of_rig(baseline), *_of_trials(baseline.fitter, baseline.fit, baseline.trials)]
     return {name: min(max(value, -_HIGHEST), _HIGHEST) for name, value in evidence if not math.isnan(value)}
@@ -80,8 +81,8 @@ def _of_lines(rig: RigTable, runs: list[Prepared]) -> Iterator[tuple[str, float]
         yield from ((f"line {block.name} {effect}", value) for effect, value in evidences(block)[0].items())
 
 
-def _of_waves(rig: RigTable, runs: list[Prepared]) -> Iterator[tuple[str, float]]:
-    """Waves of breakaways and of the drive's speed, at closer periods than the straight lines have."""
+def waves(rig: RigTable, runs: list[Prepared]) -> Iterator[tuple[str, str, float]]:
+    """Place, effect and log evidence of waves of breakaways and of the drive's speed, closer than the straight lines have."""
     if rig.drive == "force":
         return
     scales = scales_of(rig)
@@ -106,7 +107,7 @@ def _of_waves(rig: RigTable, runs: list[Prepared]) -> Iterator[tuple[str, float]
             explained = min(float(values.max()) / max(total, 1e-300), 1.0 - 1e-6)
             columns = 2 if number == 0 else 2 * len(runs)
             evidence = -0.5 * count * math.log1p(-explained) - 0.5 * columns * math.log(count)
-            yield f"wave {what}{number} {name}", evidence - math.log(_PERIODS / 10)
+            yield f"{what}{number}", name, evidence - math.log(_PERIODS / 10)
 
 
 def _of_relations(rig: RigTable, runs: list[Prepared]) -> Iterator[tuple[str, float]]:
