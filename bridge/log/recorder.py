@@ -141,6 +141,8 @@ def _record(
         if passed or realtime.was_paused(asked_s, asked_s + _LOOK_S):
             heard_s = time.monotonic()
         if passed:
+            # a busy recorder may find no moment to look for the rig before it leaves
+            seen = seen or any(message.topic.sender == "plant" for message in passed)
             for message in passed:
                 try:
                     log.write(message.topic, message.payload)
