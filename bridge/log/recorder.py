@@ -113,12 +113,7 @@ def run(
 
 
 def _record(
-    log: RunLog,
-    bus: Bus,
-    inbox: Inbox,
-    stop: threading.Event,
-    pauses: PauseWriter | None,
-    complaints: Complaints,
+    log: RunLog, bus: Bus, inbox: Inbox, stop: threading.Event, pauses: PauseWriter | None, complaints: Complaints
 ) -> bool:
     """Write until plant and controller have ended. Returns whether the plant left the bus without an END."""
     screen = Screen(complaints)
