@@ -46,7 +46,7 @@ def with_relations(
         relations=(*map(_row, answered), *latent_rows(latent)),
         findings=(*done.findings, *_latent_findings(latent)),
         left_out=tuple(LeftOut(signal_of(relation.name), relation.why) for relation in missing),
-        numbers=tuple(number for relation in answered for number in _numbers(relation, rig)),
+        relation_numbers=tuple(number for relation in answered for number in _numbers(relation, rig)),
         pictures=(*_pictures(relations, runs), *done.pictures),
     )
     return complete._replace(summary=summary(complete))

@@ -52,7 +52,7 @@ def command(damped, tmp_path_factory):
 
 def test_the_command_names_the_effect_in_the_form_of_the_contract(command):
     printed, result, _ = command
-    assert result["format"] == "diagnosis/2"
+    assert result["format"] == "diagnosis/3"
     assert result["verdict"] == "effect"
     assert result["effects"] == ["drive-damping"]
     names = {candidate["effect"] for candidate in result["candidates"]}

@@ -34,7 +34,7 @@ def test_the_file_holds_the_refitted_rig_and_the_effect(evidence, tmp_path):
     assert rig.effects == {"drive-backlash": {"form": "", "gap_m": 8.1e-5}}
     header = path.read_text().split("\nname")[0]
     assert "bench" in header
-    assert "drive-backlash, probability 93 %" in header
+    assert "drive-backlash, probability 95 %" in header
     assert all(line.startswith("#") for line in header.splitlines())
 
 
