@@ -171,6 +171,7 @@ def _diagnose_file(path: Path, options: _Options, speed: str, mass: str, channel
 def _diagnose_one(source: "EvidenceFolder", options: _Options) -> int:
     from cockpit.commands.diagnose_output import details, watched
     from cockpit.fleet.work import write_source_report
+    from diagnosis.deadline import forecast
     from diagnosis.evidence.folder import load_evidence
     from diagnosis.report.rig_file import NO_RIG, refuse_force_drive, write_rig
 
@@ -178,6 +179,9 @@ def _diagnose_one(source: "EvidenceFolder", options: _Options) -> int:
     if options.apply is not None:
         refuse_force_drive(evidence)
     with watched() as progress:
+        fitted_s = sum(float(run.t_s[-1] - run.t_s[0]) for run in evidence.runs if not run.holdout)
+        limit = "" if options.budget_s is None else f", {options.budget_s:g} s at most"
+        progress(f"the simulated fits of {fitted_s:.0f} s take about {forecast(fitted_s, options.jobs)}{limit}", 0.0)
         diagnosis = _result(source, evidence, options, progress)
     refused: list[Fault] = []
     _print(options, diagnosis, [*diagnosis.summary, *(details(diagnosis) if options.all else ())], refused)
@@ -217,10 +221,15 @@ def _print_line(options: _Options, line: str) -> None:
 def _result(
     source: "EvidenceFolder", evidence: "Evidence", options: _Options, progress: Callable[[str, float], None]
 ) -> "Diagnosis":
+    from joblib import parallel_config
+
     from diagnosis import diagnose_many as many
+    from diagnosis.deadline import ended_by_ctrl_c
 
     if not options.cluster:
-        return options.diagnose(evidence, progress, options.jobs)
+        workers = parallel_config(backend="loky", initializer=many.leave_interrupt_to_parent)
+        with workers, ended_by_ctrl_c():
+            return options.diagnose(evidence, progress, options.jobs)
     with closing(many.diagnose_many([source], 1, options.cluster, options.diagnose, options.certs)) as outcomes:
         outcome = next(outcomes)
     if outcome.diagnosis is None:

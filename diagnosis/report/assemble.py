@@ -192,8 +192,9 @@ def _judged(contest: Contest, outcome: Confirmation, held_out: HeldOut, tried: l
         for fit in compared_fits(verdict, gone)
     ]
     compared.append(Shrinkage(PARAMETERS, *held_out.closed_by(baseline)))
-    blend = flexible_differences(fitter, baseline, tried, held_out, jobs)
-    compared.append(Shrinkage("flexible residual", *held_out.closed_by_differences(blend)))
+    blend = _in_time(lambda: flexible_differences(fitter, baseline, tried, held_out, jobs), None)
+    if blend is not None:
+        compared.append(Shrinkage("flexible residual", *held_out.closed_by_differences(blend)))
     named = verdict.named is not None
     return Gap(
         definition=DEFINITION,

@@ -16,6 +16,7 @@ from bridge.results import strict_json
 from cockpit.cli import app
 from cockpit.fleet import work
 from diagnosis import diagnose_many as many
+from diagnosis.deadline import OutOfTimeError
 from tests import made_up
 
 
@@ -286,6 +287,26 @@ def test_interrupted_is_130_and_writes_nothing(tmp_path, monkeypatch):
     assert result.exit_code == 130
     assert "stopped by SIGTERM" in result.output
     assert not (tmp_path / "a.json").exists()
+
+
+def test_ctrl_c_prints_the_best_answer_so_far_and_writes_it(tmp_path, monkeypatch):
+    def ended(evidence, progress, jobs, budget_s=None):
+        with pytest.raises(OutOfTimeError):
+            os.kill(os.getpid(), signal.SIGINT)
+        return made_up.diagnosis()._replace(verdict="not-finished", effects=(), pictures=())
+
+    monkeypatch.setattr(many, "real_diagnose", ended)
+    options = ("--json", tmp_path / "a.json", "--apply", tmp_path / "a.toml")
+    result = diagnose(folders(tmp_path, "rig") / "rig", *options)
+    assert result.exit_code == 0
+    assert "rig file   not written: no cause was tried, so no effect can be applied" in result.stdout
+    assert json.loads((tmp_path / "a.json").read_text())["verdict"] == "not-finished"
+    assert not (tmp_path / "a.toml").exists()
+
+
+def test_an_estimate_of_the_time_comes_first(tmp_path):
+    result = diagnose(folders(tmp_path, "rig") / "rig", "--jobs", 2, "--budget", "30s")
+    assert result.stderr.splitlines()[0] == "the simulated fits of 1 s take about 0 to 1 s, 30 s at most"
 
 
 @pytest.mark.slow

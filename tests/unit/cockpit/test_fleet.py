@@ -144,6 +144,23 @@ def test_where_mending_helps_most_comes_first():
     assert [round(group.helps, 6) for group in fleet.groups] == [1.3, 1.0, 0.73, 0.0, 0.0, 0.0]
 
 
+def test_wrong_numbers_are_a_shared_cause_and_what_was_not_finished_is_none():
+    described = TOLD._replace(verdict="described", effects=("drive-stiffness",))
+    mass = TOLD.numbers[0]._replace(name="mass_kg", share=0.7)
+    done = [
+        ("a", described, ""),
+        ("b", described._replace(effects=(), numbers=(mass,)), ""),
+        ("c", TOLD._replace(verdict="not-finished", effects=()), ""),
+    ]
+    groups = fleet_of(done, [], []).groups
+    assert [(group.kind, group.what, group.helps) for group in groups] == [
+        ("named", "mass", 0.7),
+        ("named", "drive-stiffness", 0.43),
+        ("not-finished", "", 0.0),
+    ]
+    assert groups[1].rigs[0].size.endswith("described 11.7 kN/m, closes 43 % of the gap")
+
+
 def test_without_a_fit_the_relations_give_the_share():
     diagnosed = TOLD._replace(verdict="partly", gap=TOLD.gap._replace(shrinkage=None, interval_90=None))
     (group,) = fleet_of([("rig", diagnosed, "")], [], []).groups

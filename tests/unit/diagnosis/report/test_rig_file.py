@@ -38,6 +38,15 @@ def test_the_file_holds_the_refitted_rig_and_the_effect(evidence, tmp_path):
     assert all(line.startswith("#") for line in header.splitlines())
 
 
+def test_described_gives_the_numbers_that_were_found_and_no_effect(evidence, tmp_path):
+    number = made_up.diagnosis().numbers[0]._replace(found=10500.0)
+    described = made_up.diagnosis()._replace(verdict="described", effects=("drive-stiffness",), numbers=(number,))
+    write_rig(described, evidence, tmp_path / "rig.toml")
+    rig = load_rig(str(tmp_path / "rig.toml"), [])
+    assert (rig.drive.stiffness_N_per_m, rig.effects) == (10500.0, {})
+    assert "described 11.7 kN/m" in (tmp_path / "rig.toml").read_text()
+
+
 def test_no_gap_gives_the_retuned_rig(evidence, tmp_path):
     write_rig(made_up.diagnosis()._replace(verdict="no-gap", effects=()), evidence, tmp_path / "rig.toml")
     assert load_rig(str(tmp_path / "rig.toml"), []).effects == {}
