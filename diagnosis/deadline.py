@@ -53,7 +53,7 @@ def limited(until_s: float) -> Generator[None]:
 
 @contextmanager
 def ended_by_ctrl_c() -> Generator[None]:
-    """A body in which the first Ctrl-C raises EndedError; a second one, or one that nothing handles, KeyboardInterrupt."""
+    """A body in which the first Ctrl-C raises EndedError; the next, or an unhandled first, KeyboardInterrupt."""
 
     def on_signal(_number: int, _frame: Any) -> Never:
         signal.signal(signal.SIGINT, handler)

@@ -89,10 +89,11 @@ def _diagnosed(evidence: Evidence, progress: Progress, jobs: int, budget_s: floa
         verdict = with_vibration_findings(verdict, evidence.runs)
         if verdict.kind == "unexplained" and not (finished or seen.decision.outside or verdict.outside):
             verdict = verdict._replace(kind="not-finished")
-        done = without_fits(verdict, seen.runs, HOLD if finished else LONGER, began)
+        done = without_fits(verdict, evidence.runs, HOLD if finished else LONGER, began)
         done = done._replace(findings=(*evidence.findings, _NO_FIT))
-    done = done._replace(cannot_show=cannot_show(evidence.rig, seen.runs, evidence.assumed))
-    done = with_relations(done, evidence.rig, seen.runs, seen.relations, seen.decision, seen.latent)
+    if seen.runs:
+        done = done._replace(cannot_show=cannot_show(evidence.rig, seen.runs, evidence.assumed))
+    done = with_relations(done, seen.runs, seen.relations, seen.decision, seen.latent)
     progress(f"verdict: {done.verdict}", 1.0)
     return done
 

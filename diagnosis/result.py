@@ -101,7 +101,7 @@ class WrongNumber(NamedTuple):
     described: float
     found: float
     interval_90: tuple[float, float]
-    # share of the gap on the held-out runs that it closes beside everything else that was found; None: no gap without it
+    # share of the gap on the held-out runs that it closes if all else is corrected; None: no gap without it
     share: float | None
 
 
@@ -178,16 +178,6 @@ class LeftOut(NamedTuple):
     why: str
 
 
-class RelationNumber(NamedTuple):
-    """A number of the rig table, fitted by one relation alone."""
-
-    name: str
-    relation: str
-    described: float
-    refitted: float
-    interval_90: tuple[float, float]
-
-
 class Diagnosis(NamedTuple):
     """The whole answer of a diagnosis."""
 
@@ -210,7 +200,6 @@ class Diagnosis(NamedTuple):
     relations: tuple[RelationRow, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
     numbers: tuple[WrongNumber, ...] = ()
-    relation_numbers: tuple[RelationNumber, ...] = ()
     cannot_show: tuple[str, ...] = ()  # effects excluded by the drive, the runs or assumed numbers
     JSON_HIDDEN = ("pictures",)
 

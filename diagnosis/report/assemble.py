@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from bridge.arrays import Floats
 from bridge.log.finding import Finding
 from diagnosis.deadline import OutOfTimeError
-from diagnosis.evidence.folder import Evidence
+from diagnosis.evidence.folder import Evidence, MeasuredRun
 from diagnosis.evidence.foreign_vibration import PICK_UP
 from diagnosis.experiments.proposal import SINE, UNCOUPLE, next_experiment
 from diagnosis.features.grid import BLOCK_S
@@ -59,7 +59,7 @@ def unfitted() -> Verdict:
     return Verdict("unexplained", None, dict.fromkeys(names, 1.0 / len(names)), None, (), 1.0)
 
 
-def without_fits(verdict: Verdict, runs: list[Prepared], following: Experiment, began: float) -> Diagnosis:
+def without_fits(verdict: Verdict, runs: Sequence[MeasuredRun], following: Experiment, began: float) -> Diagnosis:
     """The diagnosis of a verdict without any fit, still without relations, shares and sentences."""
     return Diagnosis(
         verdict=verdict.kind,

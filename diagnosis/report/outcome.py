@@ -14,8 +14,8 @@ from diagnosis.verdict.held_out import FAR_FOR_NO_GAP, HeldOut
 # Distance from the described number, in tolerances, from which a number counts as wrong. Smaller: right numbers are listed, at
 # 1.6 one in half of the rigs with eight. Larger: a static force 2.96 off, which closed 12.6 of 12.6 floors, was not listed.
 BEYOND: Final = 2.0
-# Share of the gap that a wrong number must close for the verdict. Smaller: numbers that hardly matter are named. Larger: of two
-# wrong numbers that can stand in for each other neither is.
+# Share of the gap that a wrong number must close for the verdict. Smaller: idle numbers are named. Larger: of two wrong numbers
+# that imitate each other neither is named.
 _MOST = 0.5
 _TWO_SIDED_90 = 1.645
 
@@ -54,17 +54,17 @@ def wrong_numbers(nuisances: Nuisances, fit: Fit, held_out: HeldOut | None) -> I
         moved = [i for i, known in enumerate(nuisances.rig_names) if known == name]
         if not levels and not any(abs(fit.deviations[i]) > BEYOND for i in moved):
             continue
-        found, rates = described, np.zeros(len(covariance))
+        value, rates = described, np.zeros(len(covariance))
         for i in moved:
             deviation = float(fit.deviations[i])
-            found, rates[i] = nuisances.value(name, deviation), nuisances.growth(name, deviation)
+            value, rates[i] = nuisances.value(name, deviation), nuisances.growth(name, deviation)
         for j in levels:
             growth = 1.0 + coordinates[j].value(float(fit.w[j]))
-            found *= growth
+            value *= growth
             rates[count + j] = coordinates[j].scale / growth
-        half = _TWO_SIDED_90 * abs(found) * float(np.sqrt(rates @ covariance @ rates))
+        half = _TWO_SIDED_90 * abs(value) * float(np.sqrt(rates @ covariance @ rates))
         share = None if held_out is None else held_out.share_closed(_without(fit, moved, levels), fit)
-        yield WrongNumber(name, described, found, (found - half, found + half), share)
+        yield WrongNumber(name, described, value, (value - half, value + half), share)
 
 
 def _without(fit: Fit, moved: list[int], levels: list[int]) -> Fit:

@@ -104,7 +104,6 @@ def report_page(diagnosis: Diagnosis, evidence_name: str, footer: str = "") -> s
         closed_between=words.closed_between,
         sizes=words.sizes_in_words,
         remainder=words.remainder_in_words,
-        relation_number=words.number_in_words,
         between=units.interval,
         beyond=BEYOND,
     )

@@ -47,7 +47,7 @@ def refuse_force_drive(evidence: Evidence) -> None:
     if evidence.rig.drive == "force":
         raise Fault(
             "CONFIG",
-            f'{name}: rig.drive = "force": a rig file cannot describe it, the stand-in rig pulls through a spring; use the '
+            f'{name}: rig.drive = "force": a rig file cannot describe it, the simulated rig pulls through a spring; use the '
             "parameters in the JSON of the diagnosis",
         )
 
@@ -56,7 +56,7 @@ def rig_table(diagnosis: Diagnosis, evidence: Evidence) -> dict[str, Any]:
     """The corrected rig as the tables of a rig file, named after the evidence's folder."""
     # The two forces are refitted independently and may cross.
     values = evidence.rig.values() | {parameter.name: parameter.retuned for parameter in diagnosis.rig}
-    if diagnosis.verdict == "described":  # the numbers that were found hold what the level effects add
+    if diagnosis.verdict == "described":  # these numbers include the level effects
         values |= {number.name: number.found for number in diagnosis.numbers}
     table: dict[str, Any] = {"name": f"{_word(evidence.folder.name)}-diagnosed", **rig_file_tables(values)}
     effects: dict[str, dict[str, float | str]] = {}

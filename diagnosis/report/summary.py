@@ -20,12 +20,12 @@ from diagnosis.verdict.held_out import MORE_THAN_RIGHT
 # gap of the baseline over the gap as described from which a refit makes held-out runs worse, not by chance
 _WORSE = 1.1
 _SMALL_SHARE = 0.05  # smallest share of the gap of a regime that is reported
-_OTHERS = 2  # candidates beside the named ones
+_OTHERS = 2  # candidates after the named ones
 
 
 def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Six lines, the answer first; each but the first begins with its label."""
-    others = "; ".join(_others(diagnosis)) or "nothing stands out"
+    others = "; ".join(_others(diagnosis)) or "nothing"
     data = f" and {counted(len(diagnosis.findings), 'finding')} about the data" if diagnosis.findings else ""
     return (
         headline(diagnosis),

@@ -13,7 +13,6 @@ from diagnosis.result import (
     PARAMETERS,
     Diagnosis,
     Estimate,
-    RelationNumber,
     RelationRow,
     Remainder,
     RigNumber,
@@ -120,10 +119,8 @@ def relation_lines(diagnosis: Diagnosis) -> list[str]:
 
 
 def number_lines(diagnosis: Diagnosis) -> list[str]:
-    """Every number that a relation or the baseline refits, next to the described number."""
-    lines = [number_in_words(number) for number in diagnosis.relation_numbers]
-    lines += [rig_number_in_words(number) for number in diagnosis.rig if number.described and number.tolerance]
-    return lines
+    """Every refitted number, next to the described number."""
+    return [rig_number_in_words(number) for number in diagnosis.rig if number.described and number.tolerance]
 
 
 def sizes_in_words(row: RelationRow) -> str:
@@ -155,16 +152,10 @@ def remainder_in_words(remainder: Remainder) -> str:
     return f"{size} remain in the {remainder.where} {how}, where noise is {noise}: nothing in the library"
 
 
-def number_in_words(number: RelationNumber) -> str:
-    """A number of the rig, fitted by a relation."""
-    found = estimate_in_words("", number.name, Estimate(number.refitted, number.interval_90))
-    return f"{found} by the {number.relation}, described {quantity(number.described, name_and_unit(number.name)[1])}"
-
-
 def wrong_number_in_words(number: WrongNumber) -> str:
     """A number that was found, and the described one."""
-    found = estimate_in_words("", number.name, Estimate(number.found, number.interval_90))
-    return f"{found}, described {quantity(number.described, name_and_unit(number.name)[1])}"
+    value = estimate_in_words("", number.name, Estimate(number.found, number.interval_90))
+    return f"{value}, described {quantity(number.described, name_and_unit(number.name)[1])}"
 
 
 def rig_number_in_words(number: RigNumber) -> str:

@@ -53,7 +53,6 @@ def test_the_answer_comes_first_and_everything_is_there_in_order(tmp_path):
         "spring relation: 0.8 N as described, 0.3 N refitted, noise 12 mN",
         "drive-backlash 73 % 61 % to 92 % 12 %",
         "46 mN remain in the spring relation over the extension, where noise is 12 mN: nothing in the library",
-        "drive stiffness 11.697 kN/m (90 %: 11.650 to 11.744) by the spring relation, described 20 kN/m",
         "base: left out: run-01.parquet has no base_accel_mps2",
         "Where does the difference lie?",
         "drive force stick",
