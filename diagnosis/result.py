@@ -101,6 +101,7 @@ class WrongNumber(NamedTuple):
     described: float
     found: float
     interval_90: tuple[float, float]
+    off: float | None  # distance from the described number, in tolerances; None: it was described as known exactly
     # share of the gap on the held-out runs that it closes if all else is corrected; None: no gap without it
     share: float | None
 

@@ -37,7 +37,7 @@ class Nuisances:
         # a value of 0 has no relative tolerance
         self.rig_names = tuple(name for name, share in rig.tolerance.items() if share > 0.0 and known[name] > 0.0)
         self.described = known
-        self._tolerance = rig.tolerance
+        self.tolerance = rig.tolerance
         self.names = (*self.rig_names, "stribeck_tail", *_CHAIN)
 
     def __len__(self) -> int:
@@ -46,11 +46,11 @@ class Nuisances:
     def value(self, name: str, deviation: float) -> float:
         """A number of the rig table at a deviation from its described value; at least a tenth of that value."""
         described = self.described[name]
-        return described * max(1.0 + self._tolerance[name] * deviation, 0.1)
+        return described * max(1.0 + self.tolerance[name] * deviation, 0.1)
 
     def growth(self, name: str, deviation: float) -> float:
         """Relative growth of a number of the rig table per tolerance, at a deviation."""
-        return self._tolerance[name] * self.described[name] / self.value(name, deviation)
+        return self.tolerance[name] * self.described[name] / self.value(name, deviation)
 
     def _values(self, deviations: Floats) -> dict[str, float]:
         return {name: self.value(name, float(deviations[i])) for i, name in enumerate(self.rig_names)}
@@ -60,9 +60,7 @@ class Nuisances:
         count = len(self.rig_names)
         values = self.described | self._values(deviations)
         values["static_force_N"] = max(values["static_force_N"], values["coulomb_force_N"])
-        numbers = [
-            RigNumber(name, self.described[name], values[name], self._tolerance[name]) for name in self.rig_names
-        ]
+        numbers = [RigNumber(name, self.described[name], values[name], self.tolerance[name]) for name in self.rig_names]
         return (*numbers, RigNumber("stribeck_tail", 0.0, _TAIL * float(deviations[count]), _TAIL))
 
     def point(self, deviations: Floats, effects: Effects) -> Point:

@@ -48,7 +48,10 @@ def _sure(diagnosis: Diagnosis) -> Iterator[str]:
         yield "nothing was judged"
         return
     known = [row for row in diagnosis.candidates if math.isfinite(row.probability)]
-    others = [f"{row.effect} {percent(row.probability)}" for row in known if row.effect not in diagnosis.effects]
+    shown = {row.effect: f"{row.effect} {percent(row.probability)}" for row in known}
+    others = [text for effect, text in shown.items() if effect not in diagnosis.effects]
+    if known and diagnosis.verdict == "described" and diagnosis.effects:
+        yield ", ".join(shown[effect] for effect in diagnosis.effects)
     if known and diagnosis.verdict == "unexplained":
         yield f"{percent(1.0 - diagnosis.complete)} that something outside the library acts"
     elif known:

@@ -45,7 +45,7 @@ def answer(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "no-gap":
         if is_undecided(diagnosis):
             return f"the fitted runs show no gap, but the held-out runs are {times(diagnosis.gap.retuned)} noise floors off"
-        return "the rig as described explains these runs"
+        return "the described rig explains these runs within its tolerances"
     most = mostly(diagnosis)
     if diagnosis.verdict == "unexplained":
         if most is not None:
@@ -155,7 +155,8 @@ def remainder_in_words(remainder: Remainder) -> str:
 def wrong_number_in_words(number: WrongNumber) -> str:
     """A number that was found, and the described one."""
     value = estimate_in_words("", number.name, Estimate(number.found, number.interval_90))
-    return f"{value}, described {quantity(number.described, name_and_unit(number.name)[1])}"
+    off = "" if number.off is None else f" ({number.off:.1f} tolerances off)"
+    return f"{value}, described {quantity(number.described, name_and_unit(number.name)[1])}{off}"
 
 
 def rig_number_in_words(number: RigNumber) -> str:

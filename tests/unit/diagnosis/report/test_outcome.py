@@ -16,9 +16,9 @@ from diagnosis.report.outcome import verdict_of, wrong_numbers
 from diagnosis.result import Gap, WrongNumber
 from tests import made_up
 
-STATIC = WrongNumber("static_force_N", 15.88, 14.48, (14.4, 14.56), 0.99)
-MASS = WrongNumber("mass_kg", 1.5, 1.6, (1.59, 1.61), 0.6)
-IDLE = WrongNumber("contact_stiffness_N_per_m", 7.8e7, 5e7, (4e7, 6e7), 0.0)
+STATIC = WrongNumber("static_force_N", 15.88, 14.48, (14.4, 14.56), 2.96, 0.99)
+MASS = WrongNumber("mass_kg", 1.5, 1.6, (1.59, 1.61), 2.2, 0.6)
+IDLE = WrongNumber("contact_stiffness_N_per_m", 7.8e7, 5e7, (4e7, 6e7), 3.2, 0.0)
 CLOSED, OPEN = Gap("", nominal=12.6, retuned=1.05), Gap("", nominal=12.6, retuned=5.0)
 RIG: Any = {
     "drive": "spring", "mass_kg": 1.5, "drive_stiffness_N_per_m": 11700.0, "drive_damping_Ns_per_m": 0.0,
@@ -38,7 +38,8 @@ RIG: Any = {
         ("unexplained", (), (IDLE,), CLOSED, False, ("unexplained", ())),
         ("unexplained", (), (STATIC,), OPEN, False, ("unexplained", ())),
         ("unexplained", (), (STATIC,), CLOSED, True, ("unexplained", ())),
-        ("no-gap", (), (STATIC,), CLOSED, False, ("no-gap", ())),
+        ("no-gap", (), (STATIC, MASS), CLOSED, False, ("described", ("static-level",))),
+        ("no-gap", (), (MASS,), CLOSED, False, ("no-gap", ())),
         ("not-finished", (), (STATIC,), CLOSED, False, ("not-finished", ())),
     ],
 )
@@ -61,6 +62,7 @@ def test_a_number_beyond_its_tolerance_is_wrong_and_one_within_it_is_not():
     fit = fitted(nuisances, {"coulomb_force_N": -2.5, "static_force_N": 1.9}, None)
     (number,) = wrong_numbers(nuisances, fit, None)
     assert (number.name, number.described, number.share) == ("coulomb_force_N", 14.0, None)
+    assert number.off == pytest.approx(2.5)
     assert number.found == pytest.approx(14.0 * (1.0 - 0.075))
     low, high = number.interval_90
     assert (low + high) / 2.0 == pytest.approx(number.found)
@@ -85,7 +87,7 @@ def test_a_level_and_the_refitted_number_are_one_number_and_its_share_is_that_of
     assert seen[0].hypothesis == Hypothesis({"drive-damping": "viscous"}, ())
     exact = Nuisances(RigTable(**RIG))
     (number,) = wrong_numbers(exact, fitted(exact, {}, -0.2), None)
-    assert number.found == pytest.approx(14.0 * 0.8)
+    assert (number.found, number.off) == (pytest.approx(14.0 * 0.8), None)
 
 
 def test_the_bench_reads_diagnoses_of_both_formats():
