@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from bridge.arrays import Floats
+from diagnosis.deadline import OutOfTimeError
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.feature import Features, Signals, scales_of
 from diagnosis.features.force_drive import axis_features
@@ -35,10 +36,6 @@ _SCALE_SPREAD = 0.004
 # Simulated runs that are kept, of 0.6 MB each. Fewer: trials simulate their common start again. More: memory.
 _KEPT = 64
 _DIVERGED = 1e100  # a larger feature counts as missing, as its square would overflow
-
-
-class OutOfTimeError(Exception):
-    """The time budget is used up; the best answer so far is the result."""
 
 
 class Point(NamedTuple):

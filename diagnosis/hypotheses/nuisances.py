@@ -36,8 +36,8 @@ class Nuisances:
         known = {name: value for name, value in rig.values().items() if value is not None}
         # a value of 0 has no relative tolerance
         self.rig_names = tuple(name for name, share in rig.tolerance.items() if share > 0.0 and known[name] > 0.0)
-        self._described = known
-        self._tolerance = rig.tolerance
+        self.described = known
+        self.tolerance = rig.tolerance
         self.names = (*self.rig_names, "stribeck_tail", *_CHAIN)
 
     def __len__(self) -> int:
@@ -45,12 +45,12 @@ class Nuisances:
 
     def value(self, name: str, deviation: float) -> float:
         """A number of the rig table at a deviation from its described value; at least a tenth of that value."""
-        described = self._described[name]
-        return described * max(1.0 + self._tolerance[name] * deviation, 0.1)
+        described = self.described[name]
+        return described * max(1.0 + self.tolerance[name] * deviation, 0.1)
 
     def growth(self, name: str, deviation: float) -> float:
         """Relative growth of a number of the rig table per tolerance, at a deviation."""
-        return self._tolerance[name] * self._described[name] / self.value(name, deviation)
+        return self.tolerance[name] * self.described[name] / self.value(name, deviation)
 
     def _values(self, deviations: Floats) -> dict[str, float]:
         return {name: self.value(name, float(deviations[i])) for i, name in enumerate(self.rig_names)}
@@ -58,11 +58,9 @@ class Nuisances:
     def parameters(self, deviations: Floats) -> tuple[RigNumber, ...]:
         """The rig's numbers in the model at these deviations, including the shape of its Stribeck curve."""
         count = len(self.rig_names)
-        values = self._described | self._values(deviations)
+        values = self.described | self._values(deviations)
         values["static_force_N"] = max(values["static_force_N"], values["coulomb_force_N"])
-        numbers = [
-            RigNumber(name, self._described[name], values[name], self._tolerance[name]) for name in self.rig_names
-        ]
+        numbers = [RigNumber(name, self.described[name], values[name], self.tolerance[name]) for name in self.rig_names]
         return (*numbers, RigNumber("stribeck_tail", 0.0, _TAIL * float(deviations[count]), _TAIL))
 
     def point(self, deviations: Floats, effects: Effects) -> Point:

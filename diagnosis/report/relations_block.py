@@ -1,11 +1,10 @@
-"""Relations and latent friction in an answer: shares, the remainder, sizes, refitted numbers, a picture."""
+"""Relations and latent friction in an answer: shares, the remainder, sizes, a picture."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from bridge.log.finding import Finding
-from diagnosis.evidence.manifest import RigTable
 from diagnosis.gap.prepare import Prepared
 from diagnosis.latent.answer import LatentSignal
 from diagnosis.latent.components import NOISE, SCATTER
@@ -17,28 +16,24 @@ from diagnosis.result import (
     Diagnosis,
     LeftOut,
     Picture,
-    RelationNumber,
     RelationRow,
     Remainder,
     Share,
 )
 
 _SIGNALS = {"spring": "spring relation", "motion": "motion relation", "drive": "drive relation"}
-_NUMBER_OF = {"drive-stiffness": "drive_stiffness_N_per_m", "drive-damping": "drive_damping_Ns_per_m"}  # of the rig
 _POINTS = 1500  # most points of a curve
-_TWO_SIDED_90 = 1.645
 _LEAST_SHARE = 0.02  # smallest share of a cause of the friction that is reported
 
 
 def with_relations(
     done: Diagnosis,
-    rig: RigTable,
     runs: list[Prepared],
     relations: Relations,
     decision: Decision,
     latent: Sequence[LatentSignal],
 ) -> Diagnosis:
-    """The diagnosis with shares, remainder, numbers and picture of relations and latent friction, and with its sentences."""
+    """The diagnosis with shares, remainder and picture of relations and latent friction, and with its sentences."""
     answered, missing = relations
     complete = done._replace(
         shares=(*(share for relation in answered for share in _shares(relation)), *latent_shares(latent)),
@@ -46,7 +41,6 @@ def with_relations(
         relations=(*map(_row, answered), *latent_rows(latent)),
         findings=(*done.findings, *_latent_findings(latent)),
         left_out=tuple(LeftOut(signal_of(relation.name), relation.why) for relation in missing),
-        numbers=tuple(number for relation in answered for number in _numbers(relation, rig)),
         pictures=(*_pictures(relations, runs), *done.pictures),
     )
     return complete._replace(summary=summary(complete))
@@ -98,22 +92,6 @@ def _remainder(relations: Relations, decision: Decision) -> Remainder | None:
     size = float(np.sqrt(max(worst.left**2 - worst.noise**2, 0.0)))
     share = None if worst.shares is None else worst.shares.unexplained
     return Remainder(share, signal_of(worst.name), "", size, worst.noise, worst.unit)
-
-
-def _numbers(answered: Answered, rig: RigTable) -> list[RelationNumber]:
-    known = rig.values()
-    moved = {name: (size, deviation) for name, size, deviation in answered.nuisances if name in known}
-    chosen = answered.chosen
-    for term, sizes, deviations in zip(chosen.terms, chosen.sizes, chosen.deviations, strict=True):
-        if (name := _NUMBER_OF.get(term.cause)) is not None:
-            size, deviation = moved.get(name, (0.0, 0.0))
-            moved[name] = (size + float(sizes[0]), float(np.hypot(deviation, deviations[0])))
-    numbers: list[RelationNumber] = []
-    for name, (size, deviation) in moved.items():
-        described, half = known[name] or 0.0, _TWO_SIDED_90 * deviation
-        value = described + size
-        numbers.append(RelationNumber(name, signal_of(answered.name), described, value, (value - half, value + half)))
-    return numbers
 
 
 def _pictures(relations: Relations, runs: list[Prepared]) -> list[Picture]:
