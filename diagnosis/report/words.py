@@ -7,7 +7,7 @@ from typing import Final
 from bridge.units import decimals_of, fixed_digits, interval, name_and_unit, percent, prefixed, quantity, times
 from diagnosis.hypotheses.catalogue import CATALOGUE
 from diagnosis.latent.answer import LatentSignal
-from diagnosis.latent.components import NOISE, SCATTER
+from diagnosis.latent.causes import NOISE, SCATTER
 from diagnosis.latent.rows import BREAKAWAY, SLIDING
 from diagnosis.result import PARAMETERS, Diagnosis, Estimate, RelationNumber, RelationRow, Remainder, RigNumber, Share
 from diagnosis.verdict.by_latent import MOST
@@ -19,6 +19,8 @@ EFFECT_WORDS: Final = {name: row.words for name, row in CATALOGUE.items()} | {
     "unexplained": "there is a gap, and nothing in the library closes it",
 }
 _BELOW_0: Final = {("drive-hardening", "ratio"): "a softening"}  # text for negative values, by effect and parameter
+# finding of a signal whose course may be one over place or one over time, and its text
+SLOW, SLOWLY = "slow", "varies slowly: these runs cannot tell place from time"
 _MOST_IN_SENTENCE = 3  # most causes in a sentence
 
 
@@ -125,18 +127,10 @@ def _size(size: float, unit: str) -> str:
 
 def share_in_words(share: Share) -> str:
     """A share with its interval, and the share that chance alone reaches."""
-    text = f"{share.what} {_percent(share.share)}"
-    if known := _between(share.interval_90):
+    text = f"{share.what} {percent(share.share)}"
+    if known := interval(share.interval_90):
         text += f" (90 %: {known})"
-    return text if share.null_90 is None else f"{text}; chance alone shows up to {_percent(share.null_90)}"
-
-
-def _between(pair: tuple[float, float] | None) -> str:
-    return interval(None if pair is None else (max(pair[0], 0.0), max(pair[1], 0.0)))
-
-
-def _percent(share: float) -> str:
-    return percent(max(share, 0.0))
+    return text if share.null_90 is None else f"{text}; chance alone shows up to {percent(share.null_90)}"
 
 
 def remainder_in_words(remainder: Remainder) -> str:
@@ -204,6 +198,7 @@ def latent_answer(diagnosis: Diagnosis) -> str:
 def latent_sentences(diagnosis: Diagnosis, kept: str) -> list[str]:
     """One sentence per signal: the size of the difference, and the share that each cause explains."""
     sentences: list[str] = []
+    slow = {finding.where for finding in diagnosis.findings if finding.kind == SLOW}
     for row in diagnosis.relations:
         if row.relation not in (BREAKAWAY, SLIDING):
             continue
@@ -212,4 +207,6 @@ def latent_sentences(diagnosis: Diagnosis, kept: str) -> list[str]:
         listed = "; ".join(share_in_words(share) for share in largest[:_MOST_IN_SENTENCE])
         off = f"The {row.relation}{kept} is off by {quantity(row.refitted, row.unit)} rms"
         sentences.append(f"{off}: {listed}." if listed else f"{off}; no cause explains it better than chance.")
+        if row.relation in slow:
+            sentences.append(f"It {SLOWLY}.")
     return sentences
