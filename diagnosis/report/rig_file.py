@@ -42,7 +42,7 @@ def refuse_force_drive(evidence: Evidence) -> None:
     if evidence.rig.drive == "force":
         raise Fault(
             "CONFIG",
-            f'{name}: rig.drive = "force": a rig file cannot describe it, the stand-in rig pulls through a spring; use the '
+            f'{name}: rig.drive = "force": a rig file cannot describe it, as a simulated rig pulls through a spring; use the '
             "parameters in the JSON of the diagnosis",
         )
 
