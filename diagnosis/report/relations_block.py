@@ -7,10 +7,11 @@ import numpy as np
 from bridge.log.finding import Finding
 from diagnosis.gap.prepare import Prepared
 from diagnosis.latent.answer import LatentSignal
-from diagnosis.latent.components import NOISE, SCATTER
+from diagnosis.latent.causes import SCATTER
 from diagnosis.relations.answer import Answered, Relations
 from diagnosis.relations.decide import Decision
 from diagnosis.report.summary import summary
+from diagnosis.report.words import SLOW, SLOWLY
 from diagnosis.result import (
     Curve,
     Diagnosis,
@@ -23,7 +24,6 @@ from diagnosis.result import (
 
 _SIGNALS = {"spring": "spring relation", "motion": "motion relation", "drive": "drive relation"}
 _POINTS = 1500  # most points of a curve
-_LEAST_SHARE = 0.02  # smallest share of a cause of the friction that is reported
 
 
 def with_relations(
@@ -114,10 +114,9 @@ def _pictures(relations: Relations, runs: list[Prepared]) -> list[Picture]:
 def latent_shares(latent: Sequence[LatentSignal]) -> tuple[Share, ...]:
     """The shares of every signal, in the format of the diagnosis."""
     return tuple(
-        Share(signal.signal, share.what, share.share, None if share.what == NOISE else share.interval_90, share.null_90)
+        Share(signal.signal, share.what, share.share, share.interval_90, share.null_90)
         for signal in latent
         for share in signal.shares
-        if share.share > _LEAST_SHARE or share.what in (SCATTER, NOISE)
     )
 
 
@@ -138,7 +137,7 @@ def latent_rows(latent: Sequence[LatentSignal]) -> tuple[RelationRow, ...]:
 
 
 def _latent_remainder(latent: Sequence[LatentSignal]) -> Remainder | None:
-    """The largest scatter that depends on no variable."""
+    """The largest part of a signal that no cause predicts."""
     if not latent:
         return None
     worst = max(latent, key=lambda signal: signal.left)
@@ -147,6 +146,5 @@ def _latent_remainder(latent: Sequence[LatentSignal]) -> Remainder | None:
 
 
 def _latent_findings(latent: Sequence[LatentSignal]) -> tuple[Finding, ...]:
-    """A finding for each signal in which a dependence on position cannot be separated from a dependence on time."""
-    text = "no position is passed twice, so a dependence on position cannot be separated from a dependence on time"
-    return tuple(Finding("one-pass", signal.signal, text) for signal in latent if not signal.revisited)
+    """A finding for each signal that no cause predicts and that varies slowly."""
+    return tuple(Finding(SLOW, signal.signal, SLOWLY) for signal in latent if signal.varies_slowly)

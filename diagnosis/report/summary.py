@@ -7,6 +7,8 @@ from bridge.units import counted, percent, signal_name, times
 from diagnosis.evidence.foreign_vibration import DISTORTED, PICK_UP
 from diagnosis.model.per_run import has_own_phases
 from diagnosis.report.words import (
+    SLOW,
+    SLOWLY,
     closed_between,
     closed_in_words,
     headline,
@@ -110,6 +112,9 @@ def _others(diagnosis: Diagnosis) -> Iterator[str]:
             yield f"the phase of {row.effect} differs from run to run, so on a run of unknown phase it counts as scatter"
     if diagnosis.verdict == "unexplained" and diagnosis.candidates and diagnosis.candidates[0].form == "random":
         yield f"it scatters as {diagnosis.candidates[0].effect} at random would, and as bursts of debris would"
+    for finding in diagnosis.findings:
+        if finding.kind == SLOW:
+            yield f"the {finding.where} {SLOWLY}"
     still = [finding.where.partition(":")[0] for finding in diagnosis.findings if finding.kind == "still"]
     if still:
         yield f"in {', '.join(still)} the drive does not move: friction and drive are not tested there"

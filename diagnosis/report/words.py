@@ -7,7 +7,7 @@ from typing import Final
 from bridge.units import decimals_of, fixed_digits, interval, name_and_unit, percent, prefixed, quantity, times
 from diagnosis.hypotheses.catalogue import CATALOGUE
 from diagnosis.latent.answer import LatentSignal
-from diagnosis.latent.components import NOISE, SCATTER
+from diagnosis.latent.causes import NOISE, SCATTER
 from diagnosis.latent.rows import BREAKAWAY, SLIDING
 from diagnosis.result import (
     PARAMETERS,
@@ -27,6 +27,8 @@ EFFECT_WORDS: Final = {name: row.words for name, row in CATALOGUE.items()} | {
     "none": "the rig as described, inside its tolerances, is enough",
 }
 _BELOW_0: Final = {("drive-hardening", "ratio"): "a softening"}  # text for negative values, by effect and parameter
+# finding of a signal whose course may be one over place or one over time, and its text
+SLOW, SLOWLY = "slow", "varies slowly: these runs cannot tell place from time"
 
 
 def headline(diagnosis: Diagnosis) -> str:
