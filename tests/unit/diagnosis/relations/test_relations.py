@@ -5,7 +5,7 @@ import pytest
 
 from diagnosis.relations.answer import Relations, relations_of
 from diagnosis.relations.decide import Decision, decision_of, ruled_out
-from tests.unit.diagnosis.relations.kinematic import BLOCK_S, STIFFNESS_N_PER_M, Signals, rig, runs
+from tests.unit.diagnosis.relations.kinematic import BLOCK_S, STIFFNESS_N_PER_M, Signals, in_units, rig, runs
 
 pytestmark = pytest.mark.slow
 T_S = (np.arange(8000) + 0.5) * BLOCK_S
@@ -74,6 +74,20 @@ def test_a_cause_is_named_by_its_relation_alone(cause, name: str, relation: str)
     share = decision.decided[0].share
     assert share is not None
     assert share.null_90 < share.interval_90[0] <= share.share <= share.interval_90[1] <= 1.0
+
+
+@pytest.mark.parametrize("cause", [None, hardens, is_uneven])
+def test_no_answer_depends_on_the_units_of_a_record(cause):
+    """A rotary record has 75 rad of travel in place of 16 mm, and 0.6 N m in place of 17 N."""
+    _, decision = answer(cause)
+    turning, in_rad = in_units(rig(), runs(cause), 75.0 / 0.016, 0.035)
+    turned = decision_of(relations_of(turning, in_rad), turning)
+    assert [(item.cause, item.relation, item.alike) for item in turned.decided] == [
+        (item.cause, item.relation, item.alike) for item in decision.decided
+    ]
+    assert turned.outside == decision.outside == ()
+    for one, other in zip(turned.decided, decision.decided, strict=True):
+        assert one.evidence == pytest.approx(other.evidence, rel=1e-3)
 
 
 def test_effects_that_their_relation_does_not_show_are_ruled_out():
