@@ -90,7 +90,7 @@ def full_map(record: MeasuredRecord, seen: LookResult) -> str:
 def write_evidence(record: MeasuredRecord, seen: LookResult, folder: Path) -> tuple[RigTable, list[str]]:
     """Make `folder` an evidence folder of this record; returns its rig and the assumed numbers. Raises Fault, OSError."""
     rig, assumed = rig_of(seen, record.path.name)
-    columns = {"t_s": record.t_s, "drive_force_N": record.force_N, **record.vibration}
+    columns = {"t_s": record.t_s, "drive_force_N": record.force_N, **record.others}
     if record.position_m is not None:
         columns["drive_position_m"] = record.position_m
     speed = seen.known.speed_mps if record.position_m is None else None

@@ -18,7 +18,7 @@ from bridge.tables.table import Table
 from bridge.tables.unit_words import in_brackets, known_unit, weight_unit
 from cockpit.look.findings import of_time, of_values, tare_of
 from diagnosis.evidence.import_table import ImportMap
-from diagnosis.evidence.manifest_keys import VIBRATION, ChannelMap
+from diagnosis.evidence.manifest_keys import USUAL, ChannelMap, Columns
 from diagnosis.evidence.mapped import calendar_unit_s, has_time, mapped
 from diagnosis.evidence.run_log import columns_of_log
 from diagnosis.look.guess import Guess, guess, no_time
@@ -30,6 +30,7 @@ from diagnosis.look.words import headline
 # Shortest stretch without vibration that is looked at. Shorter: stops and turns of the drive between two vibrations count as
 # swings, 1.5 s in docs/guides/describe-an-axis.md. Longer: the controller's trials without vibration, 5 s, are left out.
 _ALONE_S = 2.0
+_LOOKED_AT = ("t_s", "drive_force_N", "drive_position_m")
 
 
 class LookOptions(NamedTuple):
@@ -52,7 +53,7 @@ class MeasuredRecord(NamedTuple):
     t_s: Floats
     force_N: Floats
     position_m: Floats | None  # position of the drive
-    vibration: dict[str, Floats]  # commanded frequency and amplitude; empty if unknown
+    others: Columns  # every other standard column: motion of the slide and of the base, commanded vibration
     known: RecordFacts
     findings: list[Finding]
     map_text: str  # map that reproduces this reading; empty if a map was given, or for a run log
@@ -61,9 +62,9 @@ class MeasuredRecord(NamedTuple):
     def free(self) -> Bools:
         """True for samples in long stretches without a commanded vibration, which hides stick, slip and swing of the slide."""
         free = np.ones(len(self.t_s), np.bool_)
-        if "vibration_amplitude_m" not in self.vibration:
+        if "vibration_amplitude_m" not in self.others:
             return free
-        vibrates = self.vibration["vibration_amplitude_m"] > 0.0
+        vibrates = self.others["vibration_amplitude_m"] > 0.0
         limits = [0, *(np.flatnonzero(np.diff(vibrates)) + 1).tolist(), len(free)] if vibrates.any() else []
         for first, end in pairwise(limits):
             free[first:end] = not vibrates[first] and self.t_s[end - 1] - self.t_s[first] >= _ALONE_S
@@ -203,8 +204,8 @@ def _record(
         not np.isfinite(position).any() or float(np.nanmax(position) - np.nanmin(position)) == 0.0
     ):
         position = None
-    vibration = {name: columns[name] for name in VIBRATION if name in columns}
-    record = MeasuredRecord(path, columns["t_s"], columns["drive_force_N"], position, vibration, known, findings, text)
+    others = {name: columns[name] for name in USUAL if name in columns and name not in _LOOKED_AT}
+    record = MeasuredRecord(path, columns["t_s"], columns["drive_force_N"], position, others, known, findings, text)
     free = record.free
     if free.all():
         return record

@@ -77,7 +77,9 @@ class Nuisances:
         values = self._values(deviations)
         values["stribeck_tail"] = _TAIL * float(deviations[count])
         chain: dict[str, float] = {}
-        for (name, (mean, spread)), deviation in zip(self._chain.items(), deviations[count + 1 :].tolist(), strict=True):
+        for (name, (mean, spread)), deviation in zip(
+            self._chain.items(), deviations[count + 1 :].tolist(), strict=True
+        ):
             chain[name] = mean + spread * deviation
             if name in _NOT_NEGATIVE:
                 chain[name] = max(chain[name], 0.0)

@@ -35,10 +35,12 @@ def drive_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
     fitted = [i for i, run in enumerate(runs) if not run.holdout and pieces[i]]
     if not fitted:
         return Missing("drive", "no stretch of constant speed is long enough")
-    place = [run.signals["drive_position_m"] for run in runs]
-    own_s = [(np.arange(len(s)) + 0.5) * BLOCK_S for s in place]
+    measured = [run.signals["drive_position_m"] for run in runs]
+    own_s = [(np.arange(len(s)) + 0.5) * BLOCK_S for s in measured]
     speed = [np.abs(run.commands.drive) for run in runs]
-    left = [_without_parabola(s, pieces_of) for s, pieces_of in zip(place, pieces, strict=True)]
+    left = [_without_parabola(s, pieces_of) for s, pieces_of in zip(measured, pieces, strict=True)]
+    # of the even path: a function of the measured place could be that place itself, and then leaves nothing of anything
+    place = [s - uneven for s, uneven in zip(measured, left, strict=True)]
     rows = [(i, slice(*piece)) for i in fitted for piece in pieces[i]]
     travel_m = max(float(np.ptp(place[i][piece])) for i, piece in rows)
     if float(np.mean(np.concatenate([left[i][piece] for i, piece in rows]) ** 2)) <= (RESOLVED * travel_m) ** 2:

@@ -37,7 +37,7 @@ def test_the_vibration_of_a_record_stays_in_its_evidence(tmp_path: Path) -> None
     record = vibrated_at_last()
     write_evidence(record, looked_at(record), tmp_path / "evidence")
     run = load_evidence(tmp_path / "evidence").runs[0]
-    assert run.columns["vibration_amplitude_m"].tolist() == record.vibration["vibration_amplitude_m"].tolist()
+    assert run.columns["vibration_amplitude_m"].tolist() == record.others["vibration_amplitude_m"].tolist()
 
 
 def test_a_run_log_without_a_stretch_free_of_vibration_is_refused() -> None:

@@ -161,6 +161,33 @@ def test_an_unevenness_too_small_to_pull_is_not_named_however_well_it_shows():
     assert decision == Decision((), ())
 
 
+def test_a_wave_of_a_pitch_that_only_a_short_way_shows_is_found_exactly():
+    def is_finely_uneven(_: int, signals: Signals) -> None:
+        wave_m = 1e-6 * np.sin(2.0 * np.pi * signals["drive_position_m"] / 8.7e-5)
+        signals["drive_position_m"] += wave_m
+        signals["drive_force_N"] += STIFFNESS_N_PER_M * wave_m
+
+    relations, decision = answer(is_finely_uneven)
+    assert [item.cause for item in decision.decided] == ["drive-speed-ripple"]
+    assert relations.answered[2].chosen.terms[0].form == "every 0.087 mm"
+
+
+def test_a_drive_whose_command_changes_is_not_uneven():
+    """A motion that the held-out run does not repeat at the same place; it was called uneven with a share of 0 %."""
+
+    def wanders(number: int, signals: Signals) -> None:
+        path_m = 3e-5 * np.sin(2.0 * np.pi * T_S / (3.0 + number) + 2.0 * number) * np.sin(2.0 * np.pi * T_S / 7.0)
+        signals["drive_position_m"] += path_m
+        signals["drive_force_N"] += STIFFNESS_N_PER_M * path_m
+
+    relations, decision = answer(wanders)
+    pattern = relations.answered[2].patterns[0]
+    assert pattern.evidence > 25.0
+    assert pattern.share is not None
+    assert pattern.share < 0.0
+    assert decision == Decision((), ())
+
+
 def test_a_size_that_differs_between_runs_withdraws_the_name():
     def in_one_run(number: int, signals: Signals) -> None:
         if number == 0:
