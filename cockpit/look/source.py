@@ -1,8 +1,10 @@
 """Reads a measured file and the given facts into one record; reports its assumptions as findings and as a map to correct."""
 
 import json
+from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +22,7 @@ from cockpit.look.findings import of_time, of_values, tare_of
 from diagnosis.evidence.import_table import ImportMap
 from diagnosis.evidence.manifest_keys import USUAL, ChannelMap, Columns
 from diagnosis.evidence.mapped import calendar_unit_s, has_time, mapped
-from diagnosis.evidence.run_log import columns_of_log
+from diagnosis.evidence.run_log import LoggedRun, columns_of_log
 from diagnosis.look.guess import Guess, guess, no_time
 from diagnosis.look.look import LookResult, RecordFacts, look
 from diagnosis.look.slips import FEWEST
@@ -56,6 +58,7 @@ class MeasuredRecord(NamedTuple):
     others: Columns  # every other standard column: motion of the slide and of the base, commanded vibration
     known: RecordFacts
     findings: list[Finding]
+    rig: Mapping[str, float]  # numbers of [rig] that a run log describes; empty for another file
     map_text: str  # map that reproduces this reading; empty if a map was given, or for a run log
 
     @property
@@ -73,9 +76,9 @@ class MeasuredRecord(NamedTuple):
 
 def read_record(path: Path, asked: LookOptions) -> MeasuredRecord:
     """Read a table or a run log. Raises Fault BAD_TABLE, BAD_LOG, CONFIG."""
-    if path.is_file() and kind_of(path) == "mcap" and _is_run_log(path):
-        columns, findings = columns_of_log(path)
-        return _record(path, columns, RecordFacts(asked.speed_mps, asked.load_N, asked.mass_kg), findings, "")
+    if path.is_file() and kind_of(path) == "mcap" and (logged := _logged(path)) is not None:
+        known = RecordFacts(asked.speed_mps, asked.load_N, asked.mass_kg)
+        return _record(path, logged.columns, known, logged.findings, "", logged.rig)
     if asked.map is not None:
         wanted = validate(ImportMap, read_toml(asked.map), asked.map.name)
         table = read_table(path, wanted.source.dialect, wanted.source.format)
@@ -173,15 +176,14 @@ def looked_at(record: MeasuredRecord) -> LookResult:
     return seen
 
 
-def _is_run_log(path: Path) -> bool:
-    """True if an MCAP log has the sensors of this project."""
+def _logged(path: Path) -> LoggedRun | None:
+    """The run of an MCAP log; None without sensors of this project."""
     try:
-        columns_of_log(path)
+        return columns_of_log(path)
     except Fault as fault:
         if fault.kind.code in ("BAD_LOG", "BAD_MESSAGE"):
-            return False
+            return None
         raise
-    return True
 
 
 def _record(
@@ -190,6 +192,7 @@ def _record(
     known: RecordFacts,
     findings: list[Finding],
     text: str,
+    rig: Mapping[str, float] = MappingProxyType({}),
 ) -> MeasuredRecord:
     if "drive_force_N" not in columns:
         raise Fault("BAD_TABLE", f"{path.name}: has no drive_force_N: a force is needed; map a force in [channels]")
@@ -205,7 +208,9 @@ def _record(
     ):
         position = None
     others = {name: columns[name] for name in USUAL if name in columns and name not in _LOOKED_AT}
-    record = MeasuredRecord(path, columns["t_s"], columns["drive_force_N"], position, others, known, findings, text)
+    record = MeasuredRecord(
+        path, columns["t_s"], columns["drive_force_N"], position, others, known, findings, rig, text
+    )
     free = record.free
     if free.all():
         return record

@@ -34,7 +34,7 @@ _NOT_NEGATIVE = ("accel_lowest_Hz", "accel_rolled_off")
 class Nuisances:
     """The nuisances of a rig as a vector [nuisances] in units of their tolerances; 0 is the described rig.
 
-    `travel_m`: of the drive; that of the paper's runs if not given.
+    `travel_m`: of the drive; as in the paper's runs if not given.
     """
 
     def __init__(self, rig: RigTable, travel_m: float = _PAPER_TRAVEL_M) -> None:

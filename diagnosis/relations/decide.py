@@ -181,8 +181,10 @@ def _outside_cause(answered: Answered, cause: Decided) -> Outside:
 
 def _pattern(answered: Answered, named: list[Decided]) -> Outside | None:
     taken = math.sqrt(max(answered.refitted**2 - answered.left**2, 0.0)) if named else 0.0
-    # what a drive does in some runs and not in those held out is its command
-    predicts = [one for one in answered.patterns if answered.name != "drive" or one.share is None or one.share > 0.0]
+    # a motion of the drive that the held-out runs do not repeat is its command
+    predicts = [
+        seen for seen in answered.patterns if answered.name != "drive" or seen.share is None or seen.share > 0.0
+    ]
     for pattern in () if answered.name in _COARSE else predicts:
         if pattern.evidence > _PATTERN and pattern.rms > max(_PATTERN_OVER_NOISE * answered.noise, _MISMATCH * taken):
             return Outside(

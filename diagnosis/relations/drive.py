@@ -16,7 +16,9 @@ from diagnosis.relations.shapes import hats, knots_of
 _HIGHEST_HZ = 60.0  # of the unevenness that is compared
 _DEPTH = 0.1  # typical share by which an uneven drive's speed swings
 _WAVES = 2  # strongest waves over the place, and over time, that become columns
-_FASTEST_HZ = 30.0  # of a wave, at the mean speed: half of what is compared, as each wave has a second harmonic
+_FASTEST_HZ = (
+    30.0  # of a wave, at the mean speed: half the highest compared frequency, as each wave has a second harmonic
+)
 _WANDER = 5e-5  # slow drift of a displacement sensor, as a share of the travel
 _FEWEST_TURNS = 2.0  # of a wave in the longest piece; a slower one is a wander of the sensor
 _APART_TURNS = 1.2  # in the longest piece, by which two waves differ: a line is a turn wide
@@ -96,11 +98,11 @@ def _without_parabola(values: Floats, pieces: tuple[Piece, ...]) -> Floats:
 
 
 def _strongest(over: list[Floats], left: list[Floats], rows: list[tuple[int, slice]]) -> list[float]:
-    """Turns per unit of the waves over a variable that take most of what is left: of any length that the rows resolve.
+    """Turns per unit of the waves over a variable that take most of the rest: of any length that the rows resolve.
 
     Args:
         over: place or time, [rows of the run] each.
-        left: what is left, [rows of the run] each.
+        left: the rest, [rows of the run] each.
         rows: run and rows of each piece.
 
     """

@@ -30,7 +30,7 @@ class Pattern(NamedTuple):
     what: str  # the variable
     evidence: float  # natural logarithm, against the chosen causes alone
     rms: float  # of the function over the rows, in the relation's unit
-    share: float | None  # of what the chosen causes leave on the held-out runs; below 0: it predicts worse than nothing
+    share: float | None  # of the rest on the held-out runs; below 0: it predicts worse than nothing
 
 
 def patterns_of(
@@ -56,7 +56,7 @@ def patterns_of(
 
 
 def _freed(whole: Floats, model: np.ndarray, spreads: Floats, columns: np.ndarray) -> Floats:
-    """The products of `columns` and of what is left, less what the columns of the model take."""
+    """The products of `columns` and of the rest, less the part that the columns of the model take."""
     everything = np.append(columns, whole.shape[0] - 1)
     free = whole[everything[:, None], everything]
     if len(model) == 0:
