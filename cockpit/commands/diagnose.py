@@ -158,7 +158,14 @@ def _diagnose_file(path: Path, options: _Options, speed: str, mass: str, channel
         _print_line(options, headline(seen))
         for name, value in rig.values().items():
             share = rig.tolerance.get(name, 0.0)
-            how = "assumed" if name in assumed else "from the file" if name != "mass_kg" or not mass else "given"
+            given = (
+                "given"
+                if name == "mass_kg" and mass
+                else "described in the log"
+                if name in record.rig
+                else "from the file"
+            )
+            how = "assumed" if name in assumed else given
             _print_line(
                 options,
                 f"rig        {name} = {value:.6g}" + (f" +- {100.0 * share:.2g} %" if share else "") + f", {how}",

@@ -47,7 +47,7 @@ class Retuned(NamedTuple):
 
 def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, float], None], jobs: int = 1) -> Retuned:
     """Refit the rig of an evidence to its fitted runs. Raises Fault BAD_EVIDENCE when nothing can be compared."""
-    nuisances = Nuisances(evidence.rig)
+    nuisances = Nuisances(evidence.rig, problem.travel_m)
     described = np.zeros(len(nuisances))
     point = nuisances.point(described, {})
     first = replicates(problem, point, ROUGHNESS, FIRST_REPLICATES, 1)

@@ -76,6 +76,10 @@ class Problem:
         self.until_s = math.inf  # deadline of `predicted_many` by `time.monotonic`, which all processes share
         self.pace = 0.0  # computing time for a simulated second of one lane, from the last batch [s/s]
         self.scales = scales_of(rig)
+        longest_m = max(BLOCK_S * float(np.abs(run.commands.drive).sum()) for run in runs)
+        self.travel_m = (
+            longest_m + self.scales.force_N / self.scales.stiffness_N_per_m
+        )  # of the drive; no meaning with force
         self.force_peak_N = max(float(np.abs(run.signals.get("drive_force_N", np.zeros(1))).max()) for run in runs)
         self._simulated: dict[object, Signals | None] = {}
         self._averaged = {run.file: averaged(run.commands.frequency_Hz) for run in runs}

@@ -133,8 +133,10 @@ def judge(
     leaders = best.fit.hypothesis.effects if best is not None and top in best.fit.hypothesis.effects else (top,)
     mistaken = mistaken_of(leaders, best is not None and best.scatters)
     probabilities = with_mistakes(softmax(scores), leaders, mistaken)
-    if best is None or top == "none":
+    if top == "none":
         return Verdict("no-gap", None, probabilities, ranked[0].fit if ranked else None, tuple(ranked), scale)
+    if best is None:  # the time ran out before any effect was fitted
+        return Verdict("unexplained", None, probabilities, None, (), scale)
     # fits whose friction can be predicted: no experiment separates two random paths
     followed = [candidate.fit for candidate in ranked if not is_random(candidate.fit.hypothesis)]
     if top == "unexplained":
