@@ -57,7 +57,7 @@ def _sure(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"{percent(1.0 - diagnosis.complete)} that something outside the library acts"
     elif known:
         yield f"{percent(diagnosis.complete)} that nothing else acts"
-    if known and not by_number:  # to the judge, a number that moved within its bounds is no cause but `none`
+    if known and not by_number:  # the judge counts a number within its bounds as `none`
         yield f"{'other' if diagnosis.effects else 'leading'} candidates {', '.join(others[:_OTHERS])}"
     for group in diagnosis.not_distinguishable:
         yield f"these runs cannot separate {', '.join(group)}"
