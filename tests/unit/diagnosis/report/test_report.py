@@ -228,6 +228,15 @@ def test_every_verdict_without_an_effect_has_its_words(verdict, answer, sure, nu
     assert lines["held out"] == "run-04.parquet: 6.2 noise floors as described, 5.9 refitted (perfect: 1)"
 
 
+def test_a_number_that_no_effect_stands_for_has_no_rival_candidates():
+    made = made_up.diagnosis()._replace(verdict="described", effects=("static-level",), not_distinguishable=())
+    assert told(made)["sure"] == "98 % that nothing else acts"
+    level = (Candidate("static-level", 0.9), Candidate("none", 0.1))
+    assert told(made._replace(candidates=level))["sure"].startswith(
+        "static-level 90 %; 98 % that nothing else acts; other"
+    )
+
+
 def test_without_a_fit_the_probabilities_are_unknown():
     made = made_up.diagnosis()
     candidates = tuple(row._replace(probability=NAN) for row in made.candidates)
