@@ -28,7 +28,7 @@ EFFECT_WORDS: Final = {name: row.words for name, row in CATALOGUE.items()} | {
 }
 _BELOW_0: Final = {("drive-hardening", "ratio"): "a softening"}  # text for negative values, by effect and parameter
 # finding of a signal whose course may be one over place or one over time, and its text
-SLOW, SLOWLY = "slow", "varies slowly: these runs cannot tell place from time"
+SLOW, SLOWLY = "slow", "varies slowly: these runs cannot separate place from time"
 
 
 def headline(diagnosis: Diagnosis) -> str:
