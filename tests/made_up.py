@@ -107,7 +107,7 @@ def diagnosis() -> Diagnosis:
             "to 100 %)",
             "else       46 mN remain in the spring relation over the extension, where noise is 12 mN: nothing in the library",
             "numbers    drive stiffness 11.01 kN/m (90 %: 10.95 to 11.07), described 11.7 kN/m (2.9 tolerances off)",
-            "next       Reverse the drive at 0.1 mm/s with the mass at rest, three times. `--all` prints every relation, share "
+            "next       Reverse the drive at 0.1 mm/s with the mass at rest, three times. `--all` prints relations and shares, "
             "and 2 findings about the data.",
         ),
         candidates=(

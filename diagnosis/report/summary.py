@@ -28,14 +28,14 @@ _OTHERS = 2  # candidates after the named ones
 def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Six lines, the answer first; each but the first begins with its label."""
     others = "; ".join(_others(diagnosis)) or "nothing"
-    data = f" and {counted(len(diagnosis.findings), 'finding')} about the data" if diagnosis.findings else ""
+    data = f", and {counted(len(diagnosis.findings), 'finding')} about the data" if diagnosis.findings else ""
     return (
         headline(diagnosis),
         line("sure", "; ".join(_sure(diagnosis))),
         line("held out", "; ".join(_held_out(diagnosis))),
         line("else", others),
         line("numbers", _numbers(diagnosis)),
-        line("next", f"{diagnosis.next_experiment.what} `--all` prints every relation, share{data}."),
+        line("next", f"{diagnosis.next_experiment.what} `--all` prints relations and shares{data}."),
     )
 
 
