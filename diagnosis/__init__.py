@@ -2,6 +2,7 @@
 
 diagnose        all steps of a diagnosis, in order  result      the answer and its JSON
 diagnose_many   many folders, on cores or Dask      processes   one function on many items, in several processes
+deadline        the estimate of the time, and its end by the budget or by Ctrl-C
 version         the version of a result: a hash over the definitions that make a diagnosis
 slips           turning points of a record, and the slips of a force record
 

@@ -11,12 +11,13 @@ from contextlib import suppress
 from typing import NamedTuple
 
 from bridge.log.finding import Finding
+from diagnosis.deadline import GRACE_S, EndedError, OutOfTimeError, limited
 from diagnosis.evidence.folder import Evidence, MeasuredRun
 from diagnosis.evidence.foreign_vibration import DISTORTED
 from diagnosis.evidence.split import excerpt
 from diagnosis.fits.retuning import retuned_rig
 from diagnosis.gap.prepare import Prepared, prepare
-from diagnosis.gap.problem import PIEZO_EFFECTS, OutOfTimeError, Problem
+from diagnosis.gap.problem import PIEZO_EFFECTS, Problem
 from diagnosis.hypotheses.catalogue import cannot_show, trials
 from diagnosis.latent.answer import LatentSignal, latent_of
 from diagnosis.processes import one_thread
@@ -37,6 +38,7 @@ from diagnosis.verdict.selection import Contest, Hints, Progress
 _FOR_FITS = 0.7
 _NO_FIT = Finding("budget", "fits", "none was made: names and shares come from relations and friction alone")
 _CUT_SHORT = Finding("budget", "fits", "ended before every effect was tried: this is the best answer by then")
+_TIME_IS_UP = "the time is up: the best answer so far"
 
 
 def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1, budget_s: float | None = None) -> Diagnosis:
@@ -59,29 +61,39 @@ class _Seen(NamedTuple):
     """The runs, and the results of the steps before any fit."""
 
     runs: list[Prepared]
-    relations: Relations
-    decision: Decision
-    latent: tuple[LatentSignal, ...]
+    relations: Relations = Relations((), ())
+    decision: Decision = Decision((), ())
+    latent: tuple[LatentSignal, ...] = ()
 
 
 def _diagnosed(evidence: Evidence, progress: Progress, jobs: int, budget_s: float) -> Diagnosis:
     began = time.monotonic()
-    runs = prepare(evidence)
-    relations = relations_of(evidence.rig, runs)
-    seen = _Seen(runs, relations, decision_of(relations, evidence.rig), latent_of(evidence.rig, runs))
-    for line in (in_a_line(seen.decision), latent_line(seen.latent)):
-        if line:
-            progress(line, 0.02)
-    done = None
-    if comparable(runs):
-        done = _by_fits(evidence, seen, progress, jobs, (began, began + budget_s))
+    seen, done, finished = _Seen([]), None, False
+    try:
+        with limited(began + budget_s):
+            seen = _Seen(prepare(evidence))
+            relations = relations_of(evidence.rig, seen.runs)
+            seen = seen._replace(relations=relations, decision=decision_of(relations, evidence.rig))
+            seen = seen._replace(latent=latent_of(evidence.rig, seen.runs))
+        finished = not comparable(seen.runs)
+    except OutOfTimeError:
+        progress(_TIME_IS_UP, 0.02)
+    else:
+        for line in (in_a_line(seen.decision), latent_line(seen.latent)):
+            if line:
+                progress(line, 0.02)
+        if not finished:
+            done = _by_fits(evidence, seen, progress, jobs, (began, began + budget_s))
     if done is None:
         verdict = with_latent(with_relations_verdict(unfitted(), seen.decision, [], None, None), seen.latent, None)
         verdict = with_vibration_findings(verdict, evidence.runs)
-        done = without_fits(verdict, runs, LONGER if comparable(runs) else HOLD, began)
+        if verdict.kind == "unexplained" and not (finished or seen.decision.outside or verdict.outside):
+            verdict = verdict._replace(kind="not-finished")
+        done = without_fits(verdict, evidence.runs, HOLD if finished else LONGER, began)
         done = done._replace(findings=(*evidence.findings, _NO_FIT))
-    done = done._replace(cannot_show=cannot_show(evidence.rig, runs, evidence.assumed))
-    done = with_relations(done, evidence.rig, runs, relations, seen.decision, seen.latent)
+    if seen.runs:
+        done = done._replace(cannot_show=cannot_show(evidence.rig, seen.runs, evidence.assumed))
+    done = with_relations(done, seen.runs, seen.relations, seen.decision, seen.latent)
     progress(f"verdict: {done.verdict}", 1.0)
     return done
 
@@ -106,13 +118,17 @@ def _by_fits(
             Hints(frozenset(shown), bool(seen.decision.outside)),
         )
     except OutOfTimeError:
+        progress(_TIME_IS_UP, 0.2)
         return None
-    findings: tuple[Finding, ...] = ()
+    in_time = True
     try:
         contest.decide(progress)
-    except OutOfTimeError:
+    except OutOfTimeError as error:
+        progress(_TIME_IS_UP, 0.75)
         contest.stop()
-        findings = (_CUT_SHORT,)
+        in_time, jobs = False, 1  # the interruption ended the workers; new ones would take seconds
+        if isinstance(error, EndedError):
+            until_s = min(until_s, time.monotonic() + GRACE_S)
     contest.rig.fitter.problem.until_s = until_s
     held_out = [run for run in runs if run.holdout]
     judged_on = Problem(evidence.rig, held_out) if held_out else None
@@ -122,7 +138,7 @@ def _by_fits(
         outcome = borne_out(contest, judged_on, jobs)
     except OutOfTimeError:
         outcome = borne_out(contest, None, jobs)
-        findings = (_CUT_SHORT,)
+        in_time = False
     nearest = outcome.gone or outcome.verdict.runner_up
     closes = None
     if outcome.held_out is not None and nearest is not None:
@@ -133,10 +149,12 @@ def _by_fits(
     )
     verdict = with_latent(verdict, seen.latent, outcome.held_out)
     verdict = with_vibration_findings(verdict, evidence.runs)
+    outside = bool(seen.decision.outside) or verdict.outside
+    if not (in_time or contest.singles or verdict.names or outside):
+        verdict = verdict._replace(kind="not-finished")
     outcome = outcome._replace(verdict=verdict, best=verdict.named or contest.rig.fit)
-    progress(f"verdict: {outcome.verdict.kind}", 0.8)
-    done = assembled(evidence, runs, contest, outcome, tried, began, jobs)
-    return done._replace(findings=(*done.findings, *findings))
+    done = assembled(evidence, runs, contest, outcome, tried, began, jobs, outside)
+    return done if in_time else done._replace(findings=(*done.findings, _CUT_SHORT))
 
 
 def with_vibration_findings(verdict: Verdict, runs: Sequence[MeasuredRun]) -> Verdict:

@@ -217,8 +217,8 @@ def _workers(jobs: int, cluster: str, certs: str) -> Generator[_Workers]:
     if not cluster:
         if _NO_WARNING not in sys.warnoptions:
             sys.warnoptions.append(_NO_WARNING)
-        config = {"backend": "loky", "n_jobs": jobs, "initializer": _leave_interrupt_to_parent}
-        inner = {"backend": "loky", "initializer": _leave_interrupt_to_parent}
+        config = {"backend": "loky", "n_jobs": jobs, "initializer": leave_interrupt_to_parent}
+        inner = {"backend": "loky", "initializer": leave_interrupt_to_parent}
         yield _Workers(partial(_pool, config), jobs, 2 * jobs, inner, (BrokenProcessPool,))
         return
     try:
@@ -261,7 +261,7 @@ def _pool(config: dict[str, Any], dispatched: int) -> Any:
         return Parallel(return_as="generator_unordered", batch_size=cast(Any, 1), pre_dispatch=cast(Any, dispatched))
 
 
-def _leave_interrupt_to_parent() -> None:
+def leave_interrupt_to_parent() -> None:
     """Make a worker ignore Ctrl-C, which reaches every process of the terminal; the parent ends its workers."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,4 +1,4 @@
-"""The answer of a diagnosis; its JSON (`diagnosis/2`) is a fixed contract."""
+"""The answer of a diagnosis; its JSON (`diagnosis/3`) is a fixed contract."""
 
 import math
 from pathlib import PurePath
@@ -8,8 +8,9 @@ from bridge.arrays import Floats
 from bridge.log.finding import Finding
 from bridge.results import in_json
 
-FORMAT: Final = "diagnosis/2"
+FORMAT: Final = "diagnosis/3"
 PARAMETERS = "parameters alone"  # the baseline in the comparison on the held-out runs
+Kind = Literal["effect", "partly", "described", "no-gap", "unexplained", "not-finished"]
 
 
 def _name(file: str) -> str:
@@ -25,10 +26,10 @@ class Estimate(NamedTuple):
 
 
 class Candidate(NamedTuple):
-    """One explanation: an effect of the library, `none` or `unexplained`."""
+    """One explanation: an effect of the library, or `none`."""
 
     effect: str
-    probability: float
+    probability: float  # NaN where the time ran out before any cause was tried
     form: str = ""  # the formula of the effect that fitted best
     parameters: dict[str, Estimate] = {}  # names carry their units
     chi2: float | None = None  # of the fit with this effect alone, with the priors of the nuisances; None: not refitted
@@ -91,6 +92,18 @@ class RigNumber(NamedTuple):
     described: float
     retuned: float  # in the baseline
     tolerance: float  # one standard deviation, relative, or absolute where 0 is described; 0: known exactly
+
+
+class WrongNumber(NamedTuple):
+    """A described number of the rig that the fitted runs contradict."""
+
+    name: str
+    described: float
+    found: float
+    interval_90: tuple[float, float]
+    off: float | None  # distance from the described number, in tolerances; None: it was described as known exactly
+    # share of the gap on the held-out runs that it closes if all else is corrected; None: no gap without it
+    share: float | None
 
 
 class Experiment(NamedTuple):
@@ -166,23 +179,14 @@ class LeftOut(NamedTuple):
     why: str
 
 
-class RelationNumber(NamedTuple):
-    """A number of the rig table, fitted by one relation alone."""
-
-    name: str
-    relation: str
-    described: float
-    refitted: float
-    interval_90: tuple[float, float]
-
-
 class Diagnosis(NamedTuple):
     """The whole answer of a diagnosis."""
 
-    verdict: Literal["effect", "partly", "no-gap", "unexplained"]
+    verdict: Kind
     effects: tuple[str, ...]
-    summary: tuple[str, ...]  # the answer in plain words, the first sentence first
-    candidates: tuple[Candidate, ...]  # most probable first; every effect of the library, none and unexplained
+    summary: tuple[str, ...]  # the answer in six lines
+    candidates: tuple[Candidate, ...]  # most probable first; every effect of the library and none; they add up to 1
+    complete: float  # probability that nothing else acts; NaN: not judged
     not_distinguishable: tuple[tuple[str, ...], ...]
     where: tuple[Cell, ...]  # largest share first
     gap: Gap
@@ -196,11 +200,11 @@ class Diagnosis(NamedTuple):
     remainder: Remainder | None = None
     relations: tuple[RelationRow, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
-    numbers: tuple[RelationNumber, ...] = ()
+    numbers: tuple[WrongNumber, ...] = ()
     cannot_show: tuple[str, ...] = ()  # effects excluded by the drive, the runs or assumed numbers
     JSON_HIDDEN = ("pictures",)
 
     @in_json
-    def format(self) -> Literal["diagnosis/2"]:
+    def format(self) -> Literal["diagnosis/3"]:
         """Name and version of the JSON format."""
         return FORMAT

@@ -53,11 +53,11 @@ def kept(readme: str, picture: Path) -> str:
 
 
 def block(text: str) -> str:
-    """The lines of the kept output that the README shows: the first of the demo, the answer and the number of the diagnosis."""
+    """The lines of the kept output that the README shows: the first of the demo, and the answer of the diagnosis."""
     lines = text.splitlines()
     demo = lines[lines.index(f"$ {DEMO}") + 1]
-    shown = [demo, *(next(line for line in lines if line.startswith(word)) for word in ("effect:", "candidates"))]
-    return "\n".join(f"    {' '.join(line.split())}" for line in shown)
+    answer = lines[next(number for number, line in enumerate(lines) if line.startswith("effect:")) :]
+    return "\n".join(f"    {line}" for line in (demo, *answer))
 
 
 def main() -> None:

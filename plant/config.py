@@ -84,19 +84,21 @@ class PiezoConfig(Strict):
     frequency_min_Hz: Positive = 500.0
     frequency_max_Hz: Positive = 5000.0
     # 1 um/s reaches the paper's 0.02 um in 20 ms
-    amplitude_slew_m_per_s: NotNegative = Field(1e-6, description="Rate of the amplitude; 0: at once, as in the paper.")
+    amplitude_slew_m_per_s: NotNegative = Field(
+        default=1e-6, description="Rate of the amplitude; 0: at once, as in the paper."
+    )
     command_timeout_s: Annotated[float, Field(gt=0, le=5.0)] = 0.05
     delivered_ratio: Positive = 1.0
-    mount_resonance_Hz: NotNegative = Field(0.0, description="Resonance of the mount; 0: rigid.")
+    mount_resonance_Hz: NotNegative = Field(default=0.0, description="Resonance of the mount; 0: rigid.")
     mount_damping_ratio: Positive = 0.05
 
 
 class SensorsConfig(Strict):
     """The measuring chain of the paper's test rig; noise is rms, a resolution of 0 means no quantisation."""
 
-    force_range_N: Positive = Field(50.0, description="Highest force that is measured.")
+    force_range_N: Positive = Field(default=50.0, description="Highest force that is measured.")
     force_lowest_N: NotPositive = Field(
-        0.0, description="Lowest force that is measured; a drive that goes back needs one below 0."
+        default=0.0, description="Lowest force that is measured; a drive that goes back needs one below 0."
     )
     force_noise_N: NotNegative = 0.02
     force_bandwidth_Hz: Positive = 2000.0
@@ -108,9 +110,9 @@ class SensorsConfig(Strict):
     accel_bandwidth_Hz: Positive = 10000.0
     accel_resolution_mps2: NotNegative = 2 * 490.3325 / 2**20
     position_range_m: Positive = Field(
-        0.05, description="Highest position that is measured; slide and drive begin at 0."
+        default=0.05, description="Highest position that is measured; slide and drive begin at 0."
     )
-    position_lowest_m: NotPositive = Field(0.0, description="Lowest position that is measured.")
+    position_lowest_m: NotPositive = Field(default=0.0, description="Lowest position that is measured.")
     position_noise_m: NotNegative = 5e-7
     position_bandwidth_Hz: Positive = 800.0  # HBM WA on a carrier amplifier: below 1 kHz
     position_linearity: NotNegative = 0.002
@@ -124,7 +126,8 @@ class SolverConfig(Strict):
     # Shorter: at 20 kHz a message has more fields than samples of a channel. Longer: a slip of the paper's rig, 36 ms, is over
     # within two blocks.
     block_s: Annotated[float, Field(ge=0.25e-3, le=20e-3)] = Field(
-        1e-3, description="Length of a block. In real time 0.001 or more; shorter in lockstep and in one process."
+        default=1e-3,
+        description="Length of a block. In real time 0.001 or more; shorter in lockstep and in one process.",
     )
     samples_per_block: Annotated[int, Field(ge=4, le=400)] = 20
 
@@ -133,10 +136,11 @@ class LoopConfig(Strict):
     """Delays between sensors and exciter in addition to the controller's: converters, drivers, a slow bus."""
 
     delay_s: Annotated[float, Field(ge=0, le=LONGEST_DELAY_S)] = Field(
-        0.0, description="Additional delay of each command, rounded up to whole blocks; 0: it acts in the next block."
+        default=0.0,
+        description="Additional delay of each command, rounded up to whole blocks; 0: it acts in the next block.",
     )
     jitter_s: Annotated[float, Field(ge=0, le=LONGEST_JITTER_S)] = Field(
-        0.0, description="Largest random addition to delay_s, uniform; commands do not overtake each other."
+        default=0.0, description="Largest random addition to delay_s, uniform; commands do not overtake each other."
     )
 
     def longest_s(self, block_s: float) -> float:
@@ -187,9 +191,8 @@ class RigConfig(Strict):
                 f"piezo.frequency_max_Hz = {piezo.frequency_max_Hz}: must be above "
                 f"piezo.frequency_min_Hz = {piezo.frequency_min_Hz}"
             )
-        self.guard.tones_Hz(
-            piezo.frequency_min_Hz, piezo.frequency_max_Hz
-        )  # a loop check without allowed tones is refused here
+        # a loop check without allowed tones is refused here
+        self.guard.tones_Hz(piezo.frequency_min_Hz, piezo.frequency_max_Hz)
         coarsest_s = 1.0 / (_FEWEST_STEPS_A_PERIOD * piezo.frequency_max_Hz)
         if solver.step_s > coarsest_s * (1.0 + 1e-9):
             raise ValueError(

@@ -36,14 +36,16 @@ class DriveConfig(Strict):
     stiffness_N_per_m: Positive = 11700.0
     damping_Ns_per_m: NotNegative = 0.0
     profile: Annotated[list[Two], Field(min_length=1)] = Field(
-        [(0.0, 0.0005)], description="[[time_s, velocity_mps], ...], linear in between; below 0: backwards."
+        default=[(0.0, 0.0005)], description="[[time_s, velocity_mps], ...], linear in between; below 0: backwards."
     )
     moves: Annotated[list[MoveConfig], Field(max_length=10_000)] = Field(
-        [], description="Jerk-limited moves, one after the other, in place of the profile."
+        default=[], description="Jerk-limited moves, one after the other, in place of the profile."
     )
-    repeat_every_s: NotNegative = Field(0.0, description="Profile or moves repeat after this time; 0: they run once.")
+    repeat_every_s: NotNegative = Field(
+        default=0.0, description="Profile or moves repeat after this time; 0: they run once."
+    )
     announce_ahead_s: NotNegative = Field(
-        0.0,
+        default=0.0,
         description="The rig announces the drive velocity to the controller this long ahead, in whole blocks; 0: never.",
     )
 

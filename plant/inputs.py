@@ -34,14 +34,14 @@ class Inputs(NamedTuple):
         announce = ANNOUNCE.blank(len(self.announce) + len(later.announce))
         announce[: len(self.announce)], announce[len(self.announce) :] = self.announce, later.announce
         joined: list[Any] = [np.concatenate(pair) for pair in zip(self[:-1], later[:-1], strict=True)]
-        return Inputs(*joined, announce)
+        return Inputs._make([*joined, announce])
 
     def part(self, blocks: slice) -> "Inputs":
         """The blocks of a slice without a step."""
         first, last, _ = blocks.indices(len(self.noise))
         announced = slice(int(self.announcements[:first].sum()), int(self.announcements[:last].sum()))
         part: list[Any] = [numbers[blocks] for numbers in self[:-1]]
-        return Inputs(*part, self.announce[announced])
+        return Inputs._make([*part, self.announce[announced]])
 
 
 class RigInputs:

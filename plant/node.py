@@ -42,12 +42,7 @@ class PlantNode:
     """
 
     def __init__(
-        self,
-        config: RigConfig,
-        seed: int,
-        run: int = 1,
-        arm: bool = False,
-        faults: Sequence[FaultTable] = (),
+        self, config: RigConfig, seed: int, run: int = 1, arm: bool = False, faults: Sequence[FaultTable] = ()
     ) -> None:
         self.block_ns = round(config.solver.block_s * 1e9)
         self.block = 0  # number of the next block

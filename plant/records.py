@@ -78,9 +78,8 @@ STATE = np.dtype(
 _STICK_STEP_RAD = 1.0
 _PEAK_SIGMAS = 6.0  # sigmas of the drive velocity's noise that its peaks reach in a long run
 _SLOWEST_MPS = 1e-6  # fastest drive of a rig that never moves, as a limit must be above 0
-_LEAST_SHARE = (
-    0.1  # least share of the command that sets the simulated rig's limit of v_a; a weaker exciter cannot help
-)
+# Least share of the command that sets the simulated rig's limit of v_a; a weaker exciter cannot help.
+_LEAST_SHARE = 0.1
 
 
 def _keep(bandwidth_Hz: float, period_s: float) -> float:

@@ -1,5 +1,6 @@
 """One opened case: the true answer, and the result of a method."""
 
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 OTHER_NAMES = ("none", "unexplained")
@@ -17,7 +18,7 @@ _NOTHING_SAID: dict[str, Any] = {
 
 
 class Opened(NamedTuple):
-    """Answer and result of one case; `said` has some or all keys of the format `diagnosis/2`."""
+    """Answer and result of one case; `said` has some or all keys of a diagnosis, with `unexplained` among the candidates."""
 
     name: str
     answer: dict[str, Any]
@@ -49,7 +50,7 @@ class Opened(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """The verdict of the result: effect, partly, no-gap, unexplained, or fault."""
+        """The verdict of the result, or `fault`."""
         return self.said["verdict"]
 
     @property
@@ -109,4 +110,17 @@ class Opened(NamedTuple):
 
 def opened(name: str, answer: dict[str, Any], result: dict[str, Any]) -> Opened:
     """A case from its answer and the content of its result file."""
-    return Opened(name, answer, _NOTHING_SAID | result if "fault" not in result else dict(_NOTHING_SAID))
+    if "fault" in result:
+        return Opened(name, answer, dict(_NOTHING_SAID))
+    if "complete" in result:  # diagnosis/3; in diagnosis/2 `unexplained` is a candidate
+        shares = with_unexplained(result["candidates"], result["complete"])
+        rows = {row["effect"]: row for row in result["candidates"]}
+        candidates = [rows.get(effect, {"effect": effect}) | {"probability": share} for effect, share in shares.items()]
+        result = result | {"candidates": candidates}
+    return Opened(name, answer, _NOTHING_SAID | result)
+
+
+def with_unexplained(candidates: Iterable[Mapping[str, Any]], complete: float | None) -> dict[str, float]:
+    """Probabilities of effects, none and `unexplained`, which add up to 1; all are 0 where nothing was judged."""
+    shares = {row["effect"]: float(row["probability"] or 0.0) * (complete or 0.0) for row in candidates}
+    return shares | {"unexplained": 0.0 if complete is None else 1.0 - complete}

@@ -24,7 +24,7 @@ Oracle = dict[str, float | None]  # share of the held-out gap that the true effe
 class Singles(NamedTuple):
     """Scores of cases with one effect of the library."""
 
-    alarm: Score | None  # the verdict is effect, partly or unexplained
+    alarm: Score | None  # the verdict is effect, partly, described or unexplained
     top_1: Score | None  # the true effect is the first candidate
     top_3: Score | None  # the true effect is among the first three candidates
     in_group: Score | None  # the true effect is in the named group
@@ -139,7 +139,7 @@ def score(cases: Sequence[Opened], oracle: Oracle) -> Scores:
 def of_singles(cases: Sequence[Opened]) -> Singles:
     """The scores of cases with one effect of the library."""
     return Singles(
-        alarm=rate([case.verdict in {"effect", "partly", "unexplained"} for case in cases]),
+        alarm=rate([case.verdict in {"effect", "partly", "described", "unexplained"} for case in cases]),
         top_1=rate([frozenset(name for name, _ in case.ranked[:1]) == case.truth for case in cases]),
         top_3=rate([case.truth <= {name for name, _ in case.ranked[:3]} for case in cases]),
         in_group=rate([case.truth <= case.group for case in cases]),

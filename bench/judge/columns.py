@@ -67,7 +67,7 @@ class Rows:
 
     def each(self, function: Callable[[Floats], Floats], values: Floats) -> Floats:
         """A function of one run, applied to every run."""
-        return np.concatenate([np.asarray(function(part)) for part in np.split(values, self._edges)])
+        return np.concatenate([function(part) for part in np.split(values, self._edges)])
 
     def rate(self, values: Floats) -> Floats:
         """The derivative over time."""
@@ -75,7 +75,7 @@ class Rows:
 
     def smooth(self, values: Floats, order: int = 0) -> Floats:
         """A cubic over an eighth of a slip, or its derivative."""
-        return self.each(lambda part: savgol_filter(part, self.window, 3, deriv=order, delta=BLOCK_S), values)
+        return self.each(lambda part: np.asarray(savgol_filter(part, self.window, 3, order, BLOCK_S)), values)
 
 
 def blocks(rig: RigTable, runs: list[Prepared]) -> Iterator[Block]:
@@ -172,7 +172,7 @@ def _base(rows: Rows) -> Block:
     columns: list[Column] = []
     for mode_Hz in np.geomspace(60.0, 400.0, 12).tolist():
         poles = np.poly(np.exp(2.0 * np.pi * mode_Hz * BLOCK_S * np.array([-0.03 + 1j, -0.03 - 1j]))).real
-        rung = rows.each(lambda part, poles=poles: lfilter([1.0, -2.0, 1.0], poles, part), friction)
+        rung = rows.each(lambda part, poles=poles: np.asarray(lfilter([1.0, -2.0, 1.0], poles, part)), friction)
         columns.append(("base-compliance", rung, 0))
     y = rows.signal("base_accel_mps2")
     return _block("base", y, [(1.0 + 0.0 * y, math.inf)], columns, {}, {}, 1, rows.quiet)

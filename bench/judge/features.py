@@ -60,8 +60,8 @@ def features_of(rig: RigTable, commands: CommandedRun, signals: Signals) -> Feat
                 columns = [bend[at], np.gradient(bend[at], BLOCK_S), speed[at]]
                 groups["motion"] = _lines(np.asarray(savgol_filter(accel[at], window, 3)) - bend[at], columns)
             if "base_accel_mps2" in signals:
-                base = signals["base_accel_mps2"][at]
-                near = maximum_filter1d(np.abs(speed[at]) > 0.2 * np.quantile(np.abs(speed[at]), 0.99), 101)
+                base, fast = signals["base_accel_mps2"][at], np.abs(speed[at])
+                near = np.asarray(maximum_filter1d(fast > 0.2 * np.quantile(fast, 0.99), 101), np.bool_)
                 both = near.any() and not near.all()
                 groups["base"] = [math.log(base[near].std() / base[~near].std()) if both else math.nan]
         pulled = (force[at] - rig.mass_kg * accel[at]) / rig.coulomb_force_N

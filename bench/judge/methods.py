@@ -99,7 +99,7 @@ def ask(
                 yield _asked(folder, name, case, budget_s)
         return
     tasks = (delayed(_asked_all)(folder, name, group, budget_s) for name, group in todo)
-    done: Any = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)(tasks)
+    done: Any = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)(tasks)  # pyright: ignore[reportArgumentType]
     for group in done:
         yield from group
 

@@ -13,10 +13,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from bench.blind.outcomes import with_unexplained
 from bench.blind.sealing import evidence_hash
 from bench.judge.cases import Case
 from bridge.faults import Fault
 from bridge.files import replacing
+from bridge.results import strict_json
 from diagnosis.diagnose import diagnose
 from diagnosis.evidence.folder import load_evidence
 from diagnosis.result import Diagnosis
@@ -53,8 +55,9 @@ def by_bic(chi2: dict[str, tuple[float, int]], features: int) -> Answer:
 
 def as_answer(done: Diagnosis) -> Answer:
     """The candidates of a diagnosis; two named effects are one name with the probability of the first."""
-    answer = {candidate.effect: float(candidate.probability or 0.0) for candidate in done.candidates}
-    answer["outside"] = answer.pop("unexplained", 0.0)
+    table = strict_json(done)
+    answer = with_unexplained(table["candidates"], table["complete"])
+    answer["outside"] = answer.pop("unexplained")
     if len(done.effects) == 2:
         together = max(answer.pop(effect, 0.0) for effect in done.effects)
         answer[" + ".join(sorted(done.effects))] = together

@@ -15,9 +15,8 @@ from bench.judge.methods import Answer, Given
 
 OUTSIDE, NONE = "outside", "none"
 _HALF, _SURE = 0.5, 0.8
-_NAMED = (
-    0.25  # probability from which a name counts in the F1 of a pair, two names at most. Larger: trees name one of two
-)
+# Probability from which a name counts in the F1 of a pair, two names at most. Larger: trees name one of two.
+_NAMED = 0.25
 
 
 class Outcome(NamedTuple):

@@ -34,9 +34,8 @@ _LEAST_RIGS = 0.05  # share of the rigs that must have a feature
 _BLUR, _BLUR_OF_DRIVE = 0.2, 0.3
 # Scatter along the track, and its length. Up to 0.1: a third of the effects is hidden in training.
 _SURFACES, _LENGTHS_M = (1e-3, 3e-2), (2e-5, 1e-3)
-_OTHER_NOISE = (
-    0.8  # spread of the logarithm of the noise. 0: the base's noise of another rig passed for a compliant base
-)
+# Spread of the logarithm of the noise. 0: the base's noise of another rig passed for a compliant base.
+_OTHER_NOISE = 0.8
 
 
 class _Aligned(Problem):
@@ -90,11 +89,10 @@ def _trained(problem: Problem) -> _Trained:
     rows = rows + blur * np.random.default_rng(1).standard_normal(rows.shape)
     model = HistGradientBoostingClassifier(
         max_iter=40, learning_rate=0.2, max_leaf_nodes=10, min_samples_leaf=6, max_features=0.1, l2_regularization=1.0,
-        early_stopping=False, random_state=1,
+        early_stopping=False, random_state=1,  # pyright: ignore[reportArgumentType]
     )  # fmt: skip
-    with (
-        one_thread()
-    ):  # the limit of the caller does not reach a library that was loaded later: two threads took 4 minutes
+    # the limit of the caller does not reach a library that was loaded later: two threads took 4 minutes
+    with one_thread():
         return _Trained(problem.labels, model.fit(rows, names), inputs)
 
 

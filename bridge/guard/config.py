@@ -65,66 +65,74 @@ class Level(Strict):
 class HeatConfig(Strict):
     """The exciter's warming: losses pi tan(d) C f (u0 / s)^2 of amplitude u0 at f, one thermal resistance, one time constant."""
 
-    capacitance_F: Positive = Field(8e-7, description="Capacitance C of the stack.")
-    stroke_m_per_V: Positive = Field(7.8e-8, description="Stroke per volt s of the stack.")
-    loss_tangent: Positive = Field(0.2, description="tan(d) at large signal, ten times the data sheet's.")
-    resistance_K_per_W: Positive = Field(20.0, description="Thermal resistance from the stack to its surroundings.")
-    time_s: Positive = Field(60.0, description="Time constant of the warming.")
-    rise_max_K: Positive = Field(30.0, description="Temperature rise above the surroundings at which the guard trips.")
-    alarm_share: Share = Field(0.8, description="Share of rise_max_K from which the warming is reported.")
+    capacitance_F: Positive = Field(default=8e-7, description="Capacitance C of the stack.")
+    stroke_m_per_V: Positive = Field(default=7.8e-8, description="Stroke per volt s of the stack.")
+    loss_tangent: Positive = Field(default=0.2, description="tan(d) at large signal, ten times the data sheet's.")
+    resistance_K_per_W: Positive = Field(
+        default=20.0, description="Thermal resistance from the stack to its surroundings."
+    )
+    time_s: Positive = Field(default=60.0, description="Time constant of the warming.")
+    rise_max_K: Positive = Field(
+        default=30.0, description="Temperature rise above the surroundings at which the guard trips."
+    )
+    alarm_share: Share = Field(default=0.8, description="Share of rise_max_K from which the warming is reported.")
 
 
 class GuardConfig(Strict):
     """The guard of one rig. `[piezo]` gives its frequencies and slew, and its stroke and velocity if they are not set here."""
 
     stroke_m: Level | None = Field(
-        None, description="Commanded stroke. Not given: piezo.amplitude_max_m, abort at 1.5 times that."
+        default=None, description="Commanded stroke. Not given: piezo.amplitude_max_m, abort at 1.5 times that."
     )
     fastest_drive_mps: Positive | None = Field(
-        None,
+        default=None,
         description="Fastest velocity of the drive; the guard trips at 1.5 times that. A real rig must give it; a simulated rig "
         "takes it from its drive.",
     )
     velocity_mps: Level | None = Field(
-        None,
+        default=None,
         description="v_a, commanded or measured. A real rig must give it; a simulated rig takes velocity_ratio times its fastest "
         "drive, over the least share that its exciter delivers.",
     )
     exciter_gain: Positive = Field(
-        1.0,
+        default=1.0,
         description="Delivered over commanded amplitude of the mounted exciter; 1 for a rigid mount. The first loop check must "
         "measure it within a factor of 1.5.",
     )
     velocity_ratio: Level = Field(
-        Level(alarm=3.0, abort=4.0, hold_s=0.1),
+        default=Level(alarm=3.0, abort=4.0, hold_s=0.1),
         description="Commanded v_a, times the gain of the loop check but at least exciter_gain, over the drive's velocity.",
     )
     loud_ratio: Level = Field(
-        Level(alarm=3.0, abort=4.0, hold_s=0.1), description="Measured v_a over the drive's velocity."
+        default=Level(alarm=3.0, abort=4.0, hold_s=0.1), description="Measured v_a over the drive's velocity."
     )
-    forbidden_Hz: Bands = Field([], description="Bands [low, high] without vibration.")
-    band_hold_s: HoldTime = Field(0.2, description="Time of commands at forbidden frequencies until the guard trips.")
-    duty: Level = Field(Level(alarm=1.0, abort=1.0), description="Share of the time with vibration; 1: no limit.")
-    duty_window_s: Positive = Field(60.0, description="Time constant of the duty.")
+    forbidden_Hz: Bands = Field(default=[], description="Bands [low, high] without vibration.")
+    band_hold_s: HoldTime = Field(
+        default=0.2, description="Time of commands at forbidden frequencies until the guard trips."
+    )
+    duty: Level = Field(
+        default=Level(alarm=1.0, abort=1.0), description="Share of the time with vibration; 1: no limit."
+    )
+    duty_window_s: Positive = Field(default=60.0, description="Time constant of the duty.")
     heat: HeatConfig = HeatConfig()
     drive_memory_s: Positive = Field(
-        0.5, description="Time constant of the memory of the drive's velocity: a vibration outlasts its move."
+        default=0.5, description="Time constant of the memory of the drive's velocity: a vibration outlasts its move."
     )
     # The vibration is ramped to zero after 50 ms without a command; after this time it does not resume by itself. Smaller: with
     # 0.5 s a computer that stalls for 0.5 s leaves the axis without its controller until an operator arms it. Larger: with 1 s a
     # controller restarted 1 s later (`controller-restarted` in deploy/faults) vibrates again, v_a above 1.5 set points for 1.6 s.
     command_lost_s: Annotated[HoldTime, Field(gt=0)] = Field(
-        0.75, description="Time without a fresh command until the rig is DISARMED."
+        default=0.75, description="Time without a fresh command until the rig is DISARMED."
     )
     check_Hz: Annotated[list[Positive], Field(max_length=8)] = Field(
-        [],
+        default=[],
         description="Frequencies of the loop check, rising, allowed ones. Not given: five over piezo's range, none forbidden.",
     )
     gain_change: Annotated[float, Field(ge=1.05, le=2.0)] = Field(
-        1.25,
+        default=1.25,
         description="Largest factor either way from the last accepted gain; beyond it the operator must accept the gain.",
     )
-    check_share: Share = Field(0.1, description="Amplitude of the loop check, as a share of the stroke.")
+    check_share: Share = Field(default=0.1, description="Amplitude of the loop check, as a share of the stroke.")
 
     @model_validator(mode="after")
     def _in_order(self) -> "GuardConfig":

@@ -9,11 +9,11 @@ from bridge.guard.states import enter, note_vibration
 from bridge.kernel import kernel
 from bridge.layouts import CommandRow, GuardMemory, GuardParams, SensorRow
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import NO_BLOCK
 
-_MOST = (
-    2**62
-)  # number of a command from which it is refused: far below 2^63, from which `last_sequence` would be negative
-NO_COMMAND = -1  # NO_BLOCK of bridge.wire.messages as a signed number
+# number of a command from which it is refused: far below 2^63, from which `last_sequence` would be negative
+_MOST = 2**62
+NO_COMMAND = -1  # NO_BLOCK as a signed number
 
 
 @kernel
@@ -92,6 +92,9 @@ def write_in_force(s: GuardMemory, command_block: int, block: SensorRow) -> None
     """Write the vibration in force at the block's end, as `allow` set it; `command_block` as there."""
     block.applied_Hz = s.frequency_Hz
     block.applied_m = s.amplitude_m
-    block.applied_block = command_block
+    if command_block == NO_COMMAND:  # an interpreter stores no negative number in an unsigned field
+        block.applied_block = NO_BLOCK
+    else:
+        block.applied_block = command_block
     block.fallback = 1 - s.fresh
     block.guard_limit = s.limit

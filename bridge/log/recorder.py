@@ -113,12 +113,7 @@ def run(
 
 
 def _record(
-    log: RunLog,
-    bus: Bus,
-    inbox: Inbox,
-    stop: threading.Event,
-    pauses: PauseWriter | None,
-    complaints: Complaints,
+    log: RunLog, bus: Bus, inbox: Inbox, stop: threading.Event, pauses: PauseWriter | None, complaints: Complaints
 ) -> bool:
     """Write until plant and controller have ended. Returns whether the plant left the bus without an END."""
     screen = Screen(complaints)
@@ -141,6 +136,8 @@ def _record(
         if passed or realtime.was_paused(asked_s, asked_s + _LOOK_S):
             heard_s = time.monotonic()
         if passed:
+            # a busy recorder may find no moment to look for the rig before it leaves
+            seen = seen or any(message.topic.sender == "plant" for message in passed)
             for message in passed:
                 try:
                     log.write(message.topic, message.payload)

@@ -109,9 +109,7 @@ def _stream(
     rows = dict.fromkeys(writers, 0)
     period_ns = 0.0
     for piece in iter_pieces(reader):
-        if piece.topic not in writers or not len(
-            piece.records
-        ):  # a piece is empty if no message of its chunk is readable
+        if piece.topic not in writers or not len(piece.records):  # empty if no message of its chunk is readable
             continue
         if piece.topic == "sensors":
             period_ns = period_ns or block_period_ns(piece.records)

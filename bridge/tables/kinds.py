@@ -27,7 +27,7 @@ _PACKED = (
 )
 _HDF5_AT = 512  # MATLAB v7.3 writes a head of 512 bytes before the HDF5 data
 _BY_SUFFIX: dict[str, Kind] = {".parquet": "parquet", ".mat": "mat", ".tdms": "tdms"}
-_BY_SUFFIX |= dict.fromkeys((".xlsx", ".xls", ".ods"), "sheet")
+_BY_SUFFIX.update(dict.fromkeys((".xlsx", ".xls", ".ods"), "sheet"))
 
 
 def kind_of(path: Path) -> Kind:

@@ -58,8 +58,8 @@ class Table:
             return wanted
         if wanted.isdigit() and 1 <= int(wanted) <= len(self.columns):
             return list(self.columns)[int(wanted) - 1]
-        for simplified in (_squeezed, lambda text: bare_name(text).casefold()):
-            near = [key for key in self.columns if simplified(key) == simplified(wanted)]
+        for bare in (False, True):
+            near = [key for key in self.columns if _simplified(key, bare) == _simplified(wanted, bare)]
             if len(near) == 1:
                 return near[0]
             if near:
@@ -108,6 +108,6 @@ class Table:
         return self.units.get(key) or unit_in_name(first if first in self.columns else key)
 
 
-def _squeezed(text: str) -> str:
-    """The text without comment marks at its ends, and with single blanks."""
-    return re.sub(r"\s+", " ", text).strip("%# ")
+def _simplified(text: str, bare: bool) -> str:
+    """The text with single blanks: without comment marks at its ends, or (`bare`) without its unit and its case."""
+    return bare_name(text).casefold() if bare else re.sub(r"\s+", " ", text).strip("%# ")

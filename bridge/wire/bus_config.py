@@ -16,16 +16,15 @@ class BusConfig(Strict):
     endpoint: Annotated[str, Field(pattern=r"^(tcp|tls)/[^\s,?/]+:[0-9]{1,5}$")] = "tcp/127.0.0.1:7447"
     prefix: Annotated[str, Field(pattern=r"^[^/*$?#]+(/[^/*$?#]+)*$")] = "rig"
     certificates: str = Field(
-        "",
+        default="",
         description="Folder that `stickslip certs` made, for tls/ endpoints; empty: ~/.config/stickslip/certificates.",
     )
     insecure: bool = Field(
-        False,
+        default=False,
         description="true: a tcp/ endpoint needs no password, and other computers may reach it. Never on a shared network.",
     )
-
     wait_s: float = Field(
-        30.0,
+        default=30.0,
         gt=0.0,
         le=1e6,
         description="Longest wait of plant, controller and recorder for each other at the start; `stickslip run` has --wait.",

@@ -34,6 +34,7 @@ class _Options(NamedTuple):
     cluster: str
     certs: str
     budget_s: float | None
+    all: bool
 
     @property
     def diagnose(self) -> Callable[["Evidence", Callable[[str, float], None], int], "Diagnosis"]:
@@ -77,6 +78,9 @@ def diagnose(
     channel_map: Annotated[
         Path | None, typer.Option("--map", help="Channel map, .toml, for a single measured file.")
     ] = None,
+    show_all: Annotated[
+        bool, typer.Option("--all", help="Print every candidate, relation, share and number below the answer.")
+    ] = False,
     as_json: Json = None,
 ) -> int:
     """Find the effect that makes a rig differ from its description: its probability, and how much of the gap it closes."""
@@ -88,7 +92,7 @@ def diagnose(
 
     end_like_ctrl_c()
     budget_s = quantity("--budget", budget, "time")
-    options = _Options(as_json, report, apply, jobs or cpu_count(), cluster, str(certs or ""), budget_s)
+    options = _Options(as_json, report, apply, jobs or cpu_count(), cluster, str(certs or ""), budget_s, show_all)
     if len(evidence) == 1 and evidence[0].is_file():
         return _diagnose_file(evidence[0], options, speed, mass, channel_map)
     sources = find_sources(evidence)
@@ -154,7 +158,14 @@ def _diagnose_file(path: Path, options: _Options, speed: str, mass: str, channel
         _print_line(options, headline(seen))
         for name, value in rig.values().items():
             share = rig.tolerance.get(name, 0.0)
-            how = "assumed" if name in assumed else "from the file" if name != "mass_kg" or not mass else "given"
+            given = (
+                "given"
+                if name == "mass_kg" and mass
+                else "described in the log"
+                if name in record.rig
+                else "from the file"
+            )
+            how = "assumed" if name in assumed else given
             _print_line(
                 options,
                 f"rig        {name} = {value:.6g}" + (f" +- {100.0 * share:.2g} %" if share else "") + f", {how}",
@@ -165,25 +176,26 @@ def _diagnose_file(path: Path, options: _Options, speed: str, mass: str, channel
 
 
 def _diagnose_one(source: "EvidenceFolder", options: _Options) -> int:
-    from cockpit.commands.diagnose_output import in_words, watched
+    from cockpit.commands.diagnose_output import details, watched
     from cockpit.fleet.work import write_source_report
+    from diagnosis.deadline import forecast
     from diagnosis.evidence.folder import load_evidence
-    from diagnosis.report.rig_file import refuse_force_drive, write_rig
+    from diagnosis.report.rig_file import NO_RIG, refuse_force_drive, write_rig
 
     evidence = load_evidence(source.folder)
     if options.apply is not None:
         refuse_force_drive(evidence)
     with watched() as progress:
+        fitted_s = sum(float(run.t_s[-1] - run.t_s[0]) for run in evidence.runs if not run.holdout)
+        limit = "" if options.budget_s is None else f", {options.budget_s:g} s at most"
+        progress(f"the simulated fits of {fitted_s:.0f} s take about {forecast(fitted_s, options.jobs)}{limit}", 0.0)
         diagnosis = _result(source, evidence, options, progress)
     refused: list[Fault] = []
-    _print(options, diagnosis, in_words(diagnosis), refused)
+    _print(options, diagnosis, [*diagnosis.summary, *(details(diagnosis) if options.all else ())], refused)
     wanted: list[tuple[str, Path | None, Callable[[Path], None]]] = [
         ("report     ", options.report, partial(write_source_report, source, diagnosis))
     ]
-    if options.apply is not None and diagnosis.verdict in ("unexplained", "partly"):
-        why = (
-            "nothing explains the gap" if diagnosis.verdict == "unexplained" else "only a part of the gap is explained"
-        )
+    if options.apply is not None and (why := NO_RIG.get(diagnosis.verdict)):
         _print_line(options, f"rig file   not written: {why}, so no effect can be applied")
     else:
         wanted.append(("rig file   ", options.apply, lambda path: write_rig(diagnosis, evidence, path)))
@@ -216,10 +228,15 @@ def _print_line(options: _Options, line: str) -> None:
 def _result(
     source: "EvidenceFolder", evidence: "Evidence", options: _Options, progress: Callable[[str, float], None]
 ) -> "Diagnosis":
+    from joblib import parallel_config
+
     from diagnosis import diagnose_many as many
+    from diagnosis.deadline import ended_by_ctrl_c
 
     if not options.cluster:
-        return options.diagnose(evidence, progress, options.jobs)
+        workers = parallel_config(backend="loky", initializer=many.leave_interrupt_to_parent)
+        with workers, ended_by_ctrl_c():
+            return options.diagnose(evidence, progress, options.jobs)
     with closing(many.diagnose_many([source], 1, options.cluster, options.diagnose, options.certs)) as outcomes:
         outcome = next(outcomes)
     if outcome.diagnosis is None:

@@ -1,5 +1,6 @@
 """Output of `stickslip diagnose`: progress, the answer in words, one line per folder."""
 
+import math
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from typing import Literal, NamedTuple
@@ -8,43 +9,49 @@ from bridge import units
 from bridge.plain import plain
 from diagnosis.diagnose_many import FolderResult
 from diagnosis.report import words
-from diagnosis.report.words import number_lines, relation_lines
+from diagnosis.report.summary import line
 from diagnosis.result import Diagnosis
-
-_SHOWN_CANDIDATES = 3
 
 
 class Diagnoses(NamedTuple):
     """Results of many folders, in the order given."""
 
     results: list[FolderResult]
-    format: Literal["diagnoses/2"] = "diagnoses/2"
+    format: Literal["diagnoses/3"] = "diagnoses/3"
 
 
-def in_words(diagnosis: Diagnosis) -> list[str]:
-    """Lines for the terminal: verdict, leading candidates, gap, next experiment, findings about the data."""
-    gap, after = diagnosis.gap, diagnosis.next_experiment
-    lines = [words.headline(diagnosis), *diagnosis.summary]
-    for label, row in zip(("candidates", "", ""), diagnosis.candidates[:_SHOWN_CANDIDATES], strict=False):
+def details(diagnosis: Diagnosis) -> list[str]:
+    """Lines below the answer: candidates, gap, relations, numbers, reason of the next experiment, findings about the data."""
+    gap = diagnosis.gap
+    candidates: list[str] = []
+    for row in diagnosis.candidates:
+        if row.effect not in diagnosis.effects and not math.isfinite(row.probability):
+            continue
         sizes = "; ".join(words.estimate_in_words(row.effect, *item) for item in row.parameters.items())
-        lines.append(f"{label:<10} {row.effect:<28} {units.percent(row.probability):>8}   {sizes}".rstrip())
-    if gap.files:
-        numbers = [f"{units.times(gap.nominal)} as described", f"{units.times(gap.retuned)} baseline"]
-        if diagnosis.effects:
-            numbers.append(f"{units.times(gap.with_effect)} with {' and '.join(diagnosis.effects)}")
-        shrinkage = "" if gap.shrinkage is None else f"; {words.closed_in_words(gap.shrinkage)} of the gap closed"
-        lines.append(f"gap        {', '.join(numbers)}; perfect is {units.times(gap.floor)}{shrinkage}")
-    for label, block in (("relations", relation_lines(diagnosis)), ("numbers", number_lines(diagnosis))):
-        lines += [f"{'' if i else label:<10} {line}" for i, line in enumerate(block)]
-    lines.append(f"next       {after.what} {after.why}")
-    if diagnosis.cannot_show:
-        lines.append(f"not shown  {', '.join(diagnosis.cannot_show)}: excluded by drive, runs or assumed numbers")
+        candidates.append(f"{row.effect:<28} {units.percent(row.probability):>8}   {sizes}".rstrip())
+    compared = [
+        f"{units.times(row.gap)} with {words.who_in_words(row.who)}"
+        + ("" if row.shrinkage is None else f", {words.closed_in_words(row.shrinkage)} closed")
+        for row in gap.compared
+    ]
     files: dict[tuple[str, str], list[str]] = {}
     for finding in diagnosis.findings:
         file, _, column = finding.where.partition(": ")
         files.setdefault((column, finding.text), []).append(file)
-    data = [f"{', '.join(where)}: {f'{column}: ' if column else ''}{text}" for (column, text), where in files.items()]
-    return [*lines, *(f"{'' if i else 'data':<10} {line}" for i, line in enumerate(data))]
+    blocks = {
+        "candidates": candidates,
+        "gap": [f"{units.times(gap.nominal)} as described", *compared] if gap.files else [],
+        "relations": words.relation_lines(diagnosis),
+        "numbers": words.number_lines(diagnosis),
+        "next": [diagnosis.next_experiment.why],
+        "not shown": [f"{', '.join(diagnosis.cannot_show)}: excluded by drive, runs or assumed numbers"]
+        if diagnosis.cannot_show
+        else [],
+        "data": [
+            f"{', '.join(where)}: {f'{column}: ' if column else ''}{text}" for (column, text), where in files.items()
+        ],
+    }
+    return [line("" if number else label, text) for label, block in blocks.items() for number, text in enumerate(block)]
 
 
 def in_a_line(outcome: FolderResult) -> str:

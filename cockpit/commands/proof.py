@@ -109,7 +109,7 @@ SchemaNames = list[SchemaName]
 
 @command()
 def schema(
-    name: Annotated[str, typer.Argument(help="For example rig or diagnosis-2; lists all schemas if left out.")] = "",
+    name: Annotated[str, typer.Argument(help="For example rig or diagnosis-3; lists all schemas if left out.")] = "",
     out: Annotated[
         Path | None,
         typer.Option(metavar="FOLDER", help="Write NAME.json to this folder, or all schemas if NAME is left out."),

@@ -3,12 +3,13 @@
 from collections import defaultdict
 from typing import Literal, NamedTuple
 
+from bridge.units import name_and_unit
 from diagnosis.report import words
 from diagnosis.report.words import mostly, remainder_in_words, share_in_words
 from diagnosis.result import Diagnosis
 
 FORMAT = "fleet/1"
-Kind = Literal["named", "unexplained", "no-gap"]
+Kind = Literal["named", "unexplained", "no-gap", "not-finished"]
 
 
 class GroupedRig(NamedTuple):
@@ -28,7 +29,7 @@ class RigGroup(NamedTuple):
     """Rigs that share a gap."""
 
     kind: Kind
-    what: str  # effects, or the quantity that explains most of a signal; empty if unknown
+    what: str  # effects, wrong numbers, or the quantity that explains most of a signal; empty if unknown
     meaning: str
     helps: float  # sum of the explained shares: number of gaps that a repair of the cause would close
     rigs: tuple[GroupedRig, ...]  # the largest share first
@@ -89,8 +90,13 @@ def _placed(evidence: str, diagnosis: Diagnosis, report: str) -> tuple[tuple[Kin
         if explains is None and shares:  # no fit was made: take the share in one signal, from the relations
             most = max(shares, key=lambda share: share.share)
             explains, interval_90, size = most.share, most.interval_90, f"{most.signal}: {share_in_words(most)}"
-    elif diagnosis.verdict == "no-gap":
-        kind, explains, interval_90 = "no-gap", None, None
+    elif diagnosis.verdict == "described":
+        closing = [number for number in diagnosis.numbers if number.share is not None]
+        what = " + ".join(sorted(diagnosis.effects) or (name_and_unit(number.name)[0] for number in diagnosis.numbers))
+        size = "; ".join(map(words.closing_number_in_words, diagnosis.numbers))
+        explains, interval_90 = max((number.share or 0.0 for number in closing), default=None), None
+    elif diagnosis.verdict in ("no-gap", "not-finished"):
+        kind, explains, interval_90 = diagnosis.verdict, None, None
     elif (most := mostly(diagnosis)) is not None:
         kind, what, size = "unexplained", f"{most.what} in the {most.signal}", share_in_words(most)
         explains, interval_90 = most.share, most.interval_90

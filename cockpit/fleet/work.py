@@ -149,6 +149,8 @@ def _title(group: RigGroup) -> str:
     """Title of a group: the shared cause."""
     if group.kind == "named":
         return group.what
+    if group.kind == "not-finished":
+        return "not finished: the time ran out before any cause was tried"
     return f"unexplained: {group.what}" if group.what else "unexplained, without a known common cause"
 
 

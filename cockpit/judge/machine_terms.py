@@ -195,7 +195,7 @@ def reversals_of(t_s: Floats, slide_m: Floats, drive_m: Floats, direction: npt.N
     if not len(at):
         return []
     changes, lasts = moving[at], moving[at - 1]  # first block with the new sign, last block with the old sign
-    seen_m = _SEEN_SIGMAS * np.hypot(noise_of(slide_m), noise_of(drive_m))
+    seen_m = float(_SEEN_SIGMAS * np.hypot(noise_of(slide_m), noise_of(drive_m)))
     at_turn_m = _AT_TURN_SIGMAS * noise_of(drive_m)
     begins = [0]
     for change in changes:  # the turning point is the last block near the extreme position before the reported change

@@ -17,9 +17,8 @@ from diagnosis.look.look import LookResult
 
 _LEAST_TOLERANCE = 0.01  # least relative tolerance of a number: sensors are calibrated to 1 %
 _FRICTION_TOLERANCE = 0.05  # least relative tolerance of F_s and F_k: friction differs with the load of each slip
-_STRIBECK_TOLERANCE = 0.5  # relative; one drive speed does not determine the Stribeck velocity
+_OTHER_TOLERANCE = 0.3  # relative tolerance of described numbers that no record shows well: contact and damping
 _OF_90 = 1.645  # half width of a 90 % interval in standard deviations
-_ASSUMED_MPS = 5e-4  # assumed Stribeck velocity, the value of the friction pairs in the paper
 _FAR = 3.0  # factor between the given and the estimated number above which the unit is questioned
 _SEEN = {
     "mass_kg": "mass_kg",
@@ -36,8 +35,8 @@ _UNITS: Mapping[str, tuple[tuple[float, str], ...]] = {
 }
 
 
-def rig_of(seen: LookResult, file: str) -> tuple[RigTable, list[str]]:
-    """A rig with the numbers of a record, and the names of its assumed numbers.
+def rig_of(seen: LookResult, file: str, described: Mapping[str, float]) -> tuple[RigTable, list[str]]:
+    """A rig with the numbers that a log describes or that the record shows, and the names of its assumed numbers.
 
     Raises Fault CONFIG, with an option to copy, for a number that can be neither estimated nor assumed.
     """
@@ -46,28 +45,24 @@ def rig_of(seen: LookResult, file: str) -> tuple[RigTable, list[str]]:
         raise Fault(
             "CONFIG", f"{file}: has a friction coefficient but no load, so the force is unknown; add --load 94.5N"
         )
-    if "kinetic_force_N" not in numbers or "static_force_N" not in numbers:
+    shown = numbers.keys() | {_SEEN[name] for name in described.keys() & _SEEN.keys()}
+    if not {"kinetic_force_N", "static_force_N"} <= shown:
         raise Fault(
             "CONFIG", f"{file}: shows no slip, so no rig number can be estimated; import it with a map that has [rig]"
         )
-    if "stiffness_N_per_m" not in numbers:
+    if "stiffness_N_per_m" not in shown:
         raise Fault("CONFIG", f"{file}: the speed of the drive is unknown; add --speed 0.5mm/s")
     mass = numbers.get("mass_kg")
-    if seen.known.mass_kg is None and (mass is None or not np.isfinite(mass.low) or mass.low <= 0.0):
+    has_mass = seen.known.mass_kg is not None or "mass_kg" in described
+    if not has_mass and (mass is None or not np.isfinite(mass.low) or mass.low <= 0.0):
         raise Fault("CONFIG", f"{file}: its slips are too short to estimate the mass of the slide; add --mass 1.5kg")
-    table = {
-        "drive": "torsion" if seen.known.torsion else "spring",
-        "tolerance": {},
-        "stribeck_velocity_mps": _ASSUMED_MPS,
+    table = {"drive": "torsion" if seen.known.torsion else "spring", **described}
+    least_of = {"coulomb_force_N": _FRICTION_TOLERANCE, "static_force_N": _FRICTION_TOLERANCE}
+    tolerance = {
+        name: least_of.get(name, _LEAST_TOLERANCE if name in _SEEN else _OTHER_TOLERANCE) for name in described
     }
-    tolerance: dict[str, float] = {"stribeck_velocity_mps": _STRIBECK_TOLERANCE}
-    wanted = (
-        ("drive_stiffness_N_per_m", numbers["stiffness_N_per_m"], _LEAST_TOLERANCE),
-        ("coulomb_force_N", numbers["kinetic_force_N"], _FRICTION_TOLERANCE),
-        ("static_force_N", numbers["static_force_N"], _FRICTION_TOLERANCE),
-        ("mass_kg", mass, _LEAST_TOLERANCE),
-    )
-    for name, number, least in wanted:
+    for name in (name for name in _SEEN if name not in described):
+        number, least = numbers.get(_SEEN[name]), least_of.get(name, _LEAST_TOLERANCE)
         if number is None:
             continue
         half = (number.high - number.low) / (2.0 * _OF_90 * number.value)
@@ -78,19 +73,19 @@ def rig_of(seen: LookResult, file: str) -> tuple[RigTable, list[str]]:
         tolerance["mass_kg"] = _LEAST_TOLERANCE
     table["tolerance"] = tolerance
     filled, assumed = with_assumed(table)
-    return validate(RigTable, filled, file), [*assumed, "stribeck_velocity_mps"]
+    return validate(RigTable, filled, file), assumed
 
 
 def full_map(record: MeasuredRecord, seen: LookResult) -> str:
     """Map of a record with its rig, for `log import`. Raises Fault as `rig_of`."""
-    rig, assumed = rig_of(seen, record.path.name)
+    rig, assumed = rig_of(seen, record.path.name, record.rig)
     return "\n".join([record.map_text.rstrip(), "", *rig_lines(rig, assumed)]) + "\n"
 
 
 def write_evidence(record: MeasuredRecord, seen: LookResult, folder: Path) -> tuple[RigTable, list[str]]:
     """Make `folder` an evidence folder of this record; returns its rig and the assumed numbers. Raises Fault, OSError."""
-    rig, assumed = rig_of(seen, record.path.name)
-    columns = {"t_s": record.t_s, "drive_force_N": record.force_N, **record.vibration}
+    rig, assumed = rig_of(seen, record.path.name, record.rig)
+    columns = {"t_s": record.t_s, "drive_force_N": record.force_N, **record.others}
     if record.position_m is not None:
         columns["drive_position_m"] = record.position_m
     speed = seen.known.speed_mps if record.position_m is None else None

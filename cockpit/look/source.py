@@ -1,8 +1,10 @@
 """Reads a measured file and the given facts into one record; reports its assumptions as findings and as a map to correct."""
 
 import json
+from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,9 +20,9 @@ from bridge.tables.table import Table
 from bridge.tables.unit_words import in_brackets, known_unit, weight_unit
 from cockpit.look.findings import of_time, of_values, tare_of
 from diagnosis.evidence.import_table import ImportMap
-from diagnosis.evidence.manifest_keys import VIBRATION, ChannelMap
+from diagnosis.evidence.manifest_keys import USUAL, ChannelMap, Columns
 from diagnosis.evidence.mapped import calendar_unit_s, has_time, mapped
-from diagnosis.evidence.run_log import columns_of_log
+from diagnosis.evidence.run_log import LoggedRun, columns_of_log
 from diagnosis.look.guess import Guess, guess, no_time
 from diagnosis.look.look import LookResult, RecordFacts, look
 from diagnosis.look.slips import FEWEST
@@ -30,6 +32,7 @@ from diagnosis.look.words import headline
 # Shortest stretch without vibration that is looked at. Shorter: stops and turns of the drive between two vibrations count as
 # swings, 1.5 s in docs/guides/describe-an-axis.md. Longer: the controller's trials without vibration, 5 s, are left out.
 _ALONE_S = 2.0
+_LOOKED_AT = ("t_s", "drive_force_N", "drive_position_m")
 
 
 class LookOptions(NamedTuple):
@@ -52,18 +55,19 @@ class MeasuredRecord(NamedTuple):
     t_s: Floats
     force_N: Floats
     position_m: Floats | None  # position of the drive
-    vibration: dict[str, Floats]  # commanded frequency and amplitude; empty if unknown
+    others: Columns  # every other standard column: motion of the slide and of the base, commanded vibration
     known: RecordFacts
     findings: list[Finding]
+    rig: Mapping[str, float]  # numbers of [rig] that a run log describes; empty for another file
     map_text: str  # map that reproduces this reading; empty if a map was given, or for a run log
 
     @property
     def free(self) -> Bools:
         """True for samples in long stretches without a commanded vibration, which hides stick, slip and swing of the slide."""
         free = np.ones(len(self.t_s), np.bool_)
-        if "vibration_amplitude_m" not in self.vibration:
+        if "vibration_amplitude_m" not in self.others:
             return free
-        vibrates = self.vibration["vibration_amplitude_m"] > 0.0
+        vibrates = self.others["vibration_amplitude_m"] > 0.0
         limits = [0, *(np.flatnonzero(np.diff(vibrates)) + 1).tolist(), len(free)] if vibrates.any() else []
         for first, end in pairwise(limits):
             free[first:end] = not vibrates[first] and self.t_s[end - 1] - self.t_s[first] >= _ALONE_S
@@ -72,9 +76,9 @@ class MeasuredRecord(NamedTuple):
 
 def read_record(path: Path, asked: LookOptions) -> MeasuredRecord:
     """Read a table or a run log. Raises Fault BAD_TABLE, BAD_LOG, CONFIG."""
-    if path.is_file() and kind_of(path) == "mcap" and _is_run_log(path):
-        columns, findings = columns_of_log(path)
-        return _record(path, columns, RecordFacts(asked.speed_mps, asked.load_N, asked.mass_kg), findings, "")
+    if path.is_file() and kind_of(path) == "mcap" and (logged := _logged(path)) is not None:
+        known = RecordFacts(asked.speed_mps, asked.load_N, asked.mass_kg)
+        return _record(path, logged.columns, known, logged.findings, "", logged.rig)
     if asked.map is not None:
         wanted = validate(ImportMap, read_toml(asked.map), asked.map.name)
         table = read_table(path, wanted.source.dialect, wanted.source.format)
@@ -172,15 +176,14 @@ def looked_at(record: MeasuredRecord) -> LookResult:
     return seen
 
 
-def _is_run_log(path: Path) -> bool:
-    """True if an MCAP log has the sensors of this project."""
+def _logged(path: Path) -> LoggedRun | None:
+    """The run of an MCAP log; None without sensors of this project."""
     try:
-        columns_of_log(path)
+        return columns_of_log(path)
     except Fault as fault:
         if fault.kind.code in ("BAD_LOG", "BAD_MESSAGE"):
-            return False
+            return None
         raise
-    return True
 
 
 def _record(
@@ -189,6 +192,7 @@ def _record(
     known: RecordFacts,
     findings: list[Finding],
     text: str,
+    rig: Mapping[str, float] = MappingProxyType({}),
 ) -> MeasuredRecord:
     if "drive_force_N" not in columns:
         raise Fault("BAD_TABLE", f"{path.name}: has no drive_force_N: a force is needed; map a force in [channels]")
@@ -203,8 +207,10 @@ def _record(
         not np.isfinite(position).any() or float(np.nanmax(position) - np.nanmin(position)) == 0.0
     ):
         position = None
-    vibration = {name: columns[name] for name in VIBRATION if name in columns}
-    record = MeasuredRecord(path, columns["t_s"], columns["drive_force_N"], position, vibration, known, findings, text)
+    others = {name: columns[name] for name in USUAL if name in columns and name not in _LOOKED_AT}
+    record = MeasuredRecord(
+        path, columns["t_s"], columns["drive_force_N"], position, others, known, findings, rig, text
+    )
     free = record.free
     if free.all():
         return record

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-import jinja2  # noqa: F401 - a missing package fails before minutes of simulation
+import jinja2  # noqa: F401  # pyright: ignore[reportUnusedImport] - a missing package fails before minutes of simulation
 
 from bridge.files import write_whole
 from bridge.pages import filled_page

@@ -20,8 +20,8 @@ from controller.trips.doubts import CONTACT, DRIVE
 
 def _words(first: str, last: str) -> tuple[int, int]:
     """The place of neighbouring fields in the memory, in words of 8 bytes."""
-    size, offset = STATE[last].itemsize, STATE.fields[last][1]  # ty: ignore
-    return STATE.fields[first][1] // 8, (offset + size) // 8  # ty: ignore
+    offsets: dict[str, int] = {name: place[1] for name, place in (STATE.fields or {}).items()}
+    return offsets[first] // 8, (offsets[last] + STATE[last].itemsize) // 8  # ty: ignore
 
 
 _MOTION, _POLICY, _TRIPS = _words("bins", "breakaway_N"), _words("mode", "ratio_now"), _words("trip", "most_drive_mps")

@@ -14,6 +14,9 @@ _PRESLIDING_M = 0.22e-6
 _TOLERANCE = 0.3  # relative tolerance of the contact numbers: 3.3 standard deviations reach 0.11 to 2.2 um
 # Stribeck velocities of dry and boundary-lubricated pairs lie between 0.1 and 10 mm/s.
 _STRIBECK_MPS = 1e-3
+# On a rotary rig whose radius is not given: presliding over the angle that the spring turns up to the static torque, and the
+# Stribeck velocity over static torque / sqrt(stiffness x inertia), both as on the paper's rig.
+_OF_REACH, _OF_SLIP = 1.5e-4, 0.0076
 _WIDE = 1.0  # tolerance of an unknown number: it may be a third or three times as large
 _SLIP_S = 0.1  # assumed duration of a slip, for a mass that the runs do not show
 WIDE = ("mass_kg", "stribeck_velocity_mps")  # numbers with so wide a tolerance that they decide nothing
@@ -30,16 +33,21 @@ def with_assumed(given: dict[str, Any], mass_kg: float | None = None) -> tuple[d
     if turns or table.get("drive") == "spring":
         assumed["drive_damping_Ns_per_m"] = 0.0
     static_N = _positive(table.get("static_force_N"))
-    radius_m = _positive(table.get("radius_m", 1.0)) if turns else 1.0
     if "mass_kg" not in table:
         # a mass that slips in a tenth of a second; with a force drive, a mass that its friction decelerates by 10 m/s²
         stiffness = table.get("drive_stiffness_N_per_m")
         slips_kg = static_N / 10.0 if stiffness is None else _positive(stiffness) * (_SLIP_S / math.pi) ** 2
         assumed["mass_kg"] = mass_kg or slips_kg
-    # on a rotary rig the way in rad is the way in m over the radius
-    assumed["stribeck_velocity_mps"] = _STRIBECK_MPS / radius_m
     mass = _positive(table.get("mass_kg", assumed.get("mass_kg")))
-    stiffness = _positive(table.get("contact_stiffness_N_per_m", static_N / (_PRESLIDING_M / radius_m)))
+    presliding, stribeck = _PRESLIDING_M, _STRIBECK_MPS
+    if turns and "radius_m" in table:  # the way in rad is the way in m over the radius
+        radius_m = _positive(table["radius_m"])
+        presliding, stribeck = presliding / radius_m, stribeck / radius_m
+    elif turns:
+        drive = _positive(table.get("drive_stiffness_N_per_m"))
+        presliding, stribeck = _OF_REACH * static_N / drive, _OF_SLIP * static_N / math.sqrt(drive * mass)
+    assumed["stribeck_velocity_mps"] = stribeck
+    stiffness = _positive(table.get("contact_stiffness_N_per_m", static_N / presliding))
     assumed["contact_stiffness_N_per_m"] = stiffness
     # critical damping of the presliding motion, as for the paper's pairs
     assumed["contact_damping_Ns_per_m"] = 2.0 * (stiffness * mass) ** 0.5

@@ -200,7 +200,7 @@ def read_columns(path: Path, channels: dict[str, ChannelMap], rotary: bool = Fal
     """
     try:
         if path.suffix == ".mcap":
-            logged, damaged = columns_of_log(path)
+            logged, damaged, _ = columns_of_log(path)
             return {name: _scaled(values, channels.get(name), name) for name, values in logged.items()}, damaged
         table = read_table(path)
         wanted, lacking = _wanted(table, channels)

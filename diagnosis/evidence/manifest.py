@@ -112,7 +112,7 @@ class RigTable(Strict):
 
 
 # number of [rig] -> table and key of a rig file; the tail of the Stribeck curve is refitted, and no manifest states it
-_PLACES: Final = {
+PLACES: Final = {
     "mass_kg": ("slide", "mass_kg"),
     "drive_stiffness_N_per_m": ("drive", "stiffness_N_per_m"),
     "drive_damping_Ns_per_m": ("drive", "damping_Ns_per_m"),
@@ -128,7 +128,7 @@ _PLACES: Final = {
 def rig_file_tables(values: Mapping[str, float | None]) -> dict[str, dict[str, float]]:
     """Numbers of [rig] in the tables of a rig file; the static force is at least the Coulomb force, as the plant needs."""
     tables: dict[str, dict[str, float]] = {}
-    for name, (part, key) in _PLACES.items():
+    for name, (part, key) in PLACES.items():
         if (value := values.get(name)) is not None:
             tables.setdefault(part, {})[key] = value
     tables["contact"]["static_force_N"] = max(tables["contact"]["static_force_N"], tables["contact"]["coulomb_force_N"])
@@ -138,7 +138,7 @@ def rig_file_tables(values: Mapping[str, float | None]) -> dict[str, dict[str, f
 def rig_numbers(rig: Any) -> dict[str, float]:
     """The numbers of [rig], from the configuration of a plant's rig."""
     return {
-        name: getattr(getattr(rig, part), key) for name, (part, key) in _PLACES.items() if name in RigTable.model_fields
+        name: getattr(getattr(rig, part), key) for name, (part, key) in PLACES.items() if name in RigTable.model_fields
     }
 
 

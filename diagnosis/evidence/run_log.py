@@ -1,6 +1,7 @@
 """A run log of this project as evidence: its sensor blocks, and the commands in force during each block."""
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,15 +10,22 @@ from bridge.faults import Fault
 from bridge.log.damage import damage_findings
 from bridge.log.finding import Finding
 from bridge.log.logfile import RunData, block_period_ns, read_run, sample_times_s
+from bridge.log.metadata import is_number, value_at
 from bridge.tables.export import CHANNELS
+from diagnosis.evidence.manifest import PLACES, RigTable
 from diagnosis.evidence.manifest_keys import Columns
 
 
-def columns_of_log(path: Path) -> tuple[Columns, list[Finding]]:
-    """The standard columns of a run log, [samples] each in SI units, and a finding for each damage.
+class LoggedRun(NamedTuple):
+    """A run log as evidence."""
 
-    Raises Fault BAD_LOG, BAD_MESSAGE.
-    """
+    columns: Columns  # standard columns, [samples] each in SI units
+    findings: list[Finding]  # one for each damage
+    rig: dict[str, float]  # numbers of [rig] that the header of the rig describes, without its effects
+
+
+def columns_of_log(path: Path) -> LoggedRun:
+    """The columns and the described rig of a run log. Raises Fault BAD_LOG, BAD_MESSAGE."""
     run = read_run(path)
     sensors = run.sensors
     if not len(sensors):
@@ -31,7 +39,13 @@ def columns_of_log(path: Path) -> tuple[Columns, list[Finding]]:
         samples = sensors["drive_force_N"].shape[1]
         columns["vibration_frequency_Hz"] = np.repeat(frequency_Hz, samples)
         columns["vibration_amplitude_m"] = np.repeat(amplitude_m, samples)
-    return columns, damage_findings(run.damage, path)
+    return LoggedRun(columns, damage_findings(run.damage, path), _described(run))
+
+
+def _described(run: RunData) -> dict[str, float]:
+    rig = run.configuration("plant").get("rig") if "configuration" in run.headers.get("plant", {}) else None
+    numbers = {name: value_at(rig, f"{part}.{key}") for name, (part, key) in PLACES.items()}
+    return {name: float(value) for name, value in numbers.items() if name in RigTable.model_fields and is_number(value)}
 
 
 def _commanded(run: RunData) -> tuple[Floats, Floats]:

@@ -16,7 +16,12 @@ HIGH: Band = (50.0, 500.0)
 # features that are mean squares: noise and roughness add to them
 POWERS = frozenset({"scatter", "ring", "ripple", "rest", "spring rest"})
 DRIVE_WAVES = 24  # waves of the drive position over a run; more waves show shorter ripples and cost time
-RESOLVED_M = 1e-9  # least noise of a drive position; a commanded position in place of a measured one has only rounding
+# Least noise of a drive position, as a share of the travel; a commanded position in place of a measured one has only rounding,
+# 3e-8 of the position where a file holds 32 bits. Larger: 2.5e-7 took an encoder of 2e6 counts on the travel for a command.
+RESOLVED = 5e-8
+# Change of a displacement sensor's slope over the travel: linear to 0.2 % of a range of eight travels, as 40 mm for the 5 mm of
+# the paper's rig. Larger: the sensor explains a spring that hardens. Smaller: a sensor whose range is used up is a gap.
+BOW = 1e-3
 
 
 class Feature(NamedTuple):

@@ -68,7 +68,7 @@ def _index(run: MeasuredRun) -> npt.NDArray[np.int64]:
 class Averaged(NamedTuple):
     """Blocks whose mean still holds some vibration, and the two blocks that each is averaged with, [averaged] each."""
 
-    own: npt.NDArray[np.int64]
+    centre: npt.NDArray[np.int64]
     before: npt.NDArray[np.int64]
     after: npt.NDArray[np.int64]
     cosine: Floats  # cosine of the phase that the vibration advances from one of these blocks to the next

@@ -25,8 +25,8 @@ _SMALLEST_CHANGE = 0.35
 SHORTEST_S = 0.3  # shortest segment; shorter stretches of constant command are not compared
 _SHORTEST_WINDOWS = 3  # fewest windows of a piece of constant velocity; with fewer a ripple counts as a change
 # A drive counts as at rest below this share of the run's fastest speed, where its slope is the sensor's noise; and below this
-# travel in a whole run, which is rounding (or below its noise, if larger).
-_SLOWEST, _STILL_M = 0.01, 1e-9
+# share of its position as travel in a whole run, which is rounding in 32 bits (or below its noise, if larger).
+_SLOWEST, _STILL = 0.01, 1e-7
 # Deviation of a window from the velocity of its piece, as a share of the change of speed, up to which the speed is reached.
 # Too small: noise and ripple count as a change of speed. Too large: the end of a ramp counts as constant speed.
 _ON_THE_WAY = 0.1
@@ -170,7 +170,8 @@ def _pieces(position_m: Floats) -> Floats:
         return np.full(blocks, _slope(position_m))
     windows = blocks // _WINDOW
     means_m = position_m[: windows * _WINDOW].reshape(windows, _WINDOW).mean(axis=1)
-    if float(np.ptp(means_m)) < max(float(np.diff(position_m).std()) / 2.0**0.5, _STILL_M):
+    rounding_m = _STILL * float(np.abs(position_m).max())
+    if float(np.ptp(means_m)) <= max(float(np.diff(position_m).std()) / 2.0**0.5, rounding_m):
         return np.zeros(blocks)
     velocity = np.array([_slope(position_m[i * _WINDOW : (i + 1) * _WINDOW]) for i in range(windows)])
     fastest = float(np.abs(velocity).max())

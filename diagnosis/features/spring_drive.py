@@ -16,7 +16,7 @@ from scipy.fft import dct
 from scipy.ndimage import uniform_filter1d
 
 from bridge.arrays import Floats
-from diagnosis.features.feature import DRIVE_WAVES, HIGH, LOW, MIDDLE, RESOLVED_M, Features, Scales, Signals
+from diagnosis.features.feature import DRIVE_WAVES, HIGH, LOW, MIDDLE, RESOLVED, Features, Scales, Signals
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.features.segments import CommandedRun, Segment
 from diagnosis.features.slips import NO_SLIPS, SHAPE_AT, SegmentSlips, find_slips, slip_pairs
@@ -316,14 +316,14 @@ def _parity(features: Features, signals: Signals, commands: CommandedRun, scales
 
 def _drive(features: Features, position_m: Floats, commands: CommandedRun) -> None:
     """Add waves and power of the drive position's deviation from a line and a bow in each segment."""
-    rest_m = np.zeros_like(position_m)
+    rest_m, travel_m = np.zeros_like(position_m), BLOCK_S * float(np.abs(commands.drive).sum())
     for segment in commands.segments:
         rows = slice(segment.first, segment.last)
         rest_m[rows] = _without_line(position_m[rows], segment)
     waves = np.asarray(dct(rest_m))[1 : DRIVE_WAVES + 1] / len(rest_m)
     features.add_all(_DRIVE_WAVES, "drive_position_m", LOW, -1, waves.tolist())
     fast = rest_m - uniform_filter1d(rest_m, 100)
-    features.add("rest", "drive_position_m", "steady", MIDDLE, -1, float(fast.var()) + RESOLVED_M**2)
+    features.add("rest", "drive_position_m", "steady", MIDDLE, -1, float(fast.var()) + (RESOLVED * travel_m) ** 2)
 
 
 def _without_line(position_m: Floats, segment: Segment) -> Floats:

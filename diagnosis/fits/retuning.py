@@ -8,6 +8,7 @@ import numpy as np
 
 from bridge.arrays import Floats
 from bridge.faults import Fault
+from diagnosis.deadline import forecast
 from diagnosis.evidence.folder import Evidence
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.fits.batch import together
@@ -31,9 +32,6 @@ _SLIPS_OF_OTHERS = 8.0
 _SMOOTHEST, _ROUGHEST = 0.002, 0.005
 FIRST_REPLICATES, REPLICATES = 12, 32  # for the roughness, and for the floor
 _NEW_REPLICATES = 24  # that the floor does not know
-# Predictions of all fitted runs that a diagnosis takes: counted on 9 made rigs (docs/method/diagnosis.md); for an
-# estimate of the time
-_FEW, _MANY = 600, 1500
 # of chi2 a compared feature: what the least floors promise is not held against a rig that is better
 _LEAST_EXPECTED = 0.2
 
@@ -49,13 +47,12 @@ class Retuned(NamedTuple):
 
 def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, float], None], jobs: int = 1) -> Retuned:
     """Refit the rig of an evidence to its fitted runs. Raises Fault BAD_EVIDENCE when nothing can be compared."""
-    nuisances = Nuisances(evidence.rig)
+    nuisances = Nuisances(evidence.rig, problem.travel_m)
     described = np.zeros(len(nuisances))
     point = nuisances.point(described, {})
     first = replicates(problem, point, ROUGHNESS, FIRST_REPLICATES, 1)
-    one_s = problem.pace * sum(len(run.commands.drive) for run in problem.runs) * BLOCK_S / jobs
-    about = f"{_FEW * one_s:.0f} to {_MANY * one_s:.0f} s"
-    progress(f"the simulated fits take about {about}", 0.05)
+    fitted_s = sum(len(run.commands.drive) for run in problem.runs) * BLOCK_S
+    progress(f"the simulated fits take about {forecast(fitted_s, jobs, problem.pace)} at the present pace", 0.05)
     roughness = roughness_of(problem, first)
     floor = floor_of(problem, point, first)
     if not floor.compared.any():

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from bridge.arrays import Floats
+from diagnosis.deadline import OutOfTimeError
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.feature import Features, Signals, scales_of
 from diagnosis.features.force_drive import axis_features
@@ -35,10 +36,6 @@ _SCALE_SPREAD = 0.004
 # Simulated runs that are kept, of 0.6 MB each. Fewer: trials simulate their common start again. More: memory.
 _KEPT = 64
 _DIVERGED = 1e100  # a larger feature counts as missing, as its square would overflow
-
-
-class OutOfTimeError(Exception):
-    """The time budget is used up; the best answer so far is the result."""
 
 
 class Point(NamedTuple):
@@ -79,6 +76,10 @@ class Problem:
         self.until_s = math.inf  # deadline of `predicted_many` by `time.monotonic`, which all processes share
         self.pace = 0.0  # computing time for a simulated second of one lane, from the last batch [s/s]
         self.scales = scales_of(rig)
+        longest_m = max(BLOCK_S * float(np.abs(run.commands.drive).sum()) for run in runs)
+        self.travel_m = (
+            longest_m + self.scales.force_N / self.scales.stiffness_N_per_m
+        )  # of the drive; no meaning with force
         self.force_peak_N = max(float(np.abs(run.signals.get("drive_force_N", np.zeros(1))).max()) for run in runs)
         self._simulated: dict[object, Signals | None] = {}
         self._averaged = {run.file: averaged(run.commands.frequency_Hz) for run in runs}

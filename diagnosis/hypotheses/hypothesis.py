@@ -3,6 +3,8 @@
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from bridge.arrays import Floats
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.grid import BLOCK_S
@@ -98,8 +100,9 @@ def sizes(rig: RigTable, runs: list[Prepared], highest_Hz: float) -> Sizes:
     critical = 2.0 * math.sqrt(stiffness * rig.mass_kg)
     slip_s = math.pi * math.sqrt(rig.mass_kg / stiffness)
     slip_mps = 0.3 * static_N / math.sqrt(stiffness * rig.mass_kg)
-    if rig.drive == "force":  # no spring: speeds and times come from the motion
-        slip_mps = max(20.0 * rig.stribeck_velocity_mps, 0.05)
+    motions = [run.commands.motion for run in runs if run.commands.motion is not None]
+    if motions:  # no spring: speeds and times come from the motion
+        slip_mps = max(float(np.abs(motion.velocity_mps).max()) for motion in motions)
         critical = static_N / slip_mps
         slip_s = 0.05
     return Sizes(static_N, stiffness, static_N / stiffness, critical, slip_s, slip_mps, longest_run_s(runs), highest_Hz)

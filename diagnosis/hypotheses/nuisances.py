@@ -6,6 +6,7 @@ missing nuisance in another way.
 
 from bridge.arrays import Floats
 from diagnosis.evidence.manifest import RigTable
+from diagnosis.features.feature import BOW
 from diagnosis.gap.problem import Point
 from diagnosis.model.rig import Effects
 from diagnosis.model.sensor_chain import SensorChain
@@ -13,16 +14,17 @@ from diagnosis.result import RigNumber
 
 # Mean and standard deviation of sensor numbers that no manifest states. A 2 kHz force channel lags by 80 us, an 800 Hz
 # displacement channel by 200 us, an unfiltered channel by 0; displacement sensors are linear to 0.2 % of their range: up to 0.8 %
-# in slope, and a bow of 0.2 / m for a range of 40 mm; common accelerometers begin at 0 to 0.5 Hz and end at 10 kHz or above.
+# in slope; common accelerometers begin at 0 to 0.5 Hz and end at 10 kHz or above.
 _CHAIN = {
     "force_delay_s": (4e-5, 4e-5),
     "position_delay_s": (1e-4, 1e-4),
     "position_scale": (1.0, 0.004),
     "drive_slope": (0.0, 0.006),
-    "drive_bow_per_m": (0.0, 0.2),
+    "drive_bow_per_m": (0.0, BOW),  # over the travel
     "accel_lowest_Hz": (0.25, 0.25),
     "accel_rolled_off": (0.5, 0.5),
 }
+_PAPER_TRAVEL_M = 5e-3  # of the drive in the paper's runs
 # Standard deviation of the tail of the Stribeck curve: a table states two friction levels and a velocity, and the curve between
 # them is not exactly the Gaussian of tail 0.
 _TAIL = 0.4
@@ -30,27 +32,31 @@ _NOT_NEGATIVE = ("accel_lowest_Hz", "accel_rolled_off")
 
 
 class Nuisances:
-    """The nuisances of a rig as a vector [nuisances] in units of their tolerances; 0 is the described rig."""
+    """The nuisances of a rig as a vector [nuisances] in units of their tolerances; 0 is the described rig.
 
-    def __init__(self, rig: RigTable) -> None:
+    `travel_m`: of the drive; as in the paper's runs if not given.
+    """
+
+    def __init__(self, rig: RigTable, travel_m: float = _PAPER_TRAVEL_M) -> None:
         known = {name: value for name, value in rig.values().items() if value is not None}
         # a value of 0 has no relative tolerance
         self.rig_names = tuple(name for name, share in rig.tolerance.items() if share > 0.0 and known[name] > 0.0)
-        self._described = known
-        self._tolerance = rig.tolerance
-        self.names = (*self.rig_names, "stribeck_tail", *_CHAIN)
+        self.described = known
+        self.tolerance = rig.tolerance
+        self._chain = _CHAIN | {"drive_bow_per_m": (0.0, _CHAIN["drive_bow_per_m"][1] / travel_m)}
+        self.names = (*self.rig_names, "stribeck_tail", *self._chain)
 
     def __len__(self) -> int:
         return len(self.names)
 
     def value(self, name: str, deviation: float) -> float:
         """A number of the rig table at a deviation from its described value; at least a tenth of that value."""
-        described = self._described[name]
-        return described * max(1.0 + self._tolerance[name] * deviation, 0.1)
+        described = self.described[name]
+        return described * max(1.0 + self.tolerance[name] * deviation, 0.1)
 
     def growth(self, name: str, deviation: float) -> float:
         """Relative growth of a number of the rig table per tolerance, at a deviation."""
-        return self._tolerance[name] * self._described[name] / self.value(name, deviation)
+        return self.tolerance[name] * self.described[name] / self.value(name, deviation)
 
     def _values(self, deviations: Floats) -> dict[str, float]:
         return {name: self.value(name, float(deviations[i])) for i, name in enumerate(self.rig_names)}
@@ -58,11 +64,9 @@ class Nuisances:
     def parameters(self, deviations: Floats) -> tuple[RigNumber, ...]:
         """The rig's numbers in the model at these deviations, including the shape of its Stribeck curve."""
         count = len(self.rig_names)
-        values = self._described | self._values(deviations)
+        values = self.described | self._values(deviations)
         values["static_force_N"] = max(values["static_force_N"], values["coulomb_force_N"])
-        numbers = [
-            RigNumber(name, self._described[name], values[name], self._tolerance[name]) for name in self.rig_names
-        ]
+        numbers = [RigNumber(name, self.described[name], values[name], self.tolerance[name]) for name in self.rig_names]
         return (*numbers, RigNumber("stribeck_tail", 0.0, _TAIL * float(deviations[count]), _TAIL))
 
     def point(self, deviations: Floats, effects: Effects) -> Point:
@@ -71,7 +75,9 @@ class Nuisances:
         values = self._values(deviations)
         values["stribeck_tail"] = _TAIL * float(deviations[count])
         chain: dict[str, float] = {}
-        for (name, (mean, spread)), deviation in zip(_CHAIN.items(), deviations[count + 1 :].tolist(), strict=True):
+        for (name, (mean, spread)), deviation in zip(
+            self._chain.items(), deviations[count + 1 :].tolist(), strict=True
+        ):
             chain[name] = mean + spread * deviation
             if name in _NOT_NEGATIVE:
                 chain[name] = max(chain[name], 0.0)

@@ -177,10 +177,10 @@ def _waves(asked: TrialRequest, waves: list[Wave]) -> list[Trial]:
 def wave_trial(name: str, form: str, wave: Wave, slowest_Hz: float) -> Trial:
     """A form with a single wave that starts at `wave`; a wave over time must not be slower than `slowest_Hz`."""
     over_time = any(row.name == "frequency_Hz" for row in EFFECTS[name].forms[form].parameters)
-    period = ("frequency_Hz", 1.0 / wave.period) if over_time else ("wavelength_m", wave.period)
+    key, period = ("frequency_Hz", 1.0 / wave.period) if over_time else ("wavelength_m", wave.period)
     axes = [
         ("ratio", max(wave.ratio, 1e-4), True, 1.5, 0.0),
-        (*period, True, wave.spread, 0.0),
+        (key, period, True, wave.spread, 0.0),
         *_phases({PHASE: wave.phase_rad} | dict(wave.phases_of)),
         ("second_sin", 0.4, False, 1.0, wave.second_sin / 0.4),
         ("second_cos", 0.4, False, 1.0, wave.second_cos / 0.4),

@@ -2,7 +2,7 @@
 
 answer           the latent friction of an evidence
 rows             breakaway levels and sliding friction as rows; spring_rows: of a slide on a spring, axis_rows: of an axis
-components       the processes of the mixed model, each with a covariance: a new share is a process here
-reml             variances and lengths of the processes
-shares           the part of each process in the held-out runs
+causes           the courses that each cause can take over the rows: a new share is a column or a family of waves here
+pursuit          the courses that predict a run from the other runs
+shares           the part of the held-out rows that each cause predicts, its null, and whether its size agrees between runs
 """

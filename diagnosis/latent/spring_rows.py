@@ -1,7 +1,7 @@
 """Friction of a slide on a spring: at each breakaway, in the middle of each slip, and while it slides evenly.
 
-A slide that nothing damps falls as far below the sliding friction as it was above it at breakaway, so the middle of peak and
-trough is the sliding friction in a slip, without an acceleration. Peaks and troughs need no constant speed of the drive.
+The force of an undamped slide falls as far below the sliding friction as it exceeded it at breakaway. So the mean of peak and
+trough is the sliding friction in a slip; no acceleration is needed, and no constant speed of the drive.
 """
 
 import numpy as np
@@ -19,15 +19,15 @@ from diagnosis.relations.relation import pieces_of
 _SETTLED = 50  # blocks left out at the ends of a stretch in one direction
 _CELL = 200  # blocks of a row of even sliding
 _RATE_WINDOW = 201  # blocks over which the velocity of a drive is read that changes it all the time
-_STANDS = 0.02  # share of its fastest velocity below which it stands
+_STANDS = 0.02  # share of its fastest velocity below which it is at rest
 _SHORTEST = 300  # blocks of a stretch in one direction
-_OVER_NOISE = 4.0  # standard deviations of the noise that a slip must fall by, or noise has peaks of its own
+_OVER_NOISE = 4.0  # standard deviations of the noise by which the force falls in a slip; a smaller fall may be noise
 
 
 def spring_rows(rig: RigTable, runs: list[Prepared]) -> list[ExcessRows]:
     """Breakaways and sliding friction of every run that has a force; a list of the rows of each run and signal."""
     result: list[ExcessRows] = []
-    gone_m = 0.0  # a path that nobody measured goes on from run to run: no place of one is known to be one of another
+    gone_m = 0.0  # without a measured path, runs follow one another: no place of a run is known to be in another run
     for number, run in enumerate(runs):
         force_N = run.signals.get("drive_force_N")
         if force_N is None:
@@ -61,7 +61,7 @@ def _stretches(run: Prepared, drive_mps: Floats) -> list[tuple[int, int]]:
 
 
 def _place_m(rig: RigTable, signals: Signals, drive_mps: Floats, force_N: Floats) -> Floats:
-    """Place of the slide: as measured, or that of the drive less the extension of the spring, [blocks]."""
+    """Place of the slide: measured, or position of the drive less the extension of the spring, [blocks]."""
     if "mass_position_m" in signals:
         return signals["mass_position_m"]
     drive_m = signals.get("drive_position_m")

@@ -4,8 +4,8 @@ import re
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bridge.arrays import Floats
 from bridge.faults import Fault
 from bridge.tables.table import Table
 from bridge.tables.unit_words import bare_name, known_unit, weight_unit
@@ -234,7 +234,7 @@ def _numbers_rows(table: Table, name: str) -> bool:
     return len(steps) > _FEWEST_STEPS and bool((steps == 1.0).all())
 
 
-def _steps(table: Table, name: str) -> npt.NDArray[np.float64]:
+def _steps(table: Table, name: str) -> Floats:
     values = table.column(name)
     return np.diff(values[np.isfinite(values)])
 

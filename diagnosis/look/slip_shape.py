@@ -153,11 +153,12 @@ def _fitted(
     t, y = falls.since_s[inside] / falls.length_s, (falls.force_N[inside] - falls.bottom_N) / drop_N
     if len(t) < 2 * len(start):
         return None
-    lowest, highest, scale = bounds
+
+    def residual(p: Floats) -> Floats:
+        return swing(t, *p) - y
+
     begin = start if near is None else near.parameters
-    fitted = least_squares(
-        lambda p: swing(t, *p) - y, begin, bounds=(lowest, highest), x_scale=scale, xtol=1e-6, ftol=1e-8
-    )
+    fitted = least_squares(residual, begin, bounds=bounds[:2], x_scale=bounds[2], xtol=1e-6, ftol=1e-8)
     return fitted if fitted.success else None
 
 

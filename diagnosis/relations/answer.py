@@ -131,7 +131,7 @@ def answered_of(relation: Relation, fitted: list[int]) -> Answered:
         lost=lost,
         tried=len(relation.effects),
         ranking=ranking,
-        patterns=patterns_of(products, fitted, noise, chosen),
+        patterns=patterns_of(products, fitted, held_out, noise, chosen),
         bursts=burst_ratio(whitened_rows(products, fitted, free, products.terms, every), relation.row_s),
         nuisances=tuple(
             (term.cause, float(size[place.start]), float(deviation[place.start]))

@@ -11,15 +11,16 @@ from diagnosis.relations.shapes import bend, free, mode, rate, slip_phase
 
 NEEDED = ("base_accel_mps2", "drive_force_N", "mass_accel_mps2")
 _HIGHEST_HZ = 320.0  # of a mode of the base
-_RESOLUTION_MPS2 = 1e-4  # least noise of a row
+_RESOLUTION = 1e-5  # least noise of a row, as a share of the acceleration that the static friction gives the slide
 _MODES_HZ = np.geomspace(45.0, 300.0, 28)  # that a mode may have: steps of 7 %
 _CROSS = 0.01  # share of the slide's acceleration that an ordinary accelerometer on the base shows
-_COMPLIANCE_M_PER_N = 2e-6  # of a large effect
+_COMPLIANCE = 0.02  # of a large effect, as a share of the drive's
 
 
 def base_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
     """The relation in m/s2, away from vibration; `Missing` where a run lacks a channel or always vibrates."""
-    if rig.drive == "force":
+    stiffness = rig.drive_stiffness_N_per_m
+    if stiffness is None:
         return Missing("base", 'drive = "force": nothing slips')
     pieces = pieces_without_vibration("base", NEEDED, runs)
     if isinstance(pieces, Missing):
@@ -30,7 +31,7 @@ def base_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
     modes = tuple(
         term(
             "base-compliance", f"{each_Hz:.3g} Hz", [bend(mode(force, each_Hz, 0.02)) for force in friction],
-            _COMPLIANCE_M_PER_N, 1, "compliance_m_per_N",
+            _COMPLIANCE / stiffness, 1, "compliance_m_per_N",
         )
         for each_Hz in _MODES_HZ.tolist()
     )  # fmt: skip
@@ -41,5 +42,5 @@ def base_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
         nuisances=(term("cross sensitivity", "", accel, _CROSS),),
         effects=modes,
         patterns=(free("the time since a slip", since, 14),),
-        resolution=_RESOLUTION_MPS2,
+        resolution=_RESOLUTION * rig.static_force_N / rig.mass_kg,
     )  # fmt: skip

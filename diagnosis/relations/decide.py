@@ -181,7 +181,11 @@ def _outside_cause(answered: Answered, cause: Decided) -> Outside:
 
 def _pattern(answered: Answered, named: list[Decided]) -> Outside | None:
     taken = math.sqrt(max(answered.refitted**2 - answered.left**2, 0.0)) if named else 0.0
-    for pattern in () if answered.name in _COARSE else answered.patterns:
+    # a motion of the drive that the held-out runs do not repeat is its command
+    predicts = [
+        seen for seen in answered.patterns if answered.name != "drive" or seen.share is None or seen.share > 0.0
+    ]
+    for pattern in () if answered.name in _COARSE else predicts:
         if pattern.evidence > _PATTERN and pattern.rms > max(_PATTERN_OVER_NOISE * answered.noise, _MISMATCH * taken):
             return Outside(
                 answered.name, f"over {pattern.what}", pattern.rms, answered.noise, answered.unit, pattern.evidence

@@ -4,9 +4,10 @@ import math
 from itertools import pairwise
 
 import numpy as np
+from scipy.fft import next_fast_len, rfft, rfftfreq
 
 from diagnosis.evidence.manifest import RigTable
-from diagnosis.features.feature import RESOLVED_M
+from diagnosis.features.feature import RESOLVED
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.gap.prepare import Prepared
 from diagnosis.relations.relation import Floats, Missing, Piece, Relation, Term, kept_blocks, pieces_of, wander
@@ -14,12 +15,15 @@ from diagnosis.relations.shapes import hats, knots_of
 
 _HIGHEST_HZ = 60.0  # of the unevenness that is compared
 _DEPTH = 0.1  # typical share by which an uneven drive's speed swings
-_THIN = 10  # every how many rows the search for waves takes
 _WAVES = 2  # strongest waves over the place, and over time, that become columns
-_PITCHES_M = (2e-4, 8e-3)  # shortest and longest wave over the place
-_FREQUENCIES_HZ = (0.4, 30.0)  # slowest and fastest wave over time
-_WANDER_M = 2e-7  # slow drift of a displacement sensor
+_FASTEST_HZ = (
+    30.0  # of a wave, at the mean speed: half the highest compared frequency, as each wave has a second harmonic
+)
+_WANDER = 5e-5  # slow drift of a displacement sensor, as a share of the travel
 _FEWEST_TURNS = 2.0  # of a wave in the longest piece; a slower one is a wander of the sensor
+_APART_TURNS = 1.2  # in the longest piece, by which two waves differ: a line is a turn wide
+# Bins of the shortest wave, of which they keep 97 %, and lines for each turn. Fewer: a wave between two is lost. More: time.
+_BINS, _LINES = 8, 4
 
 
 def drive_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
@@ -33,32 +37,28 @@ def drive_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
     fitted = [i for i, run in enumerate(runs) if not run.holdout and pieces[i]]
     if not fitted:
         return Missing("drive", "no stretch of constant speed is long enough")
-    place = [run.signals["drive_position_m"] for run in runs]
-    own_s = [(np.arange(len(s)) + 0.5) * BLOCK_S for s in place]
+    measured = [run.signals["drive_position_m"] for run in runs]
+    own_s = [(np.arange(len(s)) + 0.5) * BLOCK_S for s in measured]
     speed = [np.abs(run.commands.drive) for run in runs]
-    left = [_without_parabola(s, pieces_of) for s, pieces_of in zip(place, pieces, strict=True)]
-    rows = np.concatenate([left[i][slice(*piece)] for i in fitted for piece in pieces[i]])
-    if math.sqrt(float(np.mean(rows**2))) < RESOLVED_M:
+    left = [_without_parabola(s, pieces_of) for s, pieces_of in zip(measured, pieces, strict=True)]
+    # of the even path: a function of the measured place could be that place itself, and then leaves nothing of anything
+    place = [s - uneven for s, uneven in zip(measured, left, strict=True)]
+    rows = [(i, slice(*piece)) for i in fitted for piece in pieces[i]]
+    travel_m = max(float(np.ptp(place[i][piece])) for i, piece in rows)
+    if float(np.mean(np.concatenate([left[i][piece] for i, piece in rows]) ** 2)) <= (RESOLVED * travel_m) ** 2:
         return Missing("drive", "the drive position is the commanded path, not a measurement")
     effects: list[Term] = []
-    travel_m = max((float(np.ptp(place[i][slice(*piece)])) for i in fitted for piece in pieces[i]), default=0.0)
-    if travel_m > 0.0:
-        grid = np.arange(max(1.0 / _PITCHES_M[1], _FEWEST_TURNS / travel_m), 1.0 / _PITCHES_M[0], 0.3 / travel_m)
-        for per_m in _strongest(place, left, pieces, fitted, grid):
-            angles = [2.0 * math.pi * per_m * s for s in place]
-            amplitude_m = _DEPTH / (2.0 * math.pi * per_m)
-            effects.append(
-                _wave("drive-speed-ripple", f"every {1e3 / per_m:.3g} mm", angles, None, pieces, amplitude_m)
-            )
-    longest_s = max((last - first for i in fitted for first, last in pieces[i]), default=0) * BLOCK_S
-    grid = np.arange(max(_FREQUENCIES_HZ[0], _FEWEST_TURNS / longest_s), _FREQUENCIES_HZ[1], 0.3 / longest_s)
-    for each_Hz in _strongest(own_s, left, pieces, fitted, grid):
+    for per_m in _strongest(place, left, rows):
+        angles = [2.0 * math.pi * per_m * s for s in place]
+        amplitude_m = _DEPTH / (2.0 * math.pi * per_m)
+        effects.append(_wave("drive-speed-ripple", f"every {1e3 / per_m:.3g} mm", angles, None, pieces, amplitude_m))
+    for each_Hz in _strongest(own_s, left, rows):
         angles = [2.0 * math.pi * each_Hz * t for t in own_s]
         effects.append(
             _wave("drive-speed-ripple", f"{each_Hz:.3g} Hz", angles, speed, pieces, _DEPTH / (2.0 * math.pi * each_Hz))
         )
     knots = knots_of(np.concatenate(place), 60)
-    slow = wander([len(s) for s in place], _WANDER_M)
+    slow = wander([len(s) for s in place], _WANDER * travel_m)
     return Relation(
         name="drive", unit="m", row_s=BLOCK_S, highest_Hz=_HIGHEST_HZ, left=tuple(left), pieces=pieces,
         nuisances=(
@@ -69,7 +69,7 @@ def drive_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
             Term("the place of the drive", "", tuple(
                 _without_parabola(hats(s, knots), pieces_of) for s, pieces_of in zip(place, pieces, strict=True)), math.nan),
         ),
-        resolution=RESOLVED_M,
+        resolution=RESOLVED * travel_m,
     )  # fmt: skip
 
 
@@ -97,23 +97,31 @@ def _without_parabola(values: Floats, pieces: tuple[Piece, ...]) -> Floats:
     return result
 
 
-def _strongest(
-    over: list[Floats], left: list[Floats], pieces: tuple[tuple[Piece, ...], ...], runs: list[int], grid: Floats
-) -> list[float]:
-    """The waves over a variable that take most of what is left, apart from each other; from a grid of turns for its unit."""
-    if len(grid) == 0:
-        return []
-    rows = [(i, slice(first, last, _THIN)) for i in runs for first, last in pieces[i]]
-    at = np.concatenate([over[i][rows_of] for i, rows_of in rows])
-    values = np.concatenate([left[i][rows_of] for i, rows_of in rows])
-    power = np.array([abs(np.exp(-2j * math.pi * turns * at) @ values) ** 2 for turns in grid])
-    wavelengths: list[float] = []
+def _strongest(over: list[Floats], left: list[Floats], rows: list[tuple[int, slice]]) -> list[float]:
+    """Turns per unit of the waves over a variable that take most of the rest: of any length that the rows resolve.
+
+    Args:
+        over: place or time, [rows of the run] each.
+        left: the rest, [rows of the run] each.
+        rows: run and rows of each piece.
+
+    """
+    lengths = [float(np.ptp(over[i][piece])) for i, piece in rows]
+    highest = _FASTEST_HZ * BLOCK_S * sum(piece.stop - piece.start for _, piece in rows) / sum(lengths)
+    at = np.concatenate([over[i][piece] for i, piece in rows])
+    bins = np.floor((at - at.min()) * _BINS * highest).astype(np.int64)
+    summed = np.bincount(bins, np.concatenate([left[i][piece] for i, piece in rows]))
+    count = next_fast_len(_LINES * len(summed))
+    turns = rfftfreq(count, 1.0 / (_BINS * highest))
+    inside = (turns >= _FEWEST_TURNS / max(lengths)) & (turns <= highest)
+    turns, power = turns[inside], np.abs(rfft(summed, count)[inside])
+    strongest: list[float] = []
     for i in np.argsort(-power):
-        if all(abs(grid[i] - other) > 4.0 * abs(grid[-1] - grid[0]) / max(len(grid) - 1, 1) for other in wavelengths):
-            wavelengths.append(float(grid[i]))
-        if len(wavelengths) == _WAVES:
+        if all(abs(turns[i] - other) > _APART_TURNS / max(lengths) for other in strongest):
+            strongest.append(float(turns[i]))
+        if len(strongest) == _WAVES:
             break
-    return wavelengths
+    return strongest
 
 
 def _wave(

@@ -14,7 +14,7 @@ from diagnosis.relations.shapes import bend, calmed, free, near_slips, rate, sli
 NEEDED = ("mass_accel_mps2", "mass_position_m")
 # Content above is noise of the position, whose second derivative grows with the square of the frequency.
 _HIGHEST_HZ = 60.0
-_RESOLUTION_MPS2 = 1e-4  # least noise of a row
+_RESOLUTION = 1e-5  # least noise of a row, as a share of the acceleration that the static friction gives the slide
 _SCALE = 0.008  # slope of the position sensor, relative
 _DELAY_S = 2e-4  # between the two channels
 _BEND_S2 = 1e-7  # lag of the second order between the two channels
@@ -59,5 +59,5 @@ def motion_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
             free("the velocity", velocity, 12),
             free("the time since a slip", since, 14),
         ),
-        resolution=_RESOLUTION_MPS2,
+        resolution=_RESOLUTION * rig.static_force_N / rig.mass_kg,
     )  # fmt: skip

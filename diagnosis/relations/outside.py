@@ -11,6 +11,7 @@ from diagnosis.relations.products import (
     band_edges_Hz,
     band_of_rows,
     model_columns,
+    square_left,
     turned_back,
     turned_piece,
     weighted,
@@ -19,6 +20,7 @@ from diagnosis.relations.relation import Floats, Term
 from diagnosis.relations.search import Found
 
 _WINDOW_S = 0.1  # of a local variance
+_RCOND = 1e-12  # of columns that are nearly alike
 _SPREADS = np.geomspace(1e-3, 1e2, 26)  # of a free function, relative to the noise of a row
 
 
@@ -28,48 +30,63 @@ class Pattern(NamedTuple):
     what: str  # the variable
     evidence: float  # natural logarithm, against the chosen causes alone
     rms: float  # of the function over the rows, in the relation's unit
+    share: float | None  # of the rest on the held-out runs; below 0: it predicts worse than nothing
 
 
-def patterns_of(products: Products, runs: list[int], noise: BandNoise, chosen: Found) -> tuple[Pattern, ...]:
-    """Every pattern of the relation beside the chosen causes, the largest evidence first."""
+def patterns_of(
+    products: Products, runs: list[int], held_out: list[int], noise: BandNoise, chosen: Found
+) -> tuple[Pattern, ...]:
+    """Every pattern of the relation beside the chosen causes, fitted to `runs`; the largest evidence first."""
     whole = weighted(products, runs, noise)
-    plain = products.values[runs].sum(axis=(0, 1))
+    plain, elsewhere = (products.values[of].sum(axis=(0, 1)) for of in (runs, held_out))
     rows = float(products.lengths[runs].sum())
     model, spreads = model_columns(products, chosen.terms)
-    patterns = (
-        _pattern(whole, plain, rows, model, spreads, term, products.columns((term,)))
-        for term in products.relation.patterns
-    )
+    patterns: list[Pattern] = []
+    for term in products.relation.patterns:
+        columns = products.columns((term,))
+        evidence, size = _likeliest(_freed(whole, model, spreads, columns))
+        # a part that the nuisances could take as well is not the pattern's
+        square = float(size @ _without(plain, model, columns) @ size) / max(rows, 1.0)
+        share = None
+        if held_out:
+            held = _without(elsewhere, model, np.append(columns, len(elsewhere) - 1))
+            share = 1.0 - square_left(held, size) / max(float(held[-1, -1]), 1e-300)
+        patterns.append(Pattern(term.cause, evidence, math.sqrt(max(square, 0.0)), share))
     return tuple(sorted(patterns, key=lambda pattern: -pattern.evidence))
 
 
-def _pattern(
-    whole: Floats, plain: Floats, rows: float, model: np.ndarray, spreads: Floats, term: Term, mask: np.ndarray
-) -> Pattern:
-    everything = np.append(mask, whole.shape[0] - 1)
+def _freed(whole: Floats, model: np.ndarray, spreads: Floats, columns: np.ndarray) -> Floats:
+    """The products of `columns` and of the rest, less the part that the columns of the model take."""
+    everything = np.append(columns, whole.shape[0] - 1)
     free = whole[everything[:, None], everything]
-    if len(model):
-        inner = whole[model[:, None], model] + np.diag(1.0 / spreads**2)
-        scale = 1.0 / np.sqrt(np.diag(inner))
-        across = scale[:, None] * whole[model[:, None], everything]
-        free = free - across.T @ np.linalg.solve(inner * np.outer(scale, scale), across)
+    if len(model) == 0:
+        return free
+    inner = whole[model[:, None], model] + np.diag(1.0 / spreads**2)
+    scale = 1.0 / np.sqrt(np.diag(inner))
+    across = scale[:, None] * whole[model[:, None], everything]
+    return free - across.T @ np.linalg.solve(inner * np.outer(scale, scale), across)
+
+
+def _without(plain: Floats, model: np.ndarray, columns: np.ndarray) -> Floats:
+    """The products of `columns`, less all that the columns of the model could take."""
+    across = plain[model[:, None], columns]
+    taken = np.linalg.lstsq(plain[model[:, None], model], across, rcond=_RCOND)[0] if len(model) else across
+    return plain[columns[:, None], columns] - across.T @ taken
+
+
+def _likeliest(free: Floats) -> tuple[float, Floats]:
+    """Log evidence of a free function, and its coefficients, with the spread that makes them likeliest."""
     inner, towards = free[:-1, :-1], free[:-1, -1]
     values, vectors = np.linalg.eigh(0.5 * (inner + inner.T))
     values = np.maximum(values, 0.0)
     along = vectors.T @ towards
-    typical = math.sqrt(
-        len(mask) / max(float(values.sum()), 1e-300)
-    )  # size of a coefficient that is one noise of a row
+    # size of a coefficient that is one noise of a row
+    typical = math.sqrt(len(towards) / max(float(values.sum()), 1e-300))
     sizes = typical * _SPREADS[:, None]
     gained = (0.5 * along**2 * sizes**2 / (1.0 + values * sizes**2) - 0.5 * np.log1p(values * sizes**2)).sum(axis=1)
     best = int(gained.argmax())
     size = vectors @ (along / (values + 1.0 / float(sizes[best, 0]) ** 2))
-    shown = plain[mask[:, None], mask]
-    if len(model):  # a part that the nuisances could take as well is not the pattern's
-        across = plain[model[:, None], mask]
-        shown = shown - across.T @ np.linalg.lstsq(plain[model[:, None], model], across, rcond=1e-12)[0]
-    square = float(size @ shown @ size) / max(rows, 1.0)
-    return Pattern(term.cause, float(gained[best]) - math.log(len(_SPREADS)), math.sqrt(max(square, 0.0)))
+    return float(gained[best]) - math.log(len(_SPREADS)), size
 
 
 def whitened_rows(

@@ -11,9 +11,8 @@ from bridge.arrays import Bools, Floats
 from diagnosis.gap.prepare import Prepared
 
 Piece = tuple[int, int]  # rows [first, last) of a run, without a hole
-OUTSIDE = frozenset(
-    {"acceleration-clock", "logger-clock", "force-amplifier", "loose-clamp"}
-)  # causes that no effect of the library makes
+# Causes that no effect of the library makes.
+OUTSIDE = frozenset({"acceleration-clock", "logger-clock", "force-amplifier", "loose-clamp"})
 END_BLOCKS = 20  # left out at the ends of a run
 _EDGE_BLOCKS = 100  # left out around a change of command, while drive and piezo settle
 # Rows of a piece. Shorter: its lowest frequencies are those of slips, and columns pass for noise. Longer: pieces are lost.

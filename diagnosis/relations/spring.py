@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from diagnosis.evidence.manifest import RigTable
-from diagnosis.features.feature import scales_of
+from diagnosis.features.feature import BOW, scales_of
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.gap.prepare import Prepared
 from diagnosis.relations.relation import END_BLOCKS, Floats, Missing, Relation, Term, lacking, term, wander
@@ -15,9 +15,10 @@ from diagnosis.relations.spring_effects import spring_effects
 
 NEEDED = ("drive_force_N", "mass_position_m", "drive_position_m")
 _HIGHEST_HZ = 120.0  # slips end below; above, a block mean of 1 ms is not the value at its middle
-_RESOLUTION_N = 1e-4  # least noise of a row
+_RESOLUTION = 6e-6  # least noise of a row, as a share of the static friction
 # Standard deviations of what no manifest states; sources: `diagnosis.hypotheses.nuisances`.
-_SCALE, _SLOPE, _BOW_PER_M, _DELAY_S, _BEND_S2 = 0.004, 0.006, 0.2, 1.1e-4, 5e-8
+_SCALE, _SLOPE, _DELAY_S, _BEND_S2 = 0.004, 0.006, 1.1e-4, 5e-8
+_SOFT = 0.1  # of the mean rate of the extension: below, it has no direction
 _WANDER = 6e-4  # of the static friction: a strain gauge drifts by 10 mN in 10 s on the paper's rig
 
 
@@ -41,6 +42,7 @@ def spring_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
     extension = [s - x + zero_m for s, x in zip(drive, slide, strict=True)]
     rates = [rate(e) for e in extension]
     middle_m = float(np.mean([s.mean() for s in drive]))
+    bow_per_m = BOW / float(np.ptp(np.concatenate(drive)))
 
     known = math.hypot(rig.tolerance.get("drive_stiffness_N_per_m", 0.0), _SCALE)
     nuisances = [
@@ -54,15 +56,15 @@ def spring_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
     for name, position in (("drive", drive), ("mass", slide)):
         about = [p - middle_m for p in position]
         nuisances.append(term(f"slope of the {name} sensor", "", [stiffness * p for p in about], _SLOPE))
-        nuisances.append(term(f"bow of the {name} sensor", "", [stiffness * p * p for p in about], _BOW_PER_M))
+        nuisances.append(term(f"bow of the {name} sensor", "", [stiffness * p * p for p in about], bow_per_m))
     most_N = max(float(np.abs(f).max()) for f in force)
     return Relation(
         name="spring", unit="N", row_s=BLOCK_S, highest_Hz=_HIGHEST_HZ, left=left,
         pieces=tuple(((END_BLOCKS, len(values) - END_BLOCKS),) for values in left),
         nuisances=tuple(nuisances),
-        effects=tuple(spring_effects(stiffness, extension, rates, runs, most_N)),
+        effects=tuple(spring_effects(rig, extension, rates, runs, most_N)),
         patterns=tuple(_patterns(rig, extension, rates, drive)),
-        resolution=_RESOLUTION_N,
+        resolution=_RESOLUTION * rig.static_force_N,
     )  # fmt: skip
 
 
@@ -71,11 +73,12 @@ def _patterns(
 ) -> list[Term]:
     since = [slip_phase(v, scales_of(rig).slip_s) for v in rates]
     loading = free("the extension", extension, 14)
+    soft_mps = _SOFT * float(np.mean(np.abs(np.concatenate(rates))))
     return [
         loading,
         free("the rate of the extension", rates, 12),
         Term("the extension, by direction", "", tuple(
-            hat * np.tanh(v / 1e-4)[:, None] for hat, v in zip(loading.values, rates, strict=True)), math.nan),
+            hat * np.tanh(v / soft_mps)[:, None] for hat, v in zip(loading.values, rates, strict=True)), math.nan),
         free("the time since a slip", since, 14),
         free("the place of the drive", drive, 30),
         free("the time in a run", [np.arange(len(v)) * BLOCK_S for v in rates], 24),

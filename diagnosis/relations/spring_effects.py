@@ -5,12 +5,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.gap.prepare import Prepared
 from diagnosis.model.sensor_chain import delayed, low_pass
 from diagnosis.relations.relation import Floats, Term, term
 from diagnosis.relations.shapes import mode, play
 
+_DAMPING = 0.16  # of a large effect, as a share of the critical damping
 _RELAXES_S = (2e-3, 4e-3, 8e-3)
 _DELAYS_S = (3e-4, 6e-4, 1e-3, 1.5e-3, 2e-3, 3e-3, 4e-3, 6e-3)
 _LAGS_S = (3e-4, 6e-4, 1e-3, 1.6e-3, 2.5e-3, 4e-3, 7e-3)
@@ -23,17 +25,18 @@ _SETTLING_S = (1.5, 3.0, 6.0, 12.0)
 
 
 def spring_effects(
-    stiffness: float, extension: Sequence[Floats], rates: Sequence[Floats], runs: Sequence[Prepared], most_N: float
+    rig: RigTable, extension: Sequence[Floats], rates: Sequence[Floats], runs: Sequence[Prepared], most_N: float
 ) -> list[Term]:
     """The columns, in N. `extension` [m] and `rates` [m/s] are [blocks of the run] each; `most_N` is the largest force."""
+    stiffness = rig.drive_stiffness_N_per_m or 0.0
     pull = [stiffness * e for e in extension]
-    critical_Ns_per_m = 2.0 * math.sqrt(stiffness)  # of 1 kg
+    damping_Ns_per_m = _DAMPING * 2.0 * math.sqrt(stiffness * rig.mass_kg)
     return [
         term("drive-stiffness", "", extension, 0.2 * stiffness, 0, "difference_N_per_m"),
-        term("drive-damping", "linear", rates, 0.2 * critical_Ns_per_m, 1, "damping_Ns_per_m"),
+        term("drive-damping", "linear", rates, damping_Ns_per_m, 1, "damping_Ns_per_m"),
         *(
             term("drive-damping", f"relaxing in {1e3 * time_s:g} ms", [low_pass(v, time_s) for v in rates],
-                 0.2 * critical_Ns_per_m, 1, "damping_Ns_per_m")
+                 damping_Ns_per_m, 1, "damping_Ns_per_m")
             for time_s in _RELAXES_S
         ),
         *_late(pull),

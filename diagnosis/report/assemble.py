@@ -2,14 +2,15 @@
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import TypeVar
 
 import numpy as np
 
 from bridge.arrays import Floats
 from bridge.log.finding import Finding
-from diagnosis.evidence.folder import Evidence
+from diagnosis.deadline import OutOfTimeError
+from diagnosis.evidence.folder import Evidence, MeasuredRun
 from diagnosis.evidence.foreign_vibration import PICK_UP
 from diagnosis.experiments.proposal import SINE, UNCOUPLE, next_experiment
 from diagnosis.features.grid import BLOCK_S
@@ -18,11 +19,12 @@ from diagnosis.fits.fit import Fit
 from diagnosis.fits.random_friction import is_random
 from diagnosis.gap.measure import DEFINITION, Floor, cell_names, cell_squares, differences
 from diagnosis.gap.prepare import Prepared
-from diagnosis.gap.problem import OutOfTimeError, Problem
+from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.hypothesis import Coordinate
 from diagnosis.hypotheses.starts import Trial
 from diagnosis.model.per_run import is_phase
 from diagnosis.pictures.choice import pictures
+from diagnosis.report.outcome import verdict_of, wrong_numbers
 from diagnosis.result import PARAMETERS, Candidate, Cell, Diagnosis, Estimate, Experiment, Gap, Shrinkage
 from diagnosis.verdict.blend import flexible_differences
 from diagnosis.verdict.confirmation import Confirmation
@@ -57,13 +59,14 @@ def unfitted() -> Verdict:
     return Verdict("unexplained", None, dict.fromkeys(names, 1.0 / len(names)), None, (), 1.0)
 
 
-def without_fits(verdict: Verdict, runs: list[Prepared], following: Experiment, began: float) -> Diagnosis:
+def without_fits(verdict: Verdict, runs: Sequence[MeasuredRun], following: Experiment, began: float) -> Diagnosis:
     """The diagnosis of a verdict without any fit, still without relations, shares and sentences."""
     return Diagnosis(
         verdict=verdict.kind,
         effects=verdict.names,
         summary=(),
-        candidates=tuple(Candidate(name, math.nan) for name in dict.fromkeys((*verdict.names, "unexplained", "none"))),
+        candidates=tuple(Candidate(name, math.nan) for name in dict.fromkeys((*verdict.names, *EFFECTS, "none"))),
+        complete=math.nan,
         not_distinguishable=(),
         where=(),
         gap=Gap(DEFINITION, tuple(run.file for run in runs if run.holdout)),
@@ -84,6 +87,7 @@ def assembled(
     tried: list[Trial],
     began: float,
     jobs: int,
+    outside: bool,
 ) -> Diagnosis:
     """The diagnosis of an evidence, still without its relations and without sentences.
 
@@ -94,6 +98,7 @@ def assembled(
         tried: the library's trials.
         began: `time.monotonic()` at the start of the diagnosis.
         jobs: processes.
+        outside: whether the relations show something that no effect of the library causes.
 
     """
     fitter, baseline = contest.rig.fitter, contest.rig.fit
@@ -122,12 +127,15 @@ def assembled(
     elif verdict.ranked and is_random(verdict.ranked[0].fit.hypothesis):
         by_effect[verdict.ranked[0].fit.hypothesis.effects[0]] = verdict.ranked[0].fit
     alone = {name: round(fit.chi2, 2) for name, fit in ({"none": baseline} | singles).items()}
+    numbers = _in_time(lambda: tuple(wrong_numbers(nuisances, best, held_out)), ())
+    kind, effects = verdict_of(verdict.kind, verdict.names, numbers, judged, outside)
+    complete = math.nan if kind == "not-finished" else 1.0 - verdict.probabilities["unexplained"]
     candidates = tuple(
-        _candidate(name, probability, by_effect.get(name))._replace(chi2=alone.get(name))
+        _candidate(name, probability / complete, by_effect.get(name))._replace(chi2=alone.get(name))
         for name, probability in verdict.probabilities.items()
+        if name != "unexplained"
     )
     named = nuisances.point(best.deviations, best.effects) if verdict.named else None
-    effects = verdict.names
     followed = [ranked for ranked in verdict.ranked if not is_random(ranked.fit.hypothesis)]
     alike = _in_time(lambda: imitators(fitter, followed, verdict.scale), ()) if refittable(verdict) else ()
     leaders = [fit for fit in (verdict.named or baseline, verdict.runner_up) if fit is not None]
@@ -140,10 +148,11 @@ def assembled(
     shown.until_s = fitter.problem.until_s
     described, refitted = (nuisances.point(at, {}) for at in (np.zeros(len(nuisances)), baseline.deviations))
     return Diagnosis(
-        verdict=verdict.kind,
+        verdict=kind,
         effects=effects,
         summary=(),
         candidates=candidates,
+        complete=complete,
         not_distinguishable=(alike,) if alike else (),
         where=tuple(where),
         gap=judged,
@@ -153,6 +162,7 @@ def assembled(
         pictures=_in_time(lambda: pictures(shown, described, refitted, named, effects), ()),
         compared_features=len(baseline.residual),
         elapsed_s=round(time.monotonic() - began, 2),
+        numbers=numbers,
     )
 
 
@@ -182,8 +192,9 @@ def _judged(contest: Contest, outcome: Confirmation, held_out: HeldOut, tried: l
         for fit in compared_fits(verdict, gone)
     ]
     compared.append(Shrinkage(PARAMETERS, *held_out.closed_by(baseline)))
-    blend = flexible_differences(fitter, baseline, tried, held_out, jobs)
-    compared.append(Shrinkage("flexible residual", *held_out.closed_by_differences(blend)))
+    blend = _in_time(lambda: flexible_differences(fitter, baseline, tried, held_out, jobs), None)
+    if blend is not None:
+        compared.append(Shrinkage("flexible residual", *held_out.closed_by_differences(blend)))
     named = verdict.named is not None
     return Gap(
         definition=DEFINITION,

@@ -10,6 +10,7 @@ from bridge.files import write_whole
 from bridge.pages import filled_page
 from bridge.provenance import provenance
 from diagnosis.report import words
+from diagnosis.report.outcome import BEYOND
 from diagnosis.report.page_plots import draw
 from diagnosis.result import Cell, Diagnosis, Gap, RigNumber
 
@@ -21,8 +22,10 @@ _SMALL_PROBABILITY = 0.015
 _BANNERS: Final = {
     "effect": "An effect was found",
     "partly": "A part is explained",
+    "described": "A described number was wrong",
     "no-gap": "No gap",
     "unexplained": "Unexplained gap",
+    "not-finished": "Not finished",
 }
 
 
@@ -68,7 +71,9 @@ def write_report(diagnosis: Diagnosis, evidence_name: str, path: Path, files: It
 def report_page(diagnosis: Diagnosis, evidence_name: str, footer: str = "") -> str:
     """The report as the text of an HTML file; `footer` is HTML."""
     answer = words.answer(diagnosis)
-    shown = [candidate for candidate in diagnosis.candidates if not candidate.probability < _SMALL_PROBABILITY]
+    shown = [
+        row for row in diagnosis.candidates if row.effect in diagnosis.effects or row.probability >= _SMALL_PROBABILITY
+    ]
     runs, rows, left_out = where_map(diagnosis.where)
     return filled_page(
         Path(__file__).with_name("page.html.j2"),
@@ -79,7 +84,7 @@ def report_page(diagnosis: Diagnosis, evidence_name: str, footer: str = "") -> s
         banner=_BANNERS[diagnosis.verdict],
         answer=answer,
         shown=shown,
-        hidden=[candidate.effect for candidate in diagnosis.candidates if candidate.probability < _SMALL_PROBABILITY],
+        hidden=[row.effect for row in diagnosis.candidates if row.probability < _SMALL_PROBABILITY],
         estimate=words.estimate_in_words,
         meanings=words.EFFECT_WORDS,
         gap_bars=gap_bars(diagnosis.gap, bool(diagnosis.effects)),
@@ -99,8 +104,8 @@ def report_page(diagnosis: Diagnosis, evidence_name: str, footer: str = "") -> s
         closed_between=words.closed_between,
         sizes=words.sizes_in_words,
         remainder=words.remainder_in_words,
-        relation_number=words.number_in_words,
         between=units.interval,
+        beyond=BEYOND,
     )
 
 

@@ -1,44 +1,39 @@
-"""Relations and latent friction in an answer: shares, the remainder, sizes, refitted numbers, a picture."""
+"""Relations and latent friction in an answer: shares, the remainder, sizes, a picture."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from bridge.log.finding import Finding
-from diagnosis.evidence.manifest import RigTable
 from diagnosis.gap.prepare import Prepared
 from diagnosis.latent.answer import LatentSignal
-from diagnosis.latent.components import NOISE, SCATTER
+from diagnosis.latent.causes import SCATTER
 from diagnosis.relations.answer import Answered, Relations
 from diagnosis.relations.decide import Decision
 from diagnosis.report.summary import summary
+from diagnosis.report.words import SLOW, SLOWLY
 from diagnosis.result import (
     Curve,
     Diagnosis,
     LeftOut,
     Picture,
-    RelationNumber,
     RelationRow,
     Remainder,
     Share,
 )
 
 _SIGNALS = {"spring": "spring relation", "motion": "motion relation", "drive": "drive relation"}
-_NUMBER_OF = {"drive-stiffness": "drive_stiffness_N_per_m", "drive-damping": "drive_damping_Ns_per_m"}  # of the rig
 _POINTS = 1500  # most points of a curve
-_TWO_SIDED_90 = 1.645
-_LEAST_SHARE = 0.02  # smallest share of a cause of the friction that is reported
 
 
 def with_relations(
     done: Diagnosis,
-    rig: RigTable,
     runs: list[Prepared],
     relations: Relations,
     decision: Decision,
     latent: Sequence[LatentSignal],
 ) -> Diagnosis:
-    """The diagnosis with shares, remainder, numbers and picture of relations and latent friction, and with its sentences."""
+    """The diagnosis with shares, remainder and picture of relations and latent friction, and with its sentences."""
     answered, missing = relations
     complete = done._replace(
         shares=(*(share for relation in answered for share in _shares(relation)), *latent_shares(latent)),
@@ -46,7 +41,6 @@ def with_relations(
         relations=(*map(_row, answered), *latent_rows(latent)),
         findings=(*done.findings, *_latent_findings(latent)),
         left_out=tuple(LeftOut(signal_of(relation.name), relation.why) for relation in missing),
-        numbers=tuple(number for relation in answered for number in _numbers(relation, rig)),
         pictures=(*_pictures(relations, runs), *done.pictures),
     )
     return complete._replace(summary=summary(complete))
@@ -100,22 +94,6 @@ def _remainder(relations: Relations, decision: Decision) -> Remainder | None:
     return Remainder(share, signal_of(worst.name), "", size, worst.noise, worst.unit)
 
 
-def _numbers(answered: Answered, rig: RigTable) -> list[RelationNumber]:
-    known = rig.values()
-    moved = {name: (size, deviation) for name, size, deviation in answered.nuisances if name in known}
-    chosen = answered.chosen
-    for term, sizes, deviations in zip(chosen.terms, chosen.sizes, chosen.deviations, strict=True):
-        if (name := _NUMBER_OF.get(term.cause)) is not None:
-            size, deviation = moved.get(name, (0.0, 0.0))
-            moved[name] = (size + float(sizes[0]), float(np.hypot(deviation, deviations[0])))
-    numbers: list[RelationNumber] = []
-    for name, (size, deviation) in moved.items():
-        described, half = known[name] or 0.0, _TWO_SIDED_90 * deviation
-        value = described + size
-        numbers.append(RelationNumber(name, signal_of(answered.name), described, value, (value - half, value + half)))
-    return numbers
-
-
 def _pictures(relations: Relations, runs: list[Prepared]) -> list[Picture]:
     """The residual that exceeds its noise most, with and without its causes, over time."""
     if not relations.answered:
@@ -136,10 +114,9 @@ def _pictures(relations: Relations, runs: list[Prepared]) -> list[Picture]:
 def latent_shares(latent: Sequence[LatentSignal]) -> tuple[Share, ...]:
     """The shares of every signal, in the format of the diagnosis."""
     return tuple(
-        Share(signal.signal, share.what, share.share, None if share.what == NOISE else share.interval_90, share.null_90)
+        Share(signal.signal, share.what, share.share, share.interval_90, share.null_90)
         for signal in latent
         for share in signal.shares
-        if share.share > _LEAST_SHARE or share.what in (SCATTER, NOISE)
     )
 
 
@@ -160,7 +137,7 @@ def latent_rows(latent: Sequence[LatentSignal]) -> tuple[RelationRow, ...]:
 
 
 def _latent_remainder(latent: Sequence[LatentSignal]) -> Remainder | None:
-    """The largest scatter that depends on no variable."""
+    """The largest part of a signal that no cause predicts."""
     if not latent:
         return None
     worst = max(latent, key=lambda signal: signal.left)
@@ -169,6 +146,5 @@ def _latent_remainder(latent: Sequence[LatentSignal]) -> Remainder | None:
 
 
 def _latent_findings(latent: Sequence[LatentSignal]) -> tuple[Finding, ...]:
-    """A finding for each signal in which a dependence on position cannot be separated from a dependence on time."""
-    text = "no position is passed twice, so a dependence on position cannot be separated from a dependence on time"
-    return tuple(Finding("one-pass", signal.signal, text) for signal in latent if not signal.revisited)
+    """A finding for each signal that no cause predicts and that varies slowly."""
+    return tuple(Finding(SLOW, signal.signal, SLOWLY) for signal in latent if signal.varies_slowly)

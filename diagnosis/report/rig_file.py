@@ -2,7 +2,7 @@
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from bridge.config import validate
 from bridge.faults import Fault
@@ -16,6 +16,11 @@ from plant.config import RigConfig
 
 _DIGITS = 7
 RIG_BEGINS = "# Written by `stickslip diagnose` "
+NO_RIG: Final = {  # reasons by verdict
+    "unexplained": "nothing explains the gap",
+    "partly": "only a part of the gap is explained",
+    "not-finished": "no cause was tried",
+}
 
 
 def write_rig(diagnosis: Diagnosis, evidence: Evidence, path: Path) -> None:
@@ -25,7 +30,7 @@ def write_rig(diagnosis: Diagnosis, evidence: Evidence, path: Path) -> None:
     """
     refuse_force_drive(evidence)
     name = evidence.folder.name
-    if diagnosis.verdict in ("unexplained", "partly"):
+    if diagnosis.verdict in NO_RIG:
         raise Fault(
             "CONFIG",
             f"{name}: the verdict is {diagnosis.verdict}: no effect to apply; measure the next run that the diagnosis "
@@ -42,7 +47,7 @@ def refuse_force_drive(evidence: Evidence) -> None:
     if evidence.rig.drive == "force":
         raise Fault(
             "CONFIG",
-            f'{name}: rig.drive = "force": a rig file cannot describe it, the stand-in rig pulls through a spring; use the '
+            f'{name}: rig.drive = "force": a rig file cannot describe it, the simulated rig pulls through a spring; use the '
             "parameters in the JSON of the diagnosis",
         )
 
@@ -51,9 +56,11 @@ def rig_table(diagnosis: Diagnosis, evidence: Evidence) -> dict[str, Any]:
     """The corrected rig as the tables of a rig file, named after the evidence's folder."""
     # The two forces are refitted independently and may cross.
     values = evidence.rig.values() | {parameter.name: parameter.retuned for parameter in diagnosis.rig}
+    if diagnosis.verdict == "described":  # these numbers include the level effects
+        values |= {number.name: number.found for number in diagnosis.numbers}
     table: dict[str, Any] = {"name": f"{_word(evidence.folder.name)}-diagnosed", **rig_file_tables(values)}
     effects: dict[str, dict[str, float | str]] = {}
-    for name in diagnosis.effects:
+    for name in diagnosis.effects if diagnosis.verdict != "described" else ():
         candidate = next(candidate for candidate in diagnosis.candidates if candidate.effect == name)
         effects[name] = {"form": candidate.form} if candidate.form else {}
         effects[name] |= as_in_rig_file({key: estimate.value for key, estimate in candidate.parameters.items()})
@@ -62,7 +69,7 @@ def rig_table(diagnosis: Diagnosis, evidence: Evidence) -> dict[str, Any]:
 
 def _comment(diagnosis: Diagnosis, evidence: Evidence) -> str:
     lines = []
-    if diagnosis.effects:
+    if diagnosis.verdict != "no-gap":
         lines.append(f"Verdict: {headline(diagnosis)}.")
     else:
         lines.append("Verdict: no gap: the rig as described, refitted inside its tolerances.")

@@ -7,19 +7,28 @@ from typing import Final
 from bridge.units import decimals_of, fixed_digits, interval, name_and_unit, percent, prefixed, quantity, times
 from diagnosis.hypotheses.catalogue import CATALOGUE
 from diagnosis.latent.answer import LatentSignal
-from diagnosis.latent.components import NOISE, SCATTER
+from diagnosis.latent.causes import NOISE, SCATTER
 from diagnosis.latent.rows import BREAKAWAY, SLIDING
-from diagnosis.result import PARAMETERS, Diagnosis, Estimate, RelationNumber, RelationRow, Remainder, RigNumber, Share
+from diagnosis.result import (
+    PARAMETERS,
+    Diagnosis,
+    Estimate,
+    RelationRow,
+    Remainder,
+    RigNumber,
+    Share,
+    WrongNumber,
+)  # fmt: skip
 from diagnosis.verdict.by_latent import MOST
 from diagnosis.verdict.held_out import FAR_FOR_NO_GAP
 from plant.effects.library import EFFECTS
 
 EFFECT_WORDS: Final = {name: row.words for name, row in CATALOGUE.items()} | {
     "none": "the rig as described, inside its tolerances, is enough",
-    "unexplained": "there is a gap, and nothing in the library closes it",
 }
 _BELOW_0: Final = {("drive-hardening", "ratio"): "a softening"}  # text for negative values, by effect and parameter
-_MOST_IN_SENTENCE = 3  # most causes in a sentence
+# finding of a signal whose course may be one over place or one over time, and its text
+SLOW, SLOWLY = "slow", "varies slowly: these runs cannot separate place from time"
 
 
 def headline(diagnosis: Diagnosis) -> str:
@@ -38,7 +47,7 @@ def answer(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "no-gap":
         if is_undecided(diagnosis):
             return f"the fitted runs show no gap, but the held-out runs are {times(diagnosis.gap.retuned)} noise floors off"
-        return "the rig as described explains these runs"
+        return "the described rig explains these runs within its tolerances"
     most = mostly(diagnosis)
     if diagnosis.verdict == "unexplained":
         if most is not None:
@@ -48,12 +57,24 @@ def answer(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "partly":
         if most is not None:
             return f"{most.what} explains most of the {most.signal}, {names} another part"
-        return f"{names} explains a part of the difference; the rest is not explained"
-    sure = sum(candidate.probability for candidate in diagnosis.candidates if candidate.effect in diagnosis.effects)
-    others = [name for group in diagnosis.not_distinguishable if {*group} & {*diagnosis.effects} for name in group]
-    others = [name for name in dict.fromkeys(others) if name not in diagnosis.effects]
-    alike = f"; or {', '.join(others)}, which would explain these runs nearly as well" if others else ""
-    return f"{names}, probability {percent(sure)}{alike}"
+        return f"{names} explains a part of the difference: {sizes_of_effects(diagnosis)}"
+    if diagnosis.verdict == "described":
+        return "; ".join(map(closing_number_in_words, diagnosis.numbers))
+    if diagnosis.verdict == "not-finished":
+        return "the time ran out before any cause was tried"
+    sure = sum(row.probability for row in diagnosis.candidates if row.effect in diagnosis.effects)
+    return f"{names}, probability {percent(sure)}: {sizes_of_effects(diagnosis)}"
+
+
+def sizes_of_effects(diagnosis: Diagnosis) -> str:
+    """Size and meaning of each named effect."""
+    named = [row for row in diagnosis.candidates if row.effect in diagnosis.effects]
+    return "; ".join(
+        ", ".join(
+            [*(estimate_in_words(row.effect, *item) for item in row.parameters.items()), EFFECT_WORDS[row.effect]]
+        )
+        for row in named
+    )
 
 
 def closed_in_words(share: float) -> str:
@@ -90,31 +111,24 @@ def estimate_in_words(effect: str, name: str, estimate: Estimate) -> str:
 
 
 def relation_lines(diagnosis: Diagnosis) -> list[str]:
-    """Lines of the summary: every relation with its sizes and shares, omitted relations, the largest remainder."""
+    """Every relation with its sizes and the shares beyond chance; omitted relations."""
     lines: list[str] = []
     for row in diagnosis.relations:
         lines.append(sizes_in_words(row))
-        lines += [f"  {share_in_words(share)}" for share in diagnosis.shares if share.signal == row.relation]
-    lines += [f"{omitted.relation}: left out: {omitted.why}" for omitted in diagnosis.left_out]
-    if diagnosis.remainder is not None:
-        lines.append(remainder_in_words(diagnosis.remainder))
-    return lines
+        of_row = [share for share in diagnosis.shares if share.signal == row.relation]
+        lines += [f"  {share_in_words(share)}" for share in of_row if share.null_90 is None or share.beyond_chance]
+    return [*lines, *(f"{omitted.relation}: left out: {omitted.why}" for omitted in diagnosis.left_out)]
 
 
 def number_lines(diagnosis: Diagnosis) -> list[str]:
-    """Every number that a relation or the baseline refits, next to the described number."""
-    lines = [number_in_words(number) for number in diagnosis.numbers]
-    lines += [rig_number_in_words(number) for number in diagnosis.rig if number.described and number.tolerance]
-    return lines
+    """Every refitted number, next to the described number."""
+    return [rig_number_in_words(number) for number in diagnosis.rig if number.described and number.tolerance]
 
 
 def sizes_in_words(row: RelationRow) -> str:
-    """Residuals of a relation for the described rig, the refitted rig and with its causes; and its noise."""
-    described, refitted, left, noise = (
-        _size(size, row.unit) for size in (row.described, row.refitted, row.left, row.noise)
-    )
-    caused = f", {left} with {' and '.join(row.causes)}" if row.causes else ""
-    return f"{row.relation}: {described} as described, {refitted} refitted{caused}; noise {noise}"
+    """Residuals of a relation for the described rig and for the refitted rig; and its noise."""
+    described, refitted, noise = (_size(size, row.unit) for size in (row.described, row.refitted, row.noise))
+    return f"{row.relation}: {described} as described, {refitted} refitted, noise {noise}"
 
 
 def _size(size: float, unit: str) -> str:
@@ -125,18 +139,10 @@ def _size(size: float, unit: str) -> str:
 
 def share_in_words(share: Share) -> str:
     """A share with its interval, and the share that chance alone reaches."""
-    text = f"{share.what} {_percent(share.share)}"
-    if known := _between(share.interval_90):
+    text = f"{share.what} {percent(share.share)}"
+    if known := interval(share.interval_90):
         text += f" (90 %: {known})"
-    return text if share.null_90 is None else f"{text}; chance alone shows up to {_percent(share.null_90)}"
-
-
-def _between(pair: tuple[float, float] | None) -> str:
-    return interval(None if pair is None else (max(pair[0], 0.0), max(pair[1], 0.0)))
-
-
-def _percent(share: float) -> str:
-    return percent(max(share, 0.0))
+    return text if share.null_90 is None else f"{text}; chance alone shows up to {percent(share.null_90)}"
 
 
 def remainder_in_words(remainder: Remainder) -> str:
@@ -148,21 +154,23 @@ def remainder_in_words(remainder: Remainder) -> str:
     return f"{size} remain in the {remainder.where} {how}, where noise is {noise}: nothing in the library"
 
 
-def number_in_words(number: RelationNumber) -> str:
-    """A number of the rig, fitted by a relation."""
-    word, unit = name_and_unit(number.name)
-    low, high = number.interval_90
-    factor, shown = prefixed(max(abs(number.refitted), abs(number.described)), unit)
-    digits = decimals_of((high - low) * factor) if high > low else None
-    inside = f"{fixed_digits(low * factor, digits)} to {fixed_digits(high * factor, digits)}"
-    value = fixed_digits(number.refitted * factor, digits)
-    return f"{word} {value} {shown} (90 %: {inside}) by the {number.relation}, described {quantity(number.described, unit)}"
+def wrong_number_in_words(number: WrongNumber) -> str:
+    """A number that was found, and the described one."""
+    value = estimate_in_words("", number.name, Estimate(number.found, number.interval_90))
+    off = "" if number.off is None else f" ({number.off:.1f} tolerances off)"
+    return f"{value}, described {quantity(number.described, name_and_unit(number.name)[1])}{off}"
 
 
 def rig_number_in_words(number: RigNumber) -> str:
     """A number of the rig in the fits."""
     word, unit = name_and_unit(number.name)
     return f"{word} {quantity(number.retuned, unit)}, described {quantity(number.described, unit)}"
+
+
+def closing_number_in_words(number: WrongNumber) -> str:
+    """A number that was found, the described one, and the share of the gap that it closes."""
+    closes = "" if number.share is None else f", closes {closed_in_words(number.share)} of the gap"
+    return f"{wrong_number_in_words(number)}{closes}"
 
 
 def latent_line(latent: Sequence[LatentSignal]) -> str:
@@ -199,17 +207,3 @@ def latent_answer(diagnosis: Diagnosis) -> str:
         return ""
     why = "it is not certain enough to be named" if top.what in EFFECTS else "the library has no effect for it"
     return f"Largest cause in the {top.signal}: {share_in_words(top)}; {why}."
-
-
-def latent_sentences(diagnosis: Diagnosis, kept: str) -> list[str]:
-    """One sentence per signal: the size of the difference, and the share that each cause explains."""
-    sentences: list[str] = []
-    for row in diagnosis.relations:
-        if row.relation not in (BREAKAWAY, SLIDING):
-            continue
-        shares = [share for share in diagnosis.shares if share.signal == row.relation and share.what in row.causes]
-        largest = sorted((share for share in shares if share.what != NOISE), key=lambda share: -share.share)
-        listed = "; ".join(share_in_words(share) for share in largest[:_MOST_IN_SENTENCE])
-        off = f"The {row.relation}{kept} is off by {quantity(row.refitted, row.unit)} rms"
-        sentences.append(f"{off}: {listed}." if listed else f"{off}; no cause explains it better than chance.")
-    return sentences

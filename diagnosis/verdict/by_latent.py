@@ -3,24 +3,21 @@
 from collections.abc import Sequence
 
 from diagnosis.latent.answer import LatentSignal
-from diagnosis.latent.components import DIRECTION, PLACE, TIME
+from diagnosis.latent.causes import DIRECTION, PLACE, TIME
 from diagnosis.verdict.held_out import FAR_FOR_NO_GAP, HeldOut
 from diagnosis.verdict.judge import Verdict
 from diagnosis.verdict.probabilities import swapped
 
-_KNOWN = (PLACE, DIRECTION, TIME)  # processes that are effects of the library
-# Log likelihood that the rows must lose without a process that is named: by chance 0.3 % of records lose 4, and eight processes
-# are tried.
-_SURE = 4.0
-MOST = 0.5  # share below which it is told and not named: the rest would be the answer
+_KNOWN = (PLACE, DIRECTION, TIME)  # causes that are effects of the library
+MOST = 0.5  # share below which a cause is reported and not named: the rest would be the answer
 
 
 def named_by(latent: Sequence[LatentSignal]) -> tuple[str, ...]:
-    """Effects whose share of a signal is more than half, more than chance shows, and sure; the largest share first."""
+    """Effects that predict more than half of a signal, more than chance does, with a size that is the same in all runs."""
     largest: dict[str, float] = {}
     for signal in latent:
-        for share in signal.shares if signal.judged_on_held_out else ():
-            if share.what in _KNOWN and share.beyond_chance and share.gain > _SURE and share.share > MOST:
+        for share in signal.shares if signal.left < signal.differs else ():
+            if share.what in _KNOWN and share.beyond_chance and share.agrees and share.share > MOST:
                 largest[share.what] = max(share.share, largest.get(share.what, 0.0))
     return tuple(sorted(largest, key=lambda what: -largest[what]))
 

@@ -142,6 +142,11 @@ class HeldOut:
         """The gap under a fit, in floors."""
         return self._gap(self._squares(fit.hypothesis, [(fit.deviations, fit.w)])[0])
 
+    def share_closed(self, before: Fit, after: Fit) -> float | None:
+        """Share of the gap under one fit that another one closes; None where the first leaves no gap."""
+        left = self.left_by(before)
+        return (left - self.left_by(after)) / (left - 1.0) if left - 1.0 >= _SMALLEST_GAP else None
+
     def closed_by_differences(self, z: Floats) -> GapLeft:
         """The same for differences from elsewhere [compared]."""
         in_floors = self._in_floors(self.floor, z)

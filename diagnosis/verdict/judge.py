@@ -9,7 +9,7 @@ most: it wins where the best fit of the library leaves more. Case histories: doc
 
 import math
 from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from diagnosis.fits.expected import MUCH, NEVER_WITHOUT_GAP, hidden_by_noise, mu
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.random_friction import LOAD, TRACK, RandomFriction, Scattered, is_random
 from diagnosis.gap.measure import chi2_of
+from diagnosis.result import Kind
 from diagnosis.verdict.probabilities import MISTAKEN_DOUBTFUL, mistaken_of, softmax, swapped, with_mistakes
 from plant.effects.library import EFFECTS
 
@@ -59,7 +60,7 @@ class RankedFit(NamedTuple):
 class Verdict(NamedTuple):
     """The answer of one judgement over fits."""
 
-    kind: Literal["effect", "partly", "no-gap", "unexplained"]
+    kind: Kind
     named: Fit | None  # None unless `kind` is "effect" or "partly"; None there where no fit has what is named
     probabilities: dict[str, float]  # of every effect, "none" and "unexplained", largest first; they add up to 1
     runner_up: Fit | None
@@ -132,8 +133,10 @@ def judge(
     leaders = best.fit.hypothesis.effects if best is not None and top in best.fit.hypothesis.effects else (top,)
     mistaken = mistaken_of(leaders, best is not None and best.scatters)
     probabilities = with_mistakes(softmax(scores), leaders, mistaken)
-    if best is None or top == "none":
+    if top == "none":
         return Verdict("no-gap", None, probabilities, ranked[0].fit if ranked else None, tuple(ranked), scale)
+    if best is None:  # the time ran out before any effect was fitted
+        return Verdict("unexplained", None, probabilities, None, (), scale)
     # fits whose friction can be predicted: no experiment separates two random paths
     followed = [candidate.fit for candidate in ranked if not is_random(candidate.fit.hypothesis)]
     if top == "unexplained":

@@ -101,8 +101,7 @@ class Contest:
             self._contest_on_floor_of(nearest)
 
     def stop(self) -> None:
-        """End where the time is over: the verdict is that over what was fitted by then."""
-        self.rig.fitter.problem.until_s = math.inf
+        """End where the time is over: the verdict over the fits so far."""
         self.verdict = self._judged()
 
     def check(self) -> None:

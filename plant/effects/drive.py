@@ -113,7 +113,7 @@ def _set_ripple(p: Any, form: str, value: dict[str, float]) -> None:
 _SPRING = ("spring",)
 _DAMPING = Parameter("damping_Ns_per_m", 0.0, 1e6, 10.0)
 _UNEVEN = ratio(0.05, 0.0, MOST_UNEVEN)
-_PITCH = Parameter("wavelength_m", 1e-5, 1.0, 1e-3)
+_PITCH = Parameter("wavelength_m", 1e-8, 1e3, 1e-3)
 DRIVE: Final = {
     "drive-damping": Effect(
         "drive",
@@ -138,7 +138,7 @@ DRIVE: Final = {
         {
             "cubic": Formula(
                 "k_d e (1 + ratio (e / 1 mm)^2); a softening spring yields at its largest force",
-                (ratio(0.05, -0.2, 10.0),),
+                (ratio(0.05, -0.2, 1e6),),
             ),
             "bilinear": Formula(
                 "k_d e, beyond |e| = knee_m with the stiffness k_d (1 + ratio)",

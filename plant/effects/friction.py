@@ -60,7 +60,7 @@ def _set_direction(p: Any, form: str, value: dict[str, float]) -> None:
         p.backward_ratio = -0.5 * value["ratio"] if form == "both" else value["ratio"]
 
 
-_PLACES = Parameter("wavelength_m", 1e-5, 1.0, 4e-3)
+_PLACES = Parameter("wavelength_m", 1e-8, 1e3, 4e-3)
 _TIMES = Parameter("frequency_Hz", 1e-3, 1e3, 3.0)
 _SEED = Parameter("seed", 0, 1e6, 0)
 _SWING = ratio(0.03, 0.0, 0.9)
@@ -85,7 +85,7 @@ FRICTION: Final = {
                 "as wave without its harmonic, plus other_share sin(2 pi x / other_wavelength_m + other_phase)",
                 (
                     *(_SWING, _PLACES, WAVE_SHAPE[0]),
-                    *(Parameter("other_share", 0.0, 3.0, 0.5), Parameter("other_wavelength_m", 1e-5, 1.0, 1e-3)),
+                    *(Parameter("other_share", 0.0, 3.0, 0.5), Parameter("other_wavelength_m", 1e-8, 1e3, 1e-3)),
                     Parameter("other_phase_rad", -TURN_RAD, TURN_RAD, 0.0),
                 ),
             ),

@@ -12,21 +12,21 @@ from bridge.wire.topics import FAULT
 from plant.faults.kinds import BUS, KINDS, LARGEST, PROCESS, SENSORS, TARGETS, group_of
 
 _LONGEST = 10_000  # longest table of an operator's request [bytes]; every valid table has fewer than 500
-_LONGEST_S = 1e9  # 30 years; a far longer time overflows the count of blocks
+_Time = Annotated[float, Field(ge=0, le=1e9)]  # 30 years; a far longer time overflows the count of blocks
 
 
 class FaultTable(Strict):
     """A fault injected into a run. The rig must be simulated."""
 
     name: str = Field(
-        "", pattern=r"^[^\x00-\x1f\x7f]*$", description="Name in events and verdicts; not given: TARGET KIND."
+        default="", pattern=r"^[^\x00-\x1f\x7f]*$", description="Name in events and verdicts; not given: TARGET KIND."
     )
     kind: str = Field(description="Kind of the fault: `stickslip fault --list` lists all kinds.")
     target: str = Field(description="A channel, sensors, exciter, clock, blocks, commands, link, or a process.")
-    from_s: Annotated[float, Field(ge=0, le=_LONGEST_S)] = Field(0.0, description="Time of the run at which it begins.")
-    for_s: Annotated[float, Field(ge=0, le=_LONGEST_S)] = Field(0.0, description="Duration; 0: to the end.")
-    value: float | None = Field(None, description="Size of the fault; its meaning depends on the kind.")
-    other: str = Field("", description="For `swapped`: the other channel.")
+    from_s: _Time = Field(default=0.0, description="Time of the run at which it begins.")
+    for_s: _Time = Field(default=0.0, description="Duration; 0: to the end.")
+    value: float | None = Field(default=None, description="Size of the fault; its meaning depends on the kind.")
+    other: str = Field(default="", description="For `swapped`: the other channel.")
 
     @model_validator(mode="after")
     def _is_a_fault(self) -> "FaultTable":

@@ -13,7 +13,7 @@ import joblib
 import numpy as np
 
 from bench.blind.oracle import shrinkage_with
-from bench.blind.outcomes import Opened
+from bench.blind.outcomes import Opened, opened
 from bench.blind.scoring import score
 from bench.blind.table import TOOL, table
 from bridge.results import strict_json, write_json
@@ -39,7 +39,7 @@ def done(out: Path, kind: str, number: int, seed: int, tool: str) -> tuple[Opene
         random = np.random.default_rng([seed, number, *kind.encode()])
         kept = {"tool": tool, **_one(kind, random, ask_oracle=kind not in {NONE, TWO} and number % ORACLE_EVERY == 0)}
         write_json(path, kept)
-    return Opened(path.stem, kept["answer"], kept["said"]), kept["oracle"]
+    return opened(path.stem, kept["answer"], kept["said"]), kept["oracle"]
 
 
 def _one(kind: str, random: np.random.Generator, ask_oracle: bool) -> dict[str, Any]:

@@ -60,7 +60,9 @@ if __name__ == "__main__":
             outcome = "named" if truth in diagnosis.effects else "in group" if truth in group else "wrong"
             sizes[missing].append(len(group))
         counts[missing][outcome] += 1
-        counts[missing]["sure and wrong"] += outcome == "wrong" and diagnosis.candidates[0].probability > SURE
+        counts[missing]["sure and wrong"] += (
+            outcome == "wrong" and diagnosis.complete * diagnosis.candidates[0].probability > SURE
+        )
         print(f"{number:4d}  {missing:28s} {truth:28s} {outcome:12s} {' or '.join(sorted(group))}", flush=True)
     for missing, own in counts.items():
         size = float(np.mean(sizes[missing] or [0]))

@@ -68,7 +68,7 @@ def test_it_is_judged_checked_exported_and_evidence(tmp_path):
     assert check_log(LOG).findings == []
     export(LOG, tmp_path / "run.csv", list(HELD))
     assert {path.name for path in tmp_path.iterdir()} == {f"run.{topic}.csv" for topic in HELD}
-    columns, findings = columns_of_log(LOG)
+    columns, findings, _ = columns_of_log(LOG)
     assert findings == []
     assert columns["drive_force_N"].max() == pytest.approx(17.4354553)
 

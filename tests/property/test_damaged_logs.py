@@ -4,6 +4,7 @@ import contextlib
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from bridge.log.recover import recover
 from bridge.log.runlog import RunLog
 from bridge.tables.export import export
 from bridge.wire.complaints import Complaints
+from bridge.wire.inbox import Inbox
 from bridge.wire.messages import sensor_block
 from bridge.wire.topics import CONTROLLER_EVENT, PLANT_EVENT, SENSORS, SNAPSHOT, Topic
 from bridge.wire.zenoh_link import Received
@@ -274,6 +276,18 @@ def test_a_rig_that_leaves_before_its_first_word_ends_the_record(tmp_path: Path)
     log = RunLog(tmp_path / "run.mcap", lockstep=False)
     bus: Any = Left()
     inbox: Any = Quiet()
+    complaints = Complaints(log.add_event)
+    assert recorder._record(log, bus, inbox, threading.Event(), None, complaints) is True
+    log.close()
+    assert [event.code for event in read_run(log.path).events] == ["PLANT_LOST"]
+
+
+def test_a_rig_that_leaves_before_a_busy_recorder_looks_for_it_ends_the_record(tmp_path: Path) -> None:
+    """Its END was lost as well: four rigs on two cores did that, and the recorder waited for ever."""
+    log = RunLog(tmp_path / "run.mcap", lockstep=False)
+    inbox = Inbox(10)
+    inbox.push(Received(SENSORS, block(0), 0))
+    bus: Any = SimpleNamespace(alive=lambda _role: False, linked=lambda: False)
     complaints = Complaints(log.add_event)
     assert recorder._record(log, bus, inbox, threading.Event(), None, complaints) is True
     log.close()

@@ -55,7 +55,7 @@ def of_latent(evidence: Evidence) -> list[str]:
     """Latent friction: the variation on the held-out runs, and its shares."""
     rows: list[str] = []
     for signal in latent_of(evidence.rig, prepare(evidence)):
-        once = "" if signal.revisited else "; each place once"
+        once = "; varies slowly" if signal.varies_slowly else ""
         rows.append(
             f"{signal.signal}: {signal.differs:.3g} N differ in {signal.rows} rows, noise {signal.noise:.2g}{once}"
         )

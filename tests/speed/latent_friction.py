@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from diagnosis.latent.answer import LatentSignal, signal_of
-from diagnosis.latent.components import DIRECTION, FORCE_PLACE, LOAD, PLACE, SPEED, TIME
+from diagnosis.latent.causes import DIRECTION, FORCE_PLACE, LOAD, PLACE, SPEED, TIME
 from diagnosis.latent.rows import BREAKAWAY, SLIDING, ExcessRows
 from diagnosis.processes import one_thread
 from diagnosis.verdict.by_latent import named_by
@@ -82,10 +82,12 @@ def _unit(values: Floats) -> Floats:
 
 
 def true_share(record: Made, what: str) -> float:
-    """The part of the sum of squares of the held-out rows that a process takes."""
-    own = record.rows.held_out
-    about = record.rows.excess_N[own] - record.rows.excess_N[own].mean()
-    return float(about @ record.courses[what][own]) / float(about @ about)
+    """The share on the held-out rows of a prediction that is the true course of every process."""
+    held = record.rows.held_out
+    courses = {name: (course - course[~held].mean())[held] for name, course in record.courses.items()}
+    y = np.sum(list(courses.values()), axis=0)
+    whole = y - courses["scatter"]
+    return float(courses[what] @ (2.0 * y - whole)) / float(y @ y)
 
 
 def by_bins(rows: ExcessRows, what: str) -> float:
@@ -118,7 +120,7 @@ def _share(found: LatentSignal, what: str) -> tuple[float, tuple[float, float], 
     if not own:
         return 0.0, (0.0, 0.0), False
     one = own[0]
-    return one.share, one.interval_90, one.null_90 is not None and one.share > one.null_90 and one.gain > 4.0
+    return one.share, one.interval_90 or (0.0, 0.0), one.beyond_chance and one.agrees
 
 
 def main(seed: int, records: int) -> None:

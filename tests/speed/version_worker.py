@@ -19,6 +19,7 @@ _PLACES = {
         "log": "bridge.logfile",
         "replay": "cockpit.replaying",
         "messages": "bridge.messages",
+        "speed": "tests.bench",
     },
     "new": {
         "run": "cockpit.run.in_process",
@@ -26,6 +27,7 @@ _PLACES = {
         "log": "bridge.log.logfile",
         "replay": "cockpit.run.replay",
         "messages": "bridge.wire.messages",
+        "speed": "tests.speed",
     },
 }
 _STEP_S = 1e-5
@@ -57,15 +59,16 @@ class Worker:
     """Functions of a version and their data."""
 
     def __init__(self, version: str, folder: Path) -> None:
-        modules = {name: importlib.import_module(place) for name, place in _PLACES[version].items()}
+        places = _PLACES[version]
+        modules = {name: importlib.import_module(place) for name, place in places.items()}
         self._run_onboard: Any = modules["run"].run_onboard
         self._load_scenario: Any = modules["scenario"].load_scenario
         self._read_run: Any = modules["log"].read_run
         self._changes_of: Any = modules["replay"].changes_of
         self._replay: Any = importlib.import_module("controller.replay").replay
-        self._ours: Any = importlib.import_module("tests.speed.solvers").ours
-        case: Any = importlib.import_module("tests.speed.case")
-        self._messages = _PLACES[version]["messages"]
+        self._ours: Any = importlib.import_module(f"{places['speed']}.solvers").ours
+        case: Any = importlib.import_module(f"{places['speed']}.case")
+        self._messages = places["messages"]
         self._still = case.unvibrated()
         self._shaken = case.vibrated(self._still)
         self._log = folder / f"{version}.mcap"

@@ -90,7 +90,7 @@ def test_the_documented_zenoh_configurations_match_the_code() -> None:
 def test_readme_is_a_landing_page() -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     assert len(text.splitlines()) <= 66
-    assert len(text.split()) <= 700
+    assert len(text.split()) <= 780
 
 
 def test_readme_shows_the_output_of_its_commands() -> None:
@@ -98,7 +98,7 @@ def test_readme_shows_the_output_of_its_commands() -> None:
     kept = readme.KEPT.read_text(encoding="utf-8")
     assert re.findall(r"^\$ (.*)$", kept, re.MULTILINE) == readme.commands(text)
     assert f"\n\n{readme.block(kept)}\n\n" in text, "make readme"
-    (number,) = re.findall(r"^candidates .* (damping .*)$", kept, re.MULTILINE)
+    (number,) = re.findall(r"^effect: .*: (damping .*?\))", kept, re.MULTILINE)
     assert number in (ROOT / "docs/start/first-diagnosis.md").read_text(encoding="utf-8")
 
 

@@ -18,7 +18,7 @@ from bridge.kernel_cache import compile_once
 PARTS = ("drawn", "never", "disturbed", "restick", "trials")
 # bars of a run, by figure: slips and surges that count, shares of the time of motion, time above 1.5 set points, trials
 _BARS = {"wrong": 0.0, "above_2_v_d_share": 0.02, "excited_share": 0.05, "above_s": 0.2, "false": 0.0}
-_BARS |= {"in_trials_per_600_s": 1.0}
+_BARS["in_trials_per_600_s"] = 1.0
 
 
 class Case(NamedTuple):

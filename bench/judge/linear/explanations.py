@@ -12,7 +12,6 @@ from diagnosis.fits.batch import Work, together
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.fits.refits import Start, best_of_each, refits
-from diagnosis.fits.restarts import alone
 from diagnosis.fits.screening import Screened, Screening, beside, of_changes
 from diagnosis.hypotheses.hypothesis import NOTHING
 from diagnosis.hypotheses.starts import Trial
@@ -68,16 +67,11 @@ def nothing_again(rig: Rig, singles: Sequence[Fit]) -> Fit:
 
 
 def pairs_of(rig: Rig, moved: Moved, pairs: Sequence[Screened], best: Fit, shown: Names) -> list[Fit]:
-    """The best single effect with the effects that relations show and trials promise on top of it, and the promised pairs.
-
-    The best single effect follows, refitted from its numbers in the best pair, so that it has as many starts as the pair.
-    """
+    """The best single effect with the effects that relations show and trials promise on top of it, and the promised pairs."""
     promised = best_of_each(moved.promised(rig.fitter, best).singles)
     others = [start for start in promised if set(start.hypothesis.effects) & (shown - set(best.effects))]
     starts = best_of_each([*others, *promised[:_SECOND], *pairs[:_PAIRS]])
-    fits = _refitted(rig.fitter, starts, _FULL_PAIRS)
-    single = [start for start in alone(fits) if start[0].effects == best.effects]
-    return [*fits, *refits(rig.fitter, single, 1)]
+    return _refitted(rig.fitter, starts, _FULL_PAIRS)
 
 
 def _refitted(fitter: Fitter, starts: Sequence[Screened], full: int) -> list[Fit]:

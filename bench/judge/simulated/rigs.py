@@ -132,5 +132,5 @@ def _measured(random: np.random.Generator, campaign: Campaign, rig: DrawnRig, ta
         speed_mps = plan.velocity[0][1] if len(plan.velocity) == 1 else None
         of_run = RunTable(file=f"run-{number + 1:02d}.parquet", drive_velocity_mps=speed_mps, holdout=plan.holdout)
         kept = {name: values.astype(np.float64) for name, values in columns.items() if name not in campaign.leave_out}
-        runs.append(examine(kept, table, of_run)[0])
+        runs.append(examine({**kept}, table, of_run)[0])  # a copy of the wider type of `examine`
     return runs

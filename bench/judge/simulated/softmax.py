@@ -60,7 +60,7 @@ def trained(tables: Floats, wholes: Floats, targets: Floats, counts: Floats) -> 
 
     def loss(flat: Floats) -> tuple[float, Floats]:
         scores = _scores(weights_of(flat), tables, wholes)
-        logarithms = scores - logsumexp(scores, axis=1, keepdims=True)
+        logarithms = scores - np.asarray(logsumexp(scores, axis=1, keepdims=True))
         wrong = (np.exp(logarithms) - targets) * shares
         shared = np.einsum("ne,nek->k", wrong[:, :-2], tables)
         slope = np.concatenate([shared, (wrong[:, -2:].T @ wholes).ravel(), wrong[:, -2:].sum(axis=0)])

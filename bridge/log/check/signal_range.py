@@ -141,14 +141,14 @@ class CheckedSignal:
         value, length, step_in = self._last
         # a position rests before it moves, so its first run is not clipping; a unipolar sensor at rest clips its noise at 0: the
         # end of its scale, but no signal is lost
-        clipped = [
+        clipped_high, clipped_low = (
             side.clipped((last, length, step_in), self._resolution, limit, begins=not self._dwells)
             if high > low and end
             else 0
             for side, last, end in zip(self._sides, (value, -value), (high, low), strict=True)
-        ]
+        )
         return SignalLook(
-            *(self._samples, low, high, self._not_finite, self._first_not_finite, *clipped),
+            *(self._samples, low, high, self._not_finite, self._first_not_finite, clipped_high, clipped_low),
             *(self._longest_run, self._longest_run_end, self._sides[0].at_extreme, self._sides[1].at_extreme),
         )
 

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from bridge.arrays import Indices
 
 
-def steps(values: Indices, before: int) -> Indices:
+def steps(values: npt.NDArray[np.integer[Any]], before: int) -> Indices:
     """Differences of values, the first from `before`; `numpy.diff` with `prepend` takes far longer for a short piece."""
     differences = np.empty(len(values), np.int64)
     differences[:1] = values[:1] - before

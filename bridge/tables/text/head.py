@@ -120,9 +120,10 @@ def _names_above(lines: Sequence[str], first: int, form: TextLayout, width: int,
         unit_rows = [at for at in units if is_unit_row(_named(lines[at], form, width)) and given.units_row is not False]
         return given.skip_rows, unit_rows[0] if unit_rows else -1
     fitting: list[int] = []
+    spaced = not "".join(lines[first + 1 : first + 2]).strip()  # a blank line after each, as where lines end in \r\r\n
     for at in range(first - 1, max(first - 1 - _MOST_ABOVE, -1), -1):
         if not lines[at].strip():
-            if fitting:
+            if fitting and not spaced:
                 break
             continue
         cells = _named(lines[at], form, width)

@@ -195,10 +195,10 @@ TOML = (
     Format("import-map", "A channel map: `stickslip log import --map FILE.toml`.", _import_map),
 )
 JSON = (
-    Format("diagnosis-2", "`stickslip diagnose FOLDER --json`, diagnosis/2.", "diagnosis.result:Diagnosis"),
+    Format("diagnosis-3", "`stickslip diagnose FOLDER --json`, diagnosis/3.", "diagnosis.result:Diagnosis"),
     Format(
-        "diagnoses-2",
-        "`stickslip diagnose --json` of several folders, diagnoses/2.",
+        "diagnoses-3",
+        "`stickslip diagnose --json` of several folders, diagnoses/3.",
         "cockpit.commands.diagnose_output:Diagnoses",
     ),
     Format(

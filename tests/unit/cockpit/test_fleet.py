@@ -57,7 +57,7 @@ def test_a_kept_result_is_read_back_and_a_partial_result_is_not(tmp_path):
         "",
         "[]",
         whole.replace("fleet-result/1", "fleet-result/0"),
-        whole.replace("0.93", '"x"'),
+        whole.replace("0.95,", '"x",', 1),
     ):
         place.write_text(broken)
         assert kept(tmp_path, "d") is None
@@ -142,6 +142,23 @@ def test_where_mending_helps_most_comes_first():
         ("", ["fine"]),
     ]
     assert [round(group.helps, 6) for group in fleet.groups] == [1.3, 1.0, 0.73, 0.0, 0.0, 0.0]
+
+
+def test_wrong_numbers_are_a_shared_cause_and_what_was_not_finished_is_none():
+    described = TOLD._replace(verdict="described", effects=("drive-stiffness",))
+    mass = TOLD.numbers[0]._replace(name="mass_kg", share=0.7)
+    done = [
+        ("a", described, ""),
+        ("b", described._replace(effects=(), numbers=(mass,)), ""),
+        ("c", TOLD._replace(verdict="not-finished", effects=()), ""),
+    ]
+    groups = fleet_of(done, [], []).groups
+    assert [(group.kind, group.what, group.helps) for group in groups] == [
+        ("named", "mass", 0.7),
+        ("named", "drive-stiffness", 0.43),
+        ("not-finished", "", 0.0),
+    ]
+    assert groups[1].rigs[0].size.endswith("described 11.7 kN/m (2.9 tolerances off), closes 43 % of the gap")
 
 
 def test_without_a_fit_the_relations_give_the_share():

@@ -124,13 +124,13 @@ def test_a_diagnosis_fits_and_one_more_key_does_not(tmp_path: Path) -> None:
     source = many.find_sources([folder])[0]
     diagnosis = made_up.diagnosis()
     table = strict_json(diagnosis)
-    check("diagnosis-2", table)
-    assert not fits("diagnosis-2", table | {"more": 1})
+    check("diagnosis-3", table)
+    assert not fits("diagnosis-3", table | {"more": 1})
     outcomes = [
         many.FolderResult(source, diagnosis, None),
         many.FolderResult(source, None, many.FolderFault("BAD_EVIDENCE", "why")),
     ]
-    check("diagnoses-2", diagnose_output.Diagnoses(outcomes))
+    check("diagnoses-3", diagnose_output.Diagnoses(outcomes))
 
 
 @pytest.mark.parametrize(
@@ -211,7 +211,7 @@ def test_without_a_name_they_are_listed_and_with_a_folder_written(tmp_path: Path
 
 
 def test_a_format_goes_by_the_name_in_its_files_too() -> None:
-    assert call("schema", "diagnosis/2").stdout == call("schema", "diagnosis-2").stdout
+    assert call("schema", "diagnosis/3").stdout == call("schema", "diagnosis-3").stdout
     result = call("schema", "rigs")
     assert result.exit_code == 2
     assert "rigs: no such schema; known: rig, scenario" in result.stderr

@@ -223,7 +223,7 @@ def test_a_run_is_taken_up_again(made):
     assert sorted(path.stem for path in results.iterdir()) == names
     assert json.loads((results / f"{names[0]}.json").read_text()) == mine
     result = json.loads((results / f"{names[1]}.json").read_text())
-    assert (result["format"], result["tool"]) == ("diagnosis/2", mine["tool"])
+    assert (result["format"], result["tool"]) == ("diagnosis/3", mine["tool"])
     (results / f"{names[0]}.json").write_text(json.dumps(mine | {"tool": "0.9+of-yesterday"}))
     (results / f"{names[1]}.json").unlink()
     refused = blind("run", made / "set", "--jobs", 1)

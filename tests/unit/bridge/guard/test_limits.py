@@ -6,7 +6,7 @@ import pytest
 
 from bridge.guard.config import GuardConfig, HeatConfig, Level
 from bridge.guard.estimates import expect_drive
-from bridge.guard.limits import exciter_gain, passes, watch
+from bridge.guard.limits import exciter_gain, nearest_allowed_Hz, passes, watch
 from bridge.guard.records import FIRST
 from bridge.guard.states import ARM, apply_order
 from bridge.wire.stickslip_pb2 import (
@@ -213,6 +213,16 @@ def test_the_edges_of_the_bands_are_allowed(frequency_Hz: float) -> None:
     rig = Rig(GuardConfig(forbidden_Hz=[(4600.0, 4800.0)], loud_ratio=FREE))
     rig.run(300, frequency_Hz)
     assert (rig.s.state, rig.s.limit) == (ACTIVE, NO_CAUSE)
+
+
+@pytest.mark.parametrize(
+    ("asked_Hz", "nearest_Hz"),
+    [(100.0, 500.0), (3060.0, 3201.0), (3150.0, 3201.0), (4000.0, 4000.0), (4950.0, 4899.0), (9000.0, 4899.0)],
+)
+def test_a_frequency_moves_to_the_nearest_allowed_one(asked_Hz: float, nearest_Hz: float) -> None:
+    """Upwards out of bands that overlap, downwards out of a band at the end of the range."""
+    rig = Rig(GuardConfig(forbidden_Hz=[(3000.0, 3100.0), (3050.0, 3200.0), (4900.0, 5000.0)]))
+    assert nearest_allowed_Hz(rig.p, asked_Hz) == nearest_Hz
 
 
 @pytest.mark.slow

@@ -51,6 +51,14 @@ def test_a_stop_reaches_the_rig_at_its_port_of_this_computer(endpoint: str, rigs
     assert [rig for rig in ("lathe", "mill") if StopLatch(rig).is_set] == rigs
 
 
+def test_a_rig_that_does_not_confirm_is_waited_for_and_not_counted() -> None:
+    started("lathe")
+    stops = order(HERE, "Ada")
+    assert stops
+    assert not confirmed(stops, 0.05)
+    assert not confirmed([], 0.05)
+
+
 def test_a_name_server_that_does_not_answer_does_not_delay_a_stop(monkeypatch: pytest.MonkeyPatch) -> None:
     started("lathe")
     monkeypatch.setattr(stop_file, "_NAME_S", 0.01)

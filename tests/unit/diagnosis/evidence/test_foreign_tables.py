@@ -1,6 +1,7 @@
 """Tables of other programs come in as they are, with a map that names the columns and nothing else."""
 
 import gzip
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from bridge.faults import Fault
 from bridge.tables.kinds import kind_of
 from bridge.tables.unit_words import known_unit, unit_in_name
+from diagnosis.evidence.folder import read_columns
 from diagnosis.evidence.import_table import import_file
 from tests.unit.diagnosis.evidence.foreign_tables import FORCE, KINDS, POSITION, Kind, T, write
 
@@ -55,6 +57,27 @@ def test_a_foreign_table_comes_in(tmp_path: Path, kind: Kind) -> None:
         late = 0.05 if kind.file == "start-offset.tdms" else 0.0
         assert table["drive_position_m"].to_numpy() == pytest.approx(POSITION[kind.rows] - 1e-3 * late, abs=2e-8)
     assert kind.says in " ".join(finding.text for finding in done.findings)
+
+
+@pytest.mark.parametrize("separator", [",", "\t"])
+@pytest.mark.parametrize("with_units", [False, True])
+@pytest.mark.parametrize(
+    "ends",
+    [("\n",), ("\r",), ("\r\n",), ("\r\r\n",), ("\n\r",), ("\n\n",), ("\n", "\r\n", "\r"), ("\r",) * 3 + ("\n",) * 300],
+)
+def test_lines_may_end_in_any_way(tmp_path: Path, ends: tuple[str, ...], with_units: bool, separator: str) -> None:
+    cells = [
+        ["t_s", "drive_force_N"],
+        *([["s", "N"]] if with_units else []),
+        *([f"{t:.6f}", f"{f:.5f}"] for t, f in zip(T, FORCE, strict=True)),
+    ]
+    lines = [separator.join(row) for row in cells]
+    text = "".join(line + end for line, end in zip(lines, cycle(ends), strict=False))
+    (tmp_path / "a.csv").write_bytes(text.encode())
+    columns, findings = read_columns(tmp_path / "a.csv", {})
+    assert columns["t_s"] == pytest.approx(T, abs=1e-6)
+    assert columns["drive_force_N"] == pytest.approx(FORCE, abs=1e-5)
+    assert {finding.kind for finding in findings} <= {"assumed"}
 
 
 def test_a_unit_of_another_quantity_is_refused(tmp_path: Path) -> None:

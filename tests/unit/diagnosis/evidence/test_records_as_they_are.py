@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bridge.faults import Fault
+from diagnosis.evidence.assumed import with_assumed
 from diagnosis.evidence.folder import load_evidence
 from diagnosis.features.segments import never_constant
 from tests.evidence_folder import MANIFEST, Columns, columns, folder
@@ -121,6 +122,24 @@ def test_unknown_numbers_get_a_wide_tolerance_and_are_reported(tmp_path: Path) -
     reported = {finding.where: finding.text for finding in evidence.findings if finding.kind == "assumed"}
     assert "as the runs show it" in reported["manifest.toml: rig.mass_kg"]
     assert "decides nothing" in reported["manifest.toml: rig.stribeck_velocity_mps"]
+
+
+def test_unknown_numbers_of_a_rotary_rig_are_in_proportion_to_its_spring() -> None:
+    """The paper's rig at a radius of 1 m and of 10 mm; one radius was assumed for both, and its contact was refused."""
+    known = {
+        "drive": "torsion",
+        "mass_kg": 1.5,
+        "drive_stiffness_N_per_m": 11700.0,
+        "static_force_N": 17.38,
+        "coulomb_force_N": 14.49,
+    }
+    powers = {"mass_kg": 2, "drive_stiffness_N_per_m": 2, "static_force_N": 1, "coulomb_force_N": 1}
+    small = {name: value * 0.01 ** powers[name] if name in powers else value for name, value in known.items()}
+    for table, radius_m in ((known, 1.0), (small, 0.01)):
+        filled, _ = with_assumed(table)
+        with_radius, _ = with_assumed(table | {"radius_m": radius_m})
+        for name in ("contact_stiffness_N_per_m", "stribeck_velocity_mps"):
+            assert filled[name] == pytest.approx(with_radius[name], rel=0.02)
 
 
 @pytest.mark.parametrize(("way", "expected"), [("sine", True), ("even", False), ("speeds", False)])

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from diagnosis.features.feature import BOW
 from diagnosis.fits.retuning import retuned_rig
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.nuisances import Nuisances
@@ -35,11 +36,13 @@ def test_a_bent_displacement_sensor_causes_no_gap(evidence_and_runs, straight):
         drive_m = run.signals["drive_position_m"]
         return run._replace(signals=run.signals | {"drive_position_m": drive_m * (1.0 + 0.008 - 0.4 * drive_m)})
 
-    bent_rig = retuned_rig(evidence, Problem(evidence.rig, [bent(run) for run in runs]), untold)
+    problem = Problem(evidence.rig, [bent(run) for run in runs])
+    bent_rig = retuned_rig(evidence, problem, untold)
     slope, bow = (bent_rig.fitter.nuisances.names.index(name) for name in ("drive_slope", "drive_bow_per_m"))
     change = bent_rig.fit.deviations - straight.fit.deviations
     at_m = float(np.mean([run.signals["drive_position_m"].mean() for run in runs]))
-    assert change[slope] * 0.006 + 2.0 * change[bow] * 0.2 * at_m == pytest.approx(0.008 - 0.8 * at_m, abs=0.002)
+    bow_per_m = 2.0 * change[bow] * BOW / problem.travel_m
+    assert change[slope] * 0.006 + bow_per_m * at_m == pytest.approx(0.008 - 0.8 * at_m, abs=0.002)
     assert bent_rig.fit.chi2 < straight.fit.chi2 + 30.0
 
 

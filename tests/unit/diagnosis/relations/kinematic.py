@@ -73,3 +73,34 @@ def _run(number: int, holdout: bool, cause: Callable[[int, Signals], None] | Non
     return Prepared(
         f"run-{number + 1:02d}.csv", holdout, signals, commands, Start(10.0, 0.01), (), 8.0 * number, noise, {}
     )
+
+
+def in_units(rig: RigTable, runs: list[Prepared], lengths: float, forces: float) -> tuple[RigTable, list[Prepared]]:
+    """The same rig and runs with every length and every force multiplied: a rotary record is one in rad and N m."""
+    powers = {"coulomb_force_N": (1, 0), "static_force_N": (1, 0), "stribeck_velocity_mps": (0, 1)}
+    numbers = {
+        name: value * forces ** powers.get(name, (1, -1))[0] * lengths ** powers.get(name, (1, -1))[1]
+        for name, value in rig.values().items()
+        if value is not None
+    }
+    return rig.model_copy(update=numbers), [_in_units(run, lengths, forces) for run in runs]
+
+
+def _in_units(run: Prepared, lengths: float, forces: float) -> Prepared:
+    commands = run.commands
+    segments = tuple(
+        segment._replace(
+            drive_velocity_mps=segment.drive_velocity_mps * lengths, amplitude_m=segment.amplitude_m * lengths
+        )
+        for segment in commands.segments
+    )
+    return run._replace(
+        signals={name: values * (forces if name.endswith("_N") else lengths) for name, values in run.signals.items()},
+        commands=commands._replace(
+            drive=commands.drive * lengths, amplitude_m=commands.amplitude_m * lengths, segments=segments
+        ),
+        noise=run.noise._replace(
+            shake_mps2={name: value * lengths for name, value in run.noise.shake_mps2.items()},
+            slow_force_N=run.noise.slow_force_N * forces,
+        ),
+    )

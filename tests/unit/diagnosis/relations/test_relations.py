@@ -5,7 +5,7 @@ import pytest
 
 from diagnosis.relations.answer import Relations, relations_of
 from diagnosis.relations.decide import Decision, decision_of, ruled_out
-from tests.unit.diagnosis.relations.kinematic import BLOCK_S, STIFFNESS_N_PER_M, Signals, rig, runs
+from tests.unit.diagnosis.relations.kinematic import BLOCK_S, STIFFNESS_N_PER_M, Signals, in_units, rig, runs
 
 pytestmark = pytest.mark.slow
 T_S = (np.arange(8000) + 0.5) * BLOCK_S
@@ -76,6 +76,20 @@ def test_a_cause_is_named_by_its_relation_alone(cause, name: str, relation: str)
     assert share.null_90 < share.interval_90[0] <= share.share <= share.interval_90[1] <= 1.0
 
 
+@pytest.mark.parametrize("cause", [None, hardens, is_uneven])
+def test_no_answer_depends_on_the_units_of_a_record(cause):
+    """A rotary record has 75 rad of travel in place of 16 mm, and 0.6 N m in place of 17 N."""
+    _, decision = answer(cause)
+    turning, in_rad = in_units(rig(), runs(cause), 75.0 / 0.016, 0.035)
+    turned = decision_of(relations_of(turning, in_rad), turning)
+    assert [(item.cause, item.relation, item.alike) for item in turned.decided] == [
+        (item.cause, item.relation, item.alike) for item in decision.decided
+    ]
+    assert turned.outside == decision.outside == ()
+    for one, other in zip(turned.decided, decision.decided, strict=True):
+        assert one.evidence == pytest.approx(other.evidence, rel=1e-3)
+
+
 def test_effects_that_their_relation_does_not_show_are_ruled_out():
     without = ruled_out(*answer())
     assert {"drive-hardening", "force-sensor-drift", "drive-speed-ripple"} <= without
@@ -144,6 +158,33 @@ def test_an_unevenness_too_small_to_pull_is_not_named_however_well_it_shows():
 
     relations, decision = answer(by_nanometres)
     assert relations.answered[2].chosen.evidence > 50.0
+    assert decision == Decision((), ())
+
+
+def test_a_wave_of_a_pitch_that_only_a_short_way_shows_is_found_exactly():
+    def is_finely_uneven(_: int, signals: Signals) -> None:
+        wave_m = 1e-6 * np.sin(2.0 * np.pi * signals["drive_position_m"] / 8.7e-5)
+        signals["drive_position_m"] += wave_m
+        signals["drive_force_N"] += STIFFNESS_N_PER_M * wave_m
+
+    relations, decision = answer(is_finely_uneven)
+    assert [item.cause for item in decision.decided] == ["drive-speed-ripple"]
+    assert relations.answered[2].chosen.terms[0].form == "every 0.087 mm"
+
+
+def test_a_drive_whose_command_changes_is_not_uneven():
+    """A motion that the held-out run does not repeat at the same place; it was called uneven with a share of 0 %."""
+
+    def wanders(number: int, signals: Signals) -> None:
+        path_m = 3e-5 * np.sin(2.0 * np.pi * T_S / (3.0 + number) + 2.0 * number) * np.sin(2.0 * np.pi * T_S / 7.0)
+        signals["drive_position_m"] += path_m
+        signals["drive_force_N"] += STIFFNESS_N_PER_M * path_m
+
+    relations, decision = answer(wanders)
+    pattern = relations.answered[2].patterns[0]
+    assert pattern.evidence > 25.0
+    assert pattern.share is not None
+    assert pattern.share < 0.0
     assert decision == Decision((), ())
 
 

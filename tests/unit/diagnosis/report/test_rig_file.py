@@ -34,8 +34,17 @@ def test_the_file_holds_the_refitted_rig_and_the_effect(evidence, tmp_path):
     assert rig.effects == {"drive-backlash": {"form": "", "gap_m": 8.1e-5}}
     header = path.read_text().split("\nname")[0]
     assert "bench" in header
-    assert "drive-backlash, probability 93 %" in header
+    assert "drive-backlash, probability 95 %" in header
     assert all(line.startswith("#") for line in header.splitlines())
+
+
+def test_described_gives_the_numbers_that_were_found_and_no_effect(evidence, tmp_path):
+    number = made_up.diagnosis().numbers[0]._replace(found=10500.0)
+    described = made_up.diagnosis()._replace(verdict="described", effects=("drive-stiffness",), numbers=(number,))
+    write_rig(described, evidence, tmp_path / "rig.toml")
+    rig = load_rig(str(tmp_path / "rig.toml"), [])
+    assert (rig.drive.stiffness_N_per_m, rig.effects) == (10500.0, {})
+    assert "described 11.7 kN/m" in (tmp_path / "rig.toml").read_text()
 
 
 def test_no_gap_gives_the_retuned_rig(evidence, tmp_path):

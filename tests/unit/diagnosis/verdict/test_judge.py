@@ -31,6 +31,13 @@ def test_a_good_fit_without_effects_gives_no_gap():
     assert judge(fit(50.0), [fit(48.0, "coulomb-level")], [], EXPECTED).kind == "no-gap"
 
 
+def test_a_gap_for_which_no_effect_was_fitted_in_time_is_no_verdict_that_nothing_is_wrong():
+    verdict = judge(fit(400.0), [], [], EXPECTED)
+    assert (verdict.kind, verdict.named, verdict.runner_up) == ("unexplained", None, None)
+    assert next(iter(verdict.probabilities)) == "unexplained"
+    assert judge(fit(50.0), [], [], EXPECTED).kind == "no-gap"
+
+
 def test_an_effect_that_explains_most_is_named():
     verdict = judge(fit(400.0), [fit(50.0, "coulomb-level"), fit(380.0, "static-level")], [], EXPECTED)
     assert verdict.kind == "effect"
