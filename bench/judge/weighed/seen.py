@@ -39,15 +39,20 @@ class Seen(NamedTuple):
         def left(values: dict[str, float]) -> dict[str, float]:
             return {name: value for name, value in values.items() if name != effect}
 
+        def of_each(places: Places) -> Places:
+            return {place: left(values) for place, values in places.items()}
+
         ledger = self.ledger
         if ledger is not None:
             ledger = ledger._replace(rows=tuple(row for row in ledger.rows if effect not in row.names))
-        places = {
-            witness: {place: left(values) for place, values in getattr(self, witness).items()}
-            for witness in ("lines", "waves", "chosen")
-        }
-        possible = tuple(name for name in self.possible if name != effect)
-        return self._replace(possible=possible, ledger=ledger, related=left(self.related), **places)
+        return self._replace(
+            possible=tuple(name for name in self.possible if name != effect),
+            ledger=ledger,
+            related=left(self.related),
+            lines=of_each(self.lines),
+            waves=of_each(self.waves),
+            chosen=of_each(self.chosen),
+        )
 
 
 def seen_of(evidence: Evidence) -> Seen:
