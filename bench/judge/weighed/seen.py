@@ -12,6 +12,7 @@ from bridge.faults import Fault
 from diagnosis.evidence.run import Evidence
 from diagnosis.gap.prepare import Prepared, prepare
 from diagnosis.hypotheses.catalogue import cannot_show
+from diagnosis.model.rig import Roughness
 from diagnosis.relations.answer import Answered, relations_of
 from diagnosis.relations.decide import decision_of
 from plant.effects.library import EFFECTS
@@ -106,5 +107,6 @@ def from_table(table: dict[str, Any]) -> Seen:
     changed: dict[str, Any] = {"possible": tuple(table["possible"])}
     if table["ledger"] is not None:
         rows = tuple(Row(**(row | {"names": frozenset(row["names"])})) for row in table["ledger"]["rows"])
-        changed["ledger"] = Ledger(**(table["ledger"] | {"rows": rows}))
+        surface = Roughness(*table["ledger"]["surface"])
+        changed["ledger"] = Ledger(**(table["ledger"] | {"rows": rows, "surface": surface}))
     return Seen(**(table | changed))

@@ -38,8 +38,9 @@ def test_a_rig_follows_from_its_seed() -> None:
     assert again is not None
     assert first.effects == again.effects
     assert set(first.effects) <= set(NAMES)
-    for one, other in zip(first.runs, again.runs, strict=True):
-        assert np.array_equal(one.signals["drive_force_N"], other.signals["drive_force_N"])
+    for one, other in zip(first.evidence.runs, again.evidence.runs, strict=True):
+        assert np.array_equal(one.columns["drive_force_N"], other.columns["drive_force_N"])
+    assert sum(run.holdout for run in first.evidence.runs) == 1
 
 
 def test_a_withheld_effect_says_nothing() -> None:
