@@ -12,6 +12,7 @@ trees      trees on rigs that the plant simulates under the campaign at hand
 features   the inputs of the trees
 linear/    evidence of the linearised, then refitted rig, of relations and of kept runs
 simulated/ witnesses weighed on simulated rigs
+weighed/   the evidences of both designs for each explanation, weighed on simulated rigs
 scoring    right, wrong and cost of every method
 command    the command line
 """

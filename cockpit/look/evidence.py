@@ -71,8 +71,7 @@ def rig_of(seen: LookResult, file: str, described: Mapping[str, float]) -> tuple
     if seen.known.mass_kg is not None:
         table["mass_kg"] = float(seen.known.mass_kg)
         tolerance["mass_kg"] = _LEAST_TOLERANCE
-    table["tolerance"] = tolerance
-    filled, assumed = with_assumed(table)
+    filled, assumed = with_assumed({**table, "tolerance": tolerance})
     return validate(RigTable, filled, file), assumed
 
 

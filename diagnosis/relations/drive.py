@@ -1,6 +1,7 @@
 """The drive relation: the drive's position less an even path between two changes of command."""
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -97,7 +98,7 @@ def _without_parabola(values: Floats, pieces: tuple[Piece, ...]) -> Floats:
     return result
 
 
-def _strongest(over: list[Floats], left: list[Floats], rows: list[tuple[int, slice]]) -> list[float]:
+def _strongest(over: Sequence[Floats], left: Sequence[Floats], rows: list[tuple[int, slice]]) -> list[float]:
     """Turns per unit of the waves over a variable that take most of the rest: of any length that the rows resolve.
 
     Args:
@@ -114,7 +115,7 @@ def _strongest(over: list[Floats], left: list[Floats], rows: list[tuple[int, sli
     count = next_fast_len(_LINES * len(summed))
     turns = rfftfreq(count, 1.0 / (_BINS * highest))
     inside = (turns >= _FEWEST_TURNS / max(lengths)) & (turns <= highest)
-    turns, power = turns[inside], np.abs(rfft(summed, count)[inside])
+    turns, power = turns[inside], np.abs(np.asarray(rfft(summed, count)))[inside]
     strongest: list[float] = []
     for i in np.argsort(-power):
         if all(abs(turns[i] - other) > _APART_TURNS / max(lengths) for other in strongest):
@@ -127,7 +128,7 @@ def _strongest(over: list[Floats], left: list[Floats], rows: list[tuple[int, sli
 def _wave(
     cause: str,
     form: str,
-    angles: list[Floats],
+    angles: Sequence[Floats],
     factor: list[Floats] | None,
     pieces: tuple[tuple[Piece, ...], ...],
     amplitude: float,

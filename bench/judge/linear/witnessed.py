@@ -46,7 +46,7 @@ class Ledger(NamedTuple):
     beyond: float  # share of the content of a relation that nothing in the library takes
     foreign: bool  # whether a run has a vibration that no effect makes
     surface: Roughness
-    moved: dict[str, float]  # numbers of the rig without effects, in tolerances
+    moved: dict[str, float] = {}  # numbers of the rig without effects, in tolerances
 
 
 def ledger_of(full: Evidence, relations: Relations) -> Ledger:

@@ -35,7 +35,7 @@ def train(
     """Draw the rigs that are missing in KEPT, and write the weights."""
     kept.mkdir(parents=True, exist_ok=True)
     missing = [seed for seed in range(rigs) if not (kept / f"{seed}.json").exists()]
-    Parallel(n_jobs=jobs, batch_size=1)(delayed(_keep)(kept / f"{seed}.json", seed) for seed in missing)
+    Parallel(n_jobs=jobs)(delayed(_keep)(kept / f"{seed}.json", seed) for seed in missing)
     weights = weights_of(read(kept))
     table = {name: np.round(values, _DIGITS).tolist() for name, values in weights._asdict().items()}
     WEIGHTS.write_text(json.dumps(table) + "\n", encoding="utf-8")

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.special import expit, logsumexp
+from scipy.special import expit, softmax
 
 from bench.judge.weighed.columns import Table
 from bridge.arrays import Floats
@@ -30,8 +30,7 @@ class Weights(NamedTuple):
 
     def probabilities(self, table: Table) -> Floats:
         """Of the explanations [explanations]; together 1."""
-        scores = (table.columns / self.scale) @ self.names
-        return np.exp(scores - logsumexp(scores))
+        return softmax((table.columns / self.scale) @ self.names)
 
     def beyond(self, table: Table) -> float:
         """Probability that the library does not explain the evidence."""
