@@ -95,7 +95,7 @@ def _most(places: Places, name: str) -> float:
 
 
 def _whole(seen: Seen, evidences: Sequence[Floats]) -> Floats:
-    """What is left by the best explanation, and how much there is to explain."""
+    """The remainder of the best explanation, and the size of the gap."""
     ledger = seen.ledger
     if ledger is None:
         return np.zeros(len(evidences) + 4)
