@@ -12,7 +12,7 @@ from diagnosis.latent.shares import LatentShare, shares_of
 from diagnosis.latent.spring_rows import spring_rows
 
 _FEWEST = 12  # fitted rows: with fewer, four pieces of them hold two rows each
-_FEWEST_HELD_OUT = 6  # rows to predict: with 3 a share's interval is as wide as the share
+_FEWEST_HELD_OUT = 6  # rows to predict; not swept
 # Correlation of the remainder from row to row from which it varies slowly. At 0.7 tracks measured once are reported in 9
 # signals of the development sets and not in 16; 0.3 changes nothing there.
 _SLOW = 0.5

@@ -90,7 +90,7 @@ def test_the_documented_zenoh_configurations_match_the_code() -> None:
 def test_readme_is_a_landing_page() -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     assert len(text.splitlines()) <= 66
-    assert len(text.split()) <= 780
+    assert len(text.split()) <= 660
 
 
 def test_readme_shows_the_output_of_its_commands() -> None:
@@ -103,8 +103,8 @@ def test_readme_shows_the_output_of_its_commands() -> None:
 
 
 @pytest.mark.parametrize("package", ["bridge", "controller", "plant", "diagnosis", "cockpit", "bench", "deploy"])
-def test_readme_names_the_folders_that_there_are(package: str) -> None:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+def test_contributing_names_the_folders_that_there_are(package: str) -> None:
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     (row,) = re.findall(rf"^    {package}/ (.*(?:\n     .*)*)", text, re.MULTILINE)
     folders = {path.parent.name for path in (ROOT / package).glob("*/*") if path.parent.name != "__pycache__"}
     assert set(re.findall(r"(\w+)/", row)) == folders

@@ -14,7 +14,7 @@ from diagnosis.diagnose_many import FolderFault, FolderResult, find_sources
 from diagnosis.result import Diagnosis, Share
 from tests import made_up
 
-TOLD = made_up.diagnosis()
+DIAGNOSIS = made_up.diagnosis()
 
 
 @pytest.fixture(autouse=True)
@@ -23,7 +23,7 @@ def version(monkeypatch):
 
 
 def named(*effects: str, closes: float | None, verdict="effect") -> Diagnosis:
-    return TOLD._replace(verdict=verdict, effects=effects, gap=TOLD.gap._replace(shrinkage=closes), shares=())
+    return DIAGNOSIS._replace(verdict=verdict, effects=effects, gap=DIAGNOSIS.gap._replace(shrinkage=closes), shares=())
 
 
 def digest(folder: Path, tool: str = "1.0+abc", budget_s: float | None = None) -> str:
@@ -43,10 +43,10 @@ def test_a_digest_is_of_the_files_the_version_and_the_time_allowed(tmp_path):
 
 def test_a_kept_result_is_read_back_and_a_partial_result_is_not(tmp_path):
     (tmp_path / "a.html").write_text("report")
-    keep(tmp_path, "d", TOLD, "a.html")
+    keep(tmp_path, "d", DIAGNOSIS, "a.html")
     diagnosis, report = kept(tmp_path, "d") or (None, "")
     assert (repr(diagnosis), report) == (
-        repr(TOLD._replace(pictures=())),
+        repr(DIAGNOSIS._replace(pictures=())),
         "a.html",
     )  # by repr, as NaN does not equal NaN
     assert kept(tmp_path, "e") is None
@@ -73,7 +73,7 @@ def test_only_changed_or_failed_folders_are_diagnosed_again(tmp_path):
     fleet = FleetFolder(tmp_path / "out", sources, None)
     assert fleet.kept() == []
     for source in sources[:2]:
-        fleet.add(FolderResult(source, TOLD, None))
+        fleet.add(FolderResult(source, DIAGNOSIS, None))
     fleet.add(FolderResult(sources[2], None, FolderFault("PEER_DIED", "c: its worker process died")))
     assert fleet.refused == []
     assert [failure.evidence for failure in fleet.fleet().failed] == ["c"]
@@ -99,9 +99,9 @@ def test_a_process_killed_while_writing_keeps_finished_results(tmp_path, monkeyp
     child = os.fork()
     if child == 0:
         fleet = FleetFolder(tmp_path / "out", sources, None)
-        fleet.add(FolderResult(sources[0], TOLD, None))
+        fleet.add(FolderResult(sources[0], DIAGNOSIS, None))
         monkeypatch.setattr(work, "keep", half_kept)
-        fleet.add(FolderResult(sources[1], TOLD, None))
+        fleet.add(FolderResult(sources[1], DIAGNOSIS, None))
         os._exit(1)
     assert os.WTERMSIG(os.waitpid(child, 0)[1]) == signal.SIGKILL
     assert (tmp_path / "out/b.html").is_file()
@@ -114,16 +114,16 @@ def test_an_evidence_that_changed_under_way_is_not_kept(tmp_path):
     sources = find_sources([made_up.evidence_folder(tmp_path / "a")])
     fleet = FleetFolder(tmp_path / "out", sources, None)
     (tmp_path / "a/manifest.toml").write_text(made_up.MANIFEST.replace("14.49", "14.5"))
-    fleet.add(FolderResult(sources[0], TOLD, None))
+    fleet.add(FolderResult(sources[0], DIAGNOSIS, None))
     assert (tmp_path / "out/a.html").is_file()
     assert not (tmp_path / "out" / RESULTS).exists()
 
 
 def test_where_mending_helps_most_comes_first():
     place = Share("breakaway level", "friction that goes with place", 0.73, (0.61, 0.92), 0.3)
-    unexplained = TOLD._replace(verdict="unexplained", effects=())
+    unexplained = DIAGNOSIS._replace(verdict="unexplained", effects=())
     done = [
-        ("fine", TOLD._replace(verdict="no-gap", effects=()), "fine.html"),
+        ("fine", DIAGNOSIS._replace(verdict="no-gap", effects=()), "fine.html"),
         ("p", named("drive-backlash", closes=1.2), "p.html"),
         ("q", named("coulomb-level", closes=0.5), "q.html"),
         ("r", named("coulomb-level", closes=0.8, verdict="partly"), "r.html"),
@@ -145,12 +145,12 @@ def test_where_mending_helps_most_comes_first():
 
 
 def test_wrong_numbers_are_a_shared_cause_and_what_was_not_finished_is_none():
-    described = TOLD._replace(verdict="described", effects=("drive-stiffness",))
-    mass = TOLD.numbers[0]._replace(name="mass_kg", share=0.7)
+    described = DIAGNOSIS._replace(verdict="described", effects=("drive-stiffness",))
+    mass = DIAGNOSIS.numbers[0]._replace(name="mass_kg", share=0.7)
     done = [
         ("a", described, ""),
         ("b", described._replace(effects=(), numbers=(mass,)), ""),
-        ("c", TOLD._replace(verdict="not-finished", effects=()), ""),
+        ("c", DIAGNOSIS._replace(verdict="not-finished", effects=()), ""),
     ]
     groups = fleet_of(done, [], []).groups
     assert [(group.kind, group.what, group.helps) for group in groups] == [
@@ -162,14 +162,14 @@ def test_wrong_numbers_are_a_shared_cause_and_what_was_not_finished_is_none():
 
 
 def test_without_a_fit_the_relations_give_the_share():
-    diagnosed = TOLD._replace(verdict="partly", gap=TOLD.gap._replace(shrinkage=None, interval_90=None))
+    diagnosed = DIAGNOSIS._replace(verdict="partly", gap=DIAGNOSIS.gap._replace(shrinkage=None, interval_90=None))
     (group,) = fleet_of([("rig", diagnosed, "")], [], []).groups
     assert (group.helps, group.rigs[0].interval_90) == (0.73, (0.61, 0.92))
     assert group.rigs[0].size.startswith("spring relation: drive-backlash 73 %")
 
 
 def test_the_page_has_every_rig_and_needs_no_network(tmp_path):
-    done = [("<b>rig 1", TOLD, "b#1.html"), ("fine", TOLD._replace(verdict="no-gap", effects=()), "")]
+    done = [("<b>rig 1", DIAGNOSIS, "b#1.html"), ("fine", DIAGNOSIS._replace(verdict="no-gap", effects=()), "")]
     write_page(fleet_of(done, [Failed("bad", "BAD_EVIDENCE", "too short")], ["later"]), tmp_path / "index.html")
     text = (tmp_path / "index.html").read_text()
     assert '<a href="b%231.html">&lt;b&gt;rig 1</a>' in text
@@ -187,7 +187,7 @@ def test_a_report_never_takes_the_place_of_the_index():
 def test_the_index_as_json_is_the_same(tmp_path):
     sources = find_sources([made_up.evidence_folder(tmp_path / "a")])
     fleet = FleetFolder(tmp_path / "out", sources, None)
-    fleet.add(FolderResult(sources[0], TOLD, None))
+    fleet.add(FolderResult(sources[0], DIAGNOSIS, None))
     index = json.loads((tmp_path / "out/index.json").read_text())
     assert (index["format"], index["folders"], index["left"]) == ("fleet/1", 1, [])
     assert index["groups"][0]["rigs"][0]["report"] == "a.html"

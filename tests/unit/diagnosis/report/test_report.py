@@ -187,7 +187,7 @@ def test_the_map_keeps_the_order_of_a_cycle_and_counts_the_share_left_out():
     assert left_out == pytest.approx(0.004)
 
 
-def told(diagnosis: Diagnosis) -> dict[str, str]:
+def by_label(diagnosis: Diagnosis) -> dict[str, str]:
     """The six lines of the answer by their labels; the first one as `answer`."""
     answer, *lines = summary(diagnosis)
     assert len(lines) == 5
@@ -198,7 +198,7 @@ def test_the_answer_has_six_lines_and_the_named_effects_first():
     made = made_up.diagnosis()
     assert summary(made) == made.summary
     pair = made._replace(effects=("drive-backlash", "drive-hardening"))
-    assert "drive-backlash and drive-hardening, probability 98 %: gap 81 µm" in told(pair)["answer"]
+    assert "drive-backlash and drive-hardening, probability 98 %: gap 81 µm" in by_label(pair)["answer"]
 
 
 STIFFNESS = "drive stiffness 11.01 kN/m (90 %: 10.95 to 11.07), described 11.7 kN/m (2.9 tolerances off)"
@@ -221,7 +221,7 @@ STIFFNESS = "drive stiffness 11.01 kN/m (90 %: 10.95 to 11.07), described 11.7 k
 def test_every_verdict_without_an_effect_has_its_words(verdict, answer, sure, numbers):
     made = made_up.diagnosis()
     gap = made.gap._replace(shrinkage=None, interval_90=None)
-    lines = told(made._replace(verdict=verdict, effects=(), gap=gap))
+    lines = by_label(made._replace(verdict=verdict, effects=(), gap=gap))
     assert answer in lines["answer"]
     assert lines["sure"].startswith(sure)
     assert lines["numbers"].startswith(numbers)
@@ -230,9 +230,9 @@ def test_every_verdict_without_an_effect_has_its_words(verdict, answer, sure, nu
 
 def test_a_number_that_no_effect_stands_for_has_no_rival_candidates():
     made = made_up.diagnosis()._replace(verdict="described", effects=("static-level",), not_distinguishable=())
-    assert told(made)["sure"] == "98 % that nothing else acts"
+    assert by_label(made)["sure"] == "98 % that nothing else acts"
     level = (Candidate("static-level", 0.9), Candidate("none", 0.1))
-    assert told(made._replace(candidates=level))["sure"].startswith(
+    assert by_label(made._replace(candidates=level))["sure"].startswith(
         "static-level 90 %; 98 % that nothing else acts; other"
     )
 
@@ -240,7 +240,7 @@ def test_a_number_that_no_effect_stands_for_has_no_rival_candidates():
 def test_without_a_fit_the_probabilities_are_unknown():
     made = made_up.diagnosis()
     candidates = tuple(row._replace(probability=NAN) for row in made.candidates)
-    lines = told(made._replace(verdict="partly", candidates=candidates, complete=NAN, rig=(), numbers=()))
+    lines = by_label(made._replace(verdict="partly", candidates=candidates, complete=NAN, rig=(), numbers=()))
     assert "the probabilities are unknown, as no simulated fit was made" in lines["sure"]
     assert lines["numbers"] == "none was refitted"
 
@@ -248,19 +248,21 @@ def test_without_a_fit_the_probabilities_are_unknown():
 @pytest.mark.parametrize(("form", "expected"), [("random", True), ("sine", False)])
 def test_an_unexplained_verdict_names_a_random_effect_that_would_scatter_likewise(form, expected):
     nearest = (Candidate("normal-load-fluctuation", 0.9, form), Candidate("none", 0.1))
-    lines = told(made_up.diagnosis()._replace(verdict="unexplained", effects=(), candidates=nearest))
+    lines = by_label(made_up.diagnosis()._replace(verdict="unexplained", effects=(), candidates=nearest))
     assert ("it scatters as normal-load-fluctuation at random would" in lines["else"]) is expected
 
 
 def test_the_summary_agrees_with_the_held_out_runs():
     made = made_up.diagnosis()
     worse = made._replace(gap=made.gap._replace(retuned=2.9, with_effect=3.6, shrinkage=-0.37))
-    assert "the gap grows from 2.9 to 3.6 noise floors" in told(worse)["held out"]
+    assert "the gap grows from 2.9 to 3.6 noise floors" in by_label(worse)["held out"]
     refit_worse = made._replace(gap=made.gap._replace(retuned=7.9))
-    assert told(refit_worse)["numbers"] == "the refitted numbers make the held-out runs worse: keep the described ones"
+    assert (
+        by_label(refit_worse)["numbers"] == "the refitted numbers make the held-out runs worse: keep the described ones"
+    )
     two = ("coulomb-level", "drive-backlash")
     gap = made.gap._replace(refuted=two, compared=(Shrinkage(" and ".join(two), 5.0, 0.1, None),))
-    lines = told(made._replace(verdict="unexplained", effects=(), gap=gap))
+    lines = by_label(made._replace(verdict="unexplained", effects=(), gap=gap))
     assert (
         "with coulomb-level and drive-backlash, which would explain the fitted runs, 5 are left there"
         in lines["held out"]
@@ -272,7 +274,7 @@ def test_the_summary_agrees_with_the_held_out_runs():
 def test_a_gap_that_the_held_out_runs_do_not_show_is_ascribed_to_the_fitted_runs(retuned, expected):
     made = made_up.diagnosis()
     gap = made.gap._replace(retuned=retuned, shrinkage=None)
-    lines = told(made._replace(verdict="unexplained", effects=(), gap=gap))
+    lines = by_label(made._replace(verdict="unexplained", effects=(), gap=gap))
     assert ("the gap shows in the fitted runs alone" in lines["held out"]) is expected
 
 
@@ -284,7 +286,7 @@ def test_the_summary_warns_where_a_name_leaves_more_than_a_right_name(left, effe
     made = made_up.diagnosis()
     verdict = "effect" if effects else "unexplained"
     gap = made.gap._replace(retuned=6.51, with_effect=left)
-    lines = told(made._replace(verdict=verdict, effects=effects, gap=gap))
+    lines = by_label(made._replace(verdict=verdict, effects=effects, gap=gap))
     assert ("leaves about 1 on the held-out runs, not 5.5" in lines["else"]) is expected
 
 
@@ -306,14 +308,14 @@ def test_runs_of_two_folders_keep_their_names_apart():
 
 def test_runs_in_which_nothing_moves_are_in_the_summary():
     findings = tuple(Finding("still", f"run-0{i}.csv: drive_position_m", "0 m in all") for i in (1, 3))
-    lines = told(made_up.diagnosis()._replace(verdict="no-gap", effects=(), findings=findings))
+    lines = by_label(made_up.diagnosis()._replace(verdict="no-gap", effects=(), findings=findings))
     assert "in run-01.csv, run-03.csv the drive does not move: friction and drive are not tested there" in lines["else"]
 
 
 def test_vibrations_that_no_model_has_are_in_the_summary_with_their_runs():
     picked_up = tuple(Finding(PICK_UP, f"run-0{i}.csv: drive_force_N", "vibrates with 0.3 N") for i in (1, 2, 4))
     findings = (*picked_up[:2], Finding(DISTORTED, "run-02.csv: base_accel_mps2", "moves at 5000 Hz"), picked_up[2])
-    lines = told(made_up.diagnosis()._replace(findings=findings))
+    lines = by_label(made_up.diagnosis()._replace(findings=findings))
     assert "run-01.csv: drive_force_N vibrates with 0.3 N, also run-02.csv, run-04.csv" in lines["else"]
     assert "run-02.csv: base_accel_mps2 moves at 5000 Hz" in lines["else"]
 
@@ -364,7 +366,7 @@ def test_a_number_known_exactly_has_not_moved():
 def test_the_summary_warns_where_the_held_out_runs_do_not_test_the_name(tmp_path):
     made = made_up.diagnosis()
     untested = made._replace(gap=made.gap._replace(retuned=1.0, with_effect=1.0, shrinkage=None, interval_90=None))
-    assert "no gap is left to close there, so new data have not tested the name" in told(untested)["held out"]
+    assert "no gap is left to close there, so new data have not tested the name" in by_label(untested)["held out"]
     page = text_of(page_of(untested, tmp_path))
     assert "There is no gap to close on these runs: they do not test the named effect." in page
     assert "Nothing is named" not in page
@@ -376,7 +378,7 @@ def test_the_text_closes_at_most_the_whole_gap_and_the_json_has_the_number():
     compared = tuple(fit._replace(shrinkage=1.06, interval_90=(0.43, 1.76)) for fit in made.gap.compared)
     gap = made.gap._replace(shrinkage=1.06, interval_90=(0.43, 1.76), compared=compared)
     made = made._replace(gap=gap)
-    assert "100 % of it closed (90 %: 43 % to 100 %)" in told(made)["held out"]
+    assert "100 % of it closed (90 %: 43 % to 100 %)" in by_label(made)["held out"]
     page = report_page(made, "rig")
     for text in (page, "\n".join(summary(made)), "\n".join(diagnose_output.details(made))):
         assert "106 %" not in text
