@@ -58,7 +58,7 @@ class Shrinkage(NamedTuple):
     `retuned` is the gap of the baseline.
     """
 
-    who: str  # the effect or effects, PARAMETERS, "flexible residual"
+    who: str  # the effect or effects, PARAMETERS
     gap: float
     shrinkage: float | None  # None: there was no gap to close
     interval_90: tuple[float, float] | None
@@ -75,8 +75,7 @@ class Gap(NamedTuple):
     floor: float = 1.0
     shrinkage: float | None = None
     interval_90: tuple[float, float] | None = None
-    compared: tuple[Shrinkage, ...] = ()  # best effect, runner-up, parameters alone, flexible residual
-    refuted: tuple[str, ...] = ()  # effects that the fitted runs show and the held-out runs do not confirm
+    compared: tuple[Shrinkage, ...] = ()  # best explanation, runner-up, parameters alone
     JSON_HIDDEN = ("files",)
 
     @in_json
@@ -172,6 +171,20 @@ class RelationRow(NamedTuple):
     causes: tuple[str, ...]
 
 
+class LedgerRow(NamedTuple):
+    """One witness about one explanation."""
+
+    causes: tuple[str, ...]  # none, one or two effects; for friction a cause that may be outside the library
+    place: str  # the relation or the signal; `features` for fits
+    source: Literal["relation", "friction", "fit", "simulation", "kept runs"]  # simulation: the linear model of the rig
+    evidence: float  # natural logarithm, against no effect; NaN where the witness has only a share
+    share: float | None = None  # of the difference on the held-out runs that the cause predicts
+    interval_90: tuple[float, float] | None = None
+    null_90: float | None = None  # share that chance alone reaches in 1 of 10
+    agrees: bool | None = None  # whether the size is the same in all runs
+    left: float | None = None  # of fits and kept runs: logarithm of the remainder over that of a right explanation
+
+
 class LeftOut(NamedTuple):
     """A relation that cannot be computed from the channels, and the reason."""
 
@@ -201,6 +214,7 @@ class Diagnosis(NamedTuple):
     relations: tuple[RelationRow, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
     numbers: tuple[WrongNumber, ...] = ()
+    ledger: tuple[LedgerRow, ...] = ()
     cannot_show: tuple[str, ...] = ()  # effects excluded by the drive, the runs or assumed numbers
     JSON_HIDDEN = ("pictures",)
 

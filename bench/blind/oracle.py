@@ -16,14 +16,12 @@ from bench.blind.outcomes import Opened
 from bench.blind.scoring import Oracle
 from bridge.results import write_json
 from diagnosis.evidence.folder import load_evidence
-from diagnosis.fits.fit import Fit
-from diagnosis.fits.retuning import retuned_rig
-from diagnosis.fits.screening import screened
-from diagnosis.fits.search import refitted
+from diagnosis.fits.baseline import baseline_of
+from diagnosis.fits.explanations import Search
+from diagnosis.fits.held_out import HeldOut
 from diagnosis.gap.prepare import prepare
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.catalogue import trials
-from diagnosis.verdict.held_out import HeldOut
 from diagnosis.version import tool_version
 
 Progress = Callable[[str, float], None]
@@ -68,17 +66,15 @@ def shrinkage_with(folder: Path, effects: list[str]) -> float | None:
     evidence = load_evidence(folder)
     runs = prepare(evidence)
     problem = Problem(evidence.rig, [run for run in runs if not run.holdout])
-    fitter, baseline, roughness, _ = retuned_rig(evidence, problem, _no_report)
-    tried = trials(problem)
-    best: Fit = baseline
-    for effect in effects:  # each effect is added to the fit with the effects before it
-        matching = [trial for trial in tried if trial.hypothesis.effects == (effect,)]
-        refits = refitted(fitter, best.chi2, screened(fitter, best, matching, paired=False))
-        if not refits:
-            return None
-        best = refits[0]
+    names = frozenset(effects)
+    tried = [trial for trial in trials(problem) if names.issuperset(trial.hypothesis.effects)]
+    search = Search(baseline_of(problem, _no_report), tried, lambda _: 1.0)  # each effect has a reason for a second
+    search.run(names, _no_report)
+    best = search.of(names)
+    if best is None:
+        return None
     held_out = Problem(evidence.rig, [run for run in runs if run.holdout])
-    return HeldOut(held_out, fitter.nuisances, best, baseline, roughness).closed_by(best).shrinkage
+    return HeldOut(held_out, search.rig, best).closed_by(best).shrinkage
 
 
 def _no_report(_line: str, _share: float) -> None:

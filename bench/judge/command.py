@@ -27,10 +27,6 @@ def judge(
     half: Annotated[Literal["a", "b"] | None, typer.Option(help="a: for development; b: for decisions.")] = None,
     jobs: Annotated[int, typer.Option(min=1, help="Processes to use.")] = 1,
     budget: Annotated[float | None, typer.Option(min=1.0, help="Seconds that a method has for a case.")] = None,
-    keep_fits: Annotated[
-        bool,
-        typer.Option("--keep-fits", help="First fit the cases whose fits are not kept: half a minute of CPU each."),
-    ] = False,
     as_json: Json = None,
 ) -> None:
     """Ask every method about every case, and print its answers and the truth; kept answers are not asked for again."""
@@ -38,7 +34,6 @@ def judge(
     def work() -> None:
         from bench.judge.cases import read_cases
         from bench.judge.methods import Given, ask, methods
-        from bench.judge.refits import keep_fits as fitted
         from bench.judge.scoring import Outcome, by_method, case_table, summary
         from cockpit.commands.diagnose_output import watched
 
@@ -50,9 +45,6 @@ def judge(
         outcomes: list[Outcome] = []
         by_name = {case.name: case for case in cases}
         with writing(), watched() as progress:
-            if keep_fits:
-                for number, name in enumerate(fitted(cases), 1):
-                    progress(f"fits of {name} are kept", number / len(cases))
             for given in ask(folder, names, cases, jobs, budget):
                 outcomes.append(Outcome(by_name[given.case], given))
                 progress(f"{given.method}: {given.case}", len(outcomes) / (len(cases) * len(names)))

@@ -20,13 +20,6 @@ from diagnosis.version import NOT_JUDGED, definitions_digest
 
 Answer = dict[str, float]
 _ROOT = Path(__file__).parents[2]
-_FITTED = (
-    "diagnosis/fits",
-    "diagnosis/hypotheses",
-    "diagnosis/relations",
-    "bench/judge/lines.py",
-    "bench/judge/columns.py",
-)
 _READERS = ("diagnosis/evidence", "diagnosis/features", "diagnosis/gap", "diagnosis/model")
 
 
@@ -51,21 +44,12 @@ class Given(NamedTuple):
 def methods() -> dict[str, Method]:
     """Every method; a new one is a new line."""
     from bench.judge import lines, refits, trees
-    from bench.judge.linear import answer as linear
-    from bench.judge.simulated import answer as simulated
-    from bench.judge.weighed import answer as weighed
 
     return {
         "verdict": Method(refits.verdict, ("diagnosis", "plant", "bench/judge/refits.py")),
         "BIC": Method(refits.bic, ("bench/judge/refits.py", "bench/judge/fits.json.gz")),
         "lines": Method(lines.answer, (*_READERS, "bench/judge/lines.py", "bench/judge/columns.py")),
-        "simulated": Method(
-            simulated.answer,
-            (*_READERS, *_FITTED, "plant", "bench/judge/simulated", "bench/judge/simulated/model.json"),
-        ),
         "trees": Method(trees.answer, (*_READERS, "plant", "bench/judge/trees.py", "bench/judge/features.py")),
-        "weighed": Method(weighed.answer, ("diagnosis", "plant", "bench/judge")),
-        "linear": Method(linear.answer, ("diagnosis", "plant", "bench/judge/linear")),
     }
 
 

@@ -1,39 +1,26 @@
-"""The diagnosis of today, and BIC over its single refits. The fits take half a minute a case, so they are kept in fits.json.gz.
+"""The diagnosis of today; and BIC over the single refits of the diagnosis before the judge had a ledger.
 
-BIC stays a rival when the diagnosis makes no refits any more: `python -m bench judge --keep-fits` replaced the file last at the
-version that it names.
+That diagnosis refitted every effect, half a minute a case, which today's does not; its fits are kept in fits.json.gz.
 """
 
 import gzip
 import json
 import math
-import time
-from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from bench.blind.outcomes import with_unexplained
 from bench.blind.sealing import evidence_hash
-from bench.judge.cases import Case
-from bridge.faults import Fault
-from bridge.files import replacing
-from bridge.results import strict_json
 from diagnosis.diagnose import diagnose
 from diagnosis.evidence.folder import load_evidence
 from diagnosis.result import Diagnosis
-from diagnosis.version import tool_version
 
 KEPT = Path(__file__).with_name("fits.json.gz")
 Answer = dict[str, float]
 
 
 def verdict(folder: Path, budget_s: float | None) -> Answer:
-    """The verdict of the diagnosis; `cpu_s` where the kept fits are of this version."""
-    kept = _kept()
-    row = kept["cases"].get(_key(folder)) if kept["tool"] == tool_version() else None
-    if row is not None:
-        return row["verdict"] | {"cpu_s": row["cpu_s"]}
+    """The verdict of the diagnosis."""
     return as_answer(diagnose(load_evidence(folder), _no_report, 1, budget_s))
 
 
@@ -54,47 +41,11 @@ def by_bic(chi2: dict[str, tuple[float, int]], features: int) -> Answer:
 
 
 def as_answer(done: Diagnosis) -> Answer:
-    """The candidates of a diagnosis; two named effects are one name with the probability of the first."""
-    table = strict_json(done)
-    answer = with_unexplained(table["candidates"], table["complete"])
-    answer["outside"] = answer.pop("unexplained")
-    if len(done.effects) == 2:
-        together = max(answer.pop(effect, 0.0) for effect in done.effects)
-        answer[" + ".join(sorted(done.effects))] = together
-    return answer
-
-
-def keep_fits(cases: Sequence[Case]) -> Iterator[str]:
-    """Diagnose the cases without kept fits of this version; write the fits of each at once, and yield its name."""
-    kept: dict[str, Any] = _kept()
-    if kept["tool"] != tool_version():
-        kept = {"tool": tool_version(), "cases": {}}
-    for case in cases:
-        if _key(case.folder) in kept["cases"]:
-            continue
-        kept["cases"][_key(case.folder)] = _fits(case.folder)
-        text = json.dumps(kept, separators=(",", ":"), sort_keys=True)
-        with replacing(KEPT) as file:
-            file.write(gzip.compress(text.encode(), mtime=0))
-        yield case.name
-
-
-def _fits(folder: Path) -> dict[str, Any]:
-    before = time.process_time()
-    try:
-        done = diagnose(load_evidence(folder), _no_report)
-    except Fault as fault:
-        return {"chi2": {}, "features": 0, "verdict": {}, "cpu_s": time.process_time() - before, "fault": fault.line}
-    return {
-        "chi2": {
-            candidate.effect: (round(candidate.chi2, 2), len(candidate.parameters))
-            for candidate in done.candidates
-            if candidate.chi2 is not None
-        },
-        "features": done.compared_features,
-        "verdict": {name: round(value, 5) for name, value in as_answer(done).items()},
-        "cpu_s": round(time.process_time() - before, 1),
-    }
+    """The candidates of a diagnosis, and whether something else acts; two named effects are one name."""
+    answer = {row.effect: row.probability for row in done.candidates if math.isfinite(row.probability)}
+    if len(done.effects) == 2 and answer:
+        answer[" + ".join(sorted(done.effects))] = sum(answer.pop(effect) for effect in done.effects)
+    return answer | {"outside": 1.0 - done.complete} if answer else {}
 
 
 @cache

@@ -15,7 +15,7 @@ from bridge.units import signal_name
 from diagnosis.experiments.candidate_runs import Plan, as_run, plans
 from diagnosis.features.feature import Feature
 from diagnosis.fits.fit import Fit
-from diagnosis.fits.retuning import ROUGHNESS
+from diagnosis.fits.surface import ROUGHNESS
 from diagnosis.gap.measure import Floor, compress, floor_of, replicates, slope_of_compress
 from diagnosis.gap.problem import Point, Problem
 from diagnosis.hypotheses.catalogue import CATALOGUE, FRAME, SPEEDS, SWEEP, TAP, TRACK, WEIGHT

@@ -62,9 +62,6 @@ _QUICK = FitStage(2, 0, FAR_KNEE, columns=False)
 # Largest difference, in noise floors, from which a refit begins with the far stage. Too small: fits that are near lose time
 # there. Too large: fits start where the compression is nearly flat.
 _FAR_OFF = 3.0 * KNEE
-# A trial ends after its first steps when its chi2 lies between these shares of the baseline's chi2: it then gains nothing.
-# A narrower range costs time; a wider one drops trials that would still improve. Counted: docs/method/diagnosis.md.
-_NO_LESS, _ASTRAY = 0.97, 1.5
 # Steps for the nuisances' derivatives, in tolerances, for the first, second and third renewal. Too small: the grid of the
 # features shows. Too large: curvature does. The second goes the other way and further, across slips that come or go.
 _STEPS = (0.5, -1.0, 0.25)
@@ -106,21 +103,6 @@ class Fitter:
         # bounds of the nuisances, the same in both directions [nuisances]
         self.most = np.where(np.arange(len(nuisances)) < rig_numbers, _MOST_TOLERANCES, _MOST_OF_CHAIN)
         self._rates = np.zeros((int(floor.compared.sum()), len(nuisances)))
-
-    def for_problem(self, problem: Problem) -> "Fitter":
-        """A fitter with the same floor and derivatives for other measured features of the same runs."""
-        other = Fitter(problem, self.floor, self.nuisances)
-        other._rates = self._rates
-        return other
-
-    def of_runs(self, files: set[str]) -> "Fitter":
-        """A fitter for some of the runs, given by the names of their files."""
-        mask = np.array([file in files for file, _ in self.problem.labels])
-        problem = Problem(self.problem.rig, [run for run in self.problem.runs if run.file in files])
-        problem.until_s = self.problem.until_s
-        other = Fitter(problem, self.floor.of_features(mask), self.nuisances)
-        other._rates = self._rates[mask[self.floor.compared]]
-        return other
 
     def predicted(self, deviations: Floats, effects: Effects) -> Floats:
         """Features of the model without noise [features], for nuisances in tolerances [nuisances] and tables of effects."""
@@ -169,10 +151,6 @@ class Fitter:
         fit = yield from self.fitting(hypothesis, *starts[far.index(min(far))], _QUICK)
         return (yield from self._judging(fit))
 
-    def judged(self, fit: Fit) -> Fit:
-        """A fit of any stage, with chi2 and residual under the compression of the gap."""
-        return together(self.predicted_many, [self._judging(fit)])[0]
-
     def _judging(self, fit: Fit) -> Work[Fit]:
         (predicted,) = yield Question([(fit.deviations, fit.effects)])
         residual, _ = self.whitened(predicted)
@@ -191,14 +169,6 @@ class Fitter:
             fit = yield from self.fitting(hypothesis, deviations, w, _FAR)
             deviations, w = fit.deviations, fit.w
         return (yield from self.fitting(hypothesis, deviations, w, _NEAR))
-
-    def trying(self, hypothesis: Hypothesis, deviations: Floats, w: Floats, baseline_chi2: float) -> Work[Fit]:
-        """As `refitting`, but stop after the first steps where chi2 is about the chi2 of the baseline, `baseline_chi2`."""
-        fit = yield from self.fitting(hypothesis, deviations, w, _FAR)
-        fit = yield from self._judging(fit)
-        if _NO_LESS * baseline_chi2 < fit.chi2 < _ASTRAY * baseline_chi2:
-            return fit
-        return (yield from self.fitting(hypothesis, fit.deviations, fit.w, _NEAR))
 
     def going_further(self, fit: Fit) -> Work[Fit]:
         """Refit a fit again as long as chi2 falls; a finished fit is returned unchanged."""

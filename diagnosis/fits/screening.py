@@ -14,7 +14,6 @@ from diagnosis.fits.fit import Fit, step_within
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.hypotheses.hypothesis import Hypothesis
 from diagnosis.hypotheses.starts import Trial
-from diagnosis.processes import spread
 
 # Bounds of a screened start: times the trial's own size, and tolerances of a nuisance. Too small: large effects look too small
 # to matter. Too large: starts lie where the derivatives no longer hold.
@@ -83,13 +82,6 @@ def added(base: Hypothesis, more: Hypothesis) -> Hypothesis:
     return Hypothesis(base.forms | more.forms, (*base.coordinates, *more.coordinates))
 
 
-def screened(fitter: Fitter, base: Fit, trials: list[Trial], jobs: int = 1, paired: bool = True) -> Screening:
-    """What the trials promise in addition to the effects of `base`, and pairs of them where `paired`; in `jobs` processes."""
-    trials = beside(base, trials)
-    # in the order of the trials: otherwise `jobs` would decide which of two equal trials comes first
-    return of_changes(fitter, base, trials, spread(jobs, _columns, (fitter, base), trials), paired)
-
-
 def beside(base: Fit, trials: list[Trial]) -> list[Trial]:
     """The trials of effects that a fit does not have."""
     return [trial for trial in trials if not set(trial.hypothesis.effects) & set(base.hypothesis.effects)]
@@ -116,16 +108,6 @@ def of_changes(fitter: Fitter, base: Fit, trials: list[Trial], changes: list[Flo
     best = best_pairs(columns, inner, towards, (low, high), left) if paired else []
     pairs = [_start(base, directions, [columns[i], columns[j]], sizes, chi2) for i, j, sizes, chi2 in best]
     return Screening(sorted(singles, key=lambda single: single.chi2), pairs)
-
-
-def _columns(shared: tuple[Fitter, Fit], trials: list[Trial]) -> list[Floats]:
-    fitter, base = shared
-    base_features = fitter.predicted(base.deviations, base.effects)
-    slope = fitter.whitened(base_features)[1]
-    moved = fitter.predicted_many(
-        [(base.deviations, base.effects | trial.hypothesis.tables(trial.w)) for trial in trials]
-    )
-    return [fitter.column(base_features, features, slope) for features in moved]
 
 
 def _bounds(trial: Trial) -> tuple[float, float]:

@@ -1,8 +1,7 @@
-"""From fits and a verdict to a diagnosis; and a diagnosis from relations and latent friction alone, where no fit ends in time."""
+"""From the witnesses and the answer of the judge to a diagnosis."""
 
 import math
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from typing import TypeVar
 
 import numpy as np
@@ -10,29 +9,25 @@ import numpy as np
 from bridge.arrays import Floats
 from bridge.log.finding import Finding
 from diagnosis.deadline import OutOfTimeError
-from diagnosis.evidence.folder import Evidence, MeasuredRun
+from diagnosis.evidence.folder import Evidence
 from diagnosis.evidence.foreign_vibration import PICK_UP
 from diagnosis.experiments.proposal import SINE, UNCOUPLE, next_experiment
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.features.segments import SHORTEST_S
+from diagnosis.fits.estimates import estimates_of
+from diagnosis.fits.explanations import Search
 from diagnosis.fits.fit import Fit
-from diagnosis.fits.random_friction import is_random
+from diagnosis.fits.held_out import HeldOut
 from diagnosis.gap.measure import DEFINITION, Floor, cell_names, cell_squares, differences
 from diagnosis.gap.prepare import Prepared
 from diagnosis.gap.problem import Problem
-from diagnosis.hypotheses.hypothesis import Coordinate
-from diagnosis.hypotheses.starts import Trial
-from diagnosis.model.per_run import is_phase
+from diagnosis.judge.judge import NONE, Judged
+from diagnosis.judge.ledger import Ledger
+from diagnosis.judge.witnesses import NO_FIT, Witnesses
+from diagnosis.latent.naming import named_by
 from diagnosis.pictures.choice import pictures
 from diagnosis.report.outcome import verdict_of, wrong_numbers
-from diagnosis.result import PARAMETERS, Candidate, Cell, Diagnosis, Estimate, Experiment, Gap, Shrinkage
-from diagnosis.verdict.blend import flexible_differences
-from diagnosis.verdict.confirmation import Confirmation
-from diagnosis.verdict.held_out import HeldOut
-from diagnosis.verdict.judge import Verdict, refittable
-from diagnosis.verdict.lookalikes import imitators
-from diagnosis.verdict.selection import Contest
-from plant.effects.library import EFFECTS
+from diagnosis.result import PARAMETERS, Candidate, Cell, Diagnosis, Experiment, Gap, Shrinkage, WrongNumber
 
 HOLD = Experiment(
     f"Hold each speed and each vibration for {SHORTEST_S:g} s or more in some runs.",
@@ -46,123 +41,83 @@ _NO_SINE = Experiment(SINE, "Every effect of the library shakes the base with a 
 # Largest share of a run with changing speed or vibration without a finding. Smaller: ordinary ramps of drive and piezo cause the
 # finding. Larger: most of a run may be left out of the comparison without a finding.
 _MUCH_CHANGING = 0.2
+# Probability that the named effect and its rivals hold together. Smaller: the true one is missing more often. Larger: long lists.
+_TOGETHER = 0.9
 
 
-def comparable(runs: list[Prepared]) -> bool:
-    """Whether any fitted run has a segment that simulated fits can compare."""
-    return any(run.commands.segments for run in runs if not run.holdout)
-
-
-def unfitted() -> Verdict:
-    """The verdict before any result: all explanations have the same probability."""
-    names = ("unexplained", *EFFECTS, "none")
-    return Verdict("unexplained", None, dict.fromkeys(names, 1.0 / len(names)), None, (), 1.0)
-
-
-def without_fits(verdict: Verdict, runs: Sequence[MeasuredRun], following: Experiment, began: float) -> Diagnosis:
-    """The diagnosis of a verdict without any fit, still without relations, shares and sentences."""
-    return Diagnosis(
-        verdict=verdict.kind,
-        effects=verdict.names,
-        summary=(),
-        candidates=tuple(Candidate(name, math.nan) for name in dict.fromkeys((*verdict.names, *EFFECTS, "none"))),
-        complete=math.nan,
-        not_distinguishable=(),
-        where=(),
-        gap=Gap(DEFINITION, tuple(run.file for run in runs if run.holdout)),
-        next_experiment=following,
-        rig=(),
-        findings=(),
-        pictures=(),
-        compared_features=0,
-        elapsed_s=round(time.monotonic() - began, 2),
-    )
-
-
-def assembled(
-    evidence: Evidence,
-    runs: list[Prepared],
-    contest: Contest,
-    outcome: Confirmation,
-    tried: list[Trial],
-    began: float,
-    jobs: int,
-    outside: bool,
-) -> Diagnosis:
-    """The diagnosis of an evidence, still without its relations and without sentences.
-
-    Args:
-        evidence, runs: the evidence, and all its prepared runs, including held-out runs.
-        contest: all fits, and the verdict over them.
-        outcome: the final verdict, after the held-out runs.
-        tried: the library's trials.
-        began: `time.monotonic()` at the start of the diagnosis.
-        jobs: processes.
-        outside: whether the relations show something that no effect of the library causes.
-
-    """
-    fitter, baseline = contest.rig.fitter, contest.rig.fit
-    verdict, best, _, held_out = outcome
-    nuisances = fitter.nuisances
-    cells = _in_time(
-        lambda: _cells(
-            fitter.floor, differences(fitter.floor, fitter.problem, fitter.predicted(baseline.deviations, {}))
-        ),
-        [],
-    )
-    judged = Gap(DEFINITION)
-    if held_out is not None:
-        gap = held_out
-        cells += _in_time(
-            lambda: _cells(gap.floor, gap.differences(baseline.deviations, baseline.hypothesis, baseline.w)), []
-        )
-        judged = _in_time(lambda: _judged(contest, outcome, gap, tried, jobs), judged)
+def assembled(seen: Witnesses, ledger: Ledger, judged: Judged) -> Diagnosis:
+    """The diagnosis, still without relations, shares and sentences."""
+    if seen.search is None:
+        return _without_fits(seen, ledger, judged)
+    search, evidence = seen.search, seen.evidence
+    fitter, baseline = search.rig.fitter, search.rig.fit
+    named = _in_time(lambda: search.of(judged.names), None) if judged.names else None
+    best = named or baseline
+    judged_gap, numbers, cells = Gap(DEFINITION), tuple[WrongNumber, ...](), list[Cell]()
+    cells += _in_time(lambda: _cells_of(fitter.floor, fitter.problem, fitter.predicted(baseline.deviations, {})), [])
+    rival = _in_time(lambda: _rival(search, judged), None)
+    if (held_out := seen.held_out) is not None:
+        cells += _in_time(lambda: _cells(held_out.floor, held_out.differences(baseline)), [])
+        judged_gap = _in_time(lambda: _gap(held_out, baseline, named, rival), judged_gap)
+    numbers = _in_time(lambda: tuple(wrong_numbers(fitter.nuisances, best, held_out)), ())
+    kind, effects = verdict_of(judged, named is not None, numbers, judged_gap, bool(seen.decision.outside))
     cells += _vibrating(evidence)
+    latent = named_by(seen.latent)[:1]
+    if kind == "unexplained" and latent and not any(run.foreign for run in evidence.runs):
+        kind, effects, named = "partly", latent, None
     total = sum(cell.share for cell in cells)
     where = sorted((cell._replace(share=cell.share / total) for cell in cells), key=lambda cell: -cell.share)
-    singles = {fit.hypothesis.effects[0]: fit for fit in reversed(contest.singles)}
-    by_effect = dict(singles)
-    if verdict.named is not None:
-        by_effect |= dict.fromkeys(verdict.named.hypothesis.effects, verdict.named)
-    elif verdict.ranked and is_random(verdict.ranked[0].fit.hypothesis):
-        by_effect[verdict.ranked[0].fit.hypothesis.effects[0]] = verdict.ranked[0].fit
-    alone = {name: round(fit.chi2, 2) for name, fit in ({"none": baseline} | singles).items()}
-    numbers = _in_time(lambda: tuple(wrong_numbers(nuisances, best, held_out)), ())
-    kind, effects = verdict_of(verdict.kind, verdict.names, numbers, judged, outside)
-    complete = math.nan if kind == "not-finished" else 1.0 - verdict.probabilities["unexplained"]
-    candidates = tuple(
-        _candidate(name, probability / complete, by_effect.get(name))._replace(chi2=alone.get(name))
-        for name, probability in verdict.probabilities.items()
-        if name != "unexplained"
-    )
-    named = nuisances.point(best.deviations, best.effects) if verdict.named else None
-    followed = [ranked for ranked in verdict.ranked if not is_random(ranked.fit.hypothesis)]
-    alike = _in_time(lambda: imitators(fitter, followed, verdict.scale), ()) if refittable(verdict) else ()
-    leaders = [fit for fit in (verdict.named or baseline, verdict.runner_up) if fit is not None]
-    if verdict.outside:
-        picked_up = any(vibration.kind == PICK_UP for run in evidence.runs for vibration in run.foreign)
-        following = _NO_SUCH_VIBRATION if picked_up else _NO_SINE
-    else:
-        following = _in_time(lambda: next_experiment(fitter.problem, nuisances, leaders), LONGER)
-    shown = Problem(evidence.rig, runs)
-    shown.until_s = fitter.problem.until_s
-    described, refitted = (nuisances.point(at, {}) for at in (np.zeros(len(nuisances)), baseline.deviations))
+    shown = Problem(evidence.rig, seen.runs)
+    shown.until_s = seen.until_s
+    nuisances = fitter.nuisances
+    points = [nuisances.point(at, {}) for at in (np.zeros(len(nuisances)), baseline.deviations)]
+    of_named = nuisances.point(best.deviations, best.effects) if named is not None and named.effects else None
     return Diagnosis(
         verdict=kind,
         effects=effects,
         summary=(),
-        candidates=candidates,
-        complete=complete,
-        not_distinguishable=(alike,) if alike else (),
+        candidates=_candidates(judged, search, named),
+        complete=judged.complete,
+        not_distinguishable=_alike(judged, effects),
         where=tuple(where),
-        gap=judged,
-        next_experiment=following,
+        gap=judged_gap,
+        next_experiment=_next(seen, search, [best, *([] if rival is None else [rival])]),
         rig=nuisances.parameters(best.deviations),
-        findings=(*evidence.findings, *_changing(runs)),
-        pictures=_in_time(lambda: pictures(shown, described, refitted, named, effects), ()),
+        findings=(*evidence.findings, *_changing(seen.runs)),
+        pictures=_in_time(lambda: pictures(shown, *points, of_named, effects), ()),
         compared_features=len(baseline.residual),
-        elapsed_s=round(time.monotonic() - began, 2),
+        elapsed_s=0.0,
         numbers=numbers,
+        ledger=ledger.rows,
+        cannot_show=seen.hidden,
+    )
+
+
+def _without_fits(seen: Witnesses, ledger: Ledger, judged: Judged) -> Diagnosis:
+    """The diagnosis from relations and latent friction alone."""
+    kind, effects = verdict_of(judged, False, (), Gap(DEFINITION), bool(seen.decision.outside))
+    latent = named_by(seen.latent)[:1]
+    if kind in ("unexplained", "no-gap") and latent:
+        kind, effects = "partly", latent
+    if kind == "no-gap" or not seen.runs:  # the relations do not see every effect
+        kind = "not-finished"
+    return Diagnosis(
+        verdict=kind,
+        effects=effects,
+        summary=(),
+        candidates=_candidates(judged, None, None),
+        complete=math.nan if kind == "not-finished" else judged.complete,
+        not_distinguishable=(),
+        where=(),
+        gap=Gap(DEFINITION, tuple(run.file for run in seen.evidence.runs if run.holdout)),
+        next_experiment=LONGER if seen.comparable or not seen.runs else HOLD,
+        rig=(),
+        findings=(*seen.evidence.findings, NO_FIT),
+        pictures=(),
+        compared_features=0,
+        elapsed_s=0.0,
+        ledger=ledger.rows,
+        cannot_show=seen.hidden,
     )
 
 
@@ -174,39 +129,72 @@ def _in_time(work: Callable[[], R], otherwise: R) -> R:
         return otherwise
 
 
-def compared_fits(verdict: Verdict, gone: Fit | None) -> list[Fit]:
-    """The fits whose gap is reported on the held-out runs: the named fit, or the refuted one (`gone`), then the runner-up."""
-    first, second = verdict.named or gone, verdict.runner_up
-    if first is None or second is None:
-        return [fit for fit in (first, second) if fit is not None]
-    again = first.hypothesis.effects == second.hypothesis.effects and not is_random(first.hypothesis)
-    return [first] if again else [first, second]
+def _rival(search: Search, judged: Judged) -> Fit | None:
+    """The fit of the most probable explanation that has no effect of the first one; None where none has a fit."""
+    first = judged.names
+    rivals = (search.of(names) for names in judged.explanations if names != first and not names & first)
+    return next((fit for fit in rivals if fit is not None), None)
 
 
-def _judged(contest: Contest, outcome: Confirmation, held_out: HeldOut, tried: list[Trial], jobs: int) -> Gap:
-    verdict, best, gone, _ = outcome
-    fitter, baseline = contest.rig.fitter, contest.rig.fit
-    closed = held_out.closed_by(best)
+def _gap(held_out: HeldOut, baseline: Fit, named: Fit | None, rival: Fit | None) -> Gap:
+    closed = held_out.closed_by(named or baseline)
     compared = [
-        Shrinkage(" and ".join(fit.hypothesis.effects), *held_out.closed_by(fit))
-        for fit in compared_fits(verdict, gone)
+        Shrinkage(" and ".join(fit.effects), *held_out.closed_by(fit))
+        for fit in (named, rival)
+        if fit is not None and fit.effects
     ]
-    compared.append(Shrinkage(PARAMETERS, *held_out.closed_by(baseline)))
-    blend = _in_time(lambda: flexible_differences(fitter, baseline, tried, held_out, jobs), None)
-    if blend is not None:
-        compared.append(Shrinkage("flexible residual", *held_out.closed_by_differences(blend)))
-    named = verdict.named is not None
     return Gap(
         definition=DEFINITION,
         files=tuple(run.file for run in held_out.problem.runs),
         nominal=held_out.nominal,
         retuned=held_out.retuned,
         with_effect=closed.gap,
-        shrinkage=closed.shrinkage if named else None,
-        interval_90=closed.interval_90 if named else None,
-        compared=tuple(compared),
-        refuted=verdict.refuted,
+        shrinkage=None if named is None else closed.shrinkage,
+        interval_90=None if named is None else closed.interval_90,
+        compared=(*compared, Shrinkage(PARAMETERS, *held_out.closed_by(baseline))),
     )
+
+
+def _next(seen: Witnesses, search: Search, leaders: list[Fit]) -> Experiment:
+    """The next experiment; a check by hand where the runs show a vibration that no effect makes."""
+    kinds = {vibration.kind for run in seen.evidence.runs for vibration in run.foreign}
+    if kinds:
+        return _NO_SUCH_VIBRATION if PICK_UP in kinds else _NO_SINE
+    fitter = search.rig.fitter
+    return _in_time(lambda: next_experiment(fitter.problem, fitter.nuisances, leaders), LONGER)
+
+
+def _candidates(judged: Judged, search: Search | None, named: Fit | None) -> tuple[Candidate, ...]:
+    """Every effect and none, the most probable first, with the parameters of its best fit."""
+    fits = [] if search is None else search.fits
+    alone = {fit.hypothesis.effects[0]: fit for fit in reversed(fits) if len(fit.effects) == 1}
+    chi2 = {name: round(fit.chi2, 2) for name, fit in alone.items()}
+    if search is not None:
+        chi2[NONE] = round(search.rig.fit.chi2, 2)
+    best = alone | ({} if named is None else dict.fromkeys(named.effects, named))
+    result: list[Candidate] = []
+    for name, probability in judged.effects.items():
+        fit = best.get(name)
+        if fit is None:
+            result.append(Candidate(name, probability, chi2=chi2.get(name)))
+        else:
+            form, parameters = fit.hypothesis.forms[name], estimates_of(fit)[name]
+            result.append(Candidate(name, probability, form, parameters, chi2.get(name)))
+    return tuple(result)
+
+
+def _alike(judged: Judged, effects: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
+    """The named effect and its rivals, as far as their probabilities reach; empty where the named one reaches alone."""
+    if len(effects) != 1:
+        return ()
+    names, total = list(effects), judged.effects[effects[0]]
+    for name, probability in judged.effects.items():
+        if total >= _TOGETHER * (1.0 - judged.effects[NONE]):
+            break
+        if name not in (*effects, NONE):
+            names.append(name)
+            total += probability
+    return (tuple(names),) if len(names) > 1 else ()
 
 
 def _changing(runs: list[Prepared]) -> Iterator[Finding]:
@@ -216,6 +204,10 @@ def _changing(runs: list[Prepared]) -> Iterator[Finding]:
         if seconds > _MUCH_CHANGING * length_s:
             text = f"in {seconds:.3g} of {length_s:.3g} s speed or vibration change within {SHORTEST_S:g} s: not compared there"
             yield Finding("changing", f"{run.file}: commands", f"{text}; hold each command longer")
+
+
+def _cells_of(floor: Floor, problem: Problem, predicted: Floats) -> list[Cell]:
+    return _cells(floor, differences(floor, problem, predicted))
 
 
 def _cells(floor: Floor, z: Floats) -> list[Cell]:
@@ -237,26 +229,3 @@ def _vibrating(evidence: Evidence) -> list[Cell]:
         for run in evidence.runs
         for vibration in run.foreign
     ]
-
-
-def _candidate(name: str, probability: float, fit: Fit | None) -> Candidate:
-    if fit is None:
-        return Candidate(name, probability)
-    nuisances = len(fit.deviations)
-    deviation = np.sqrt(np.diag(fit.covariance()))[nuisances:]
-    parameters = {
-        coordinate.name: estimate_of(coordinate, float(w), float(spread))
-        for coordinate, w, spread in zip(fit.hypothesis.coordinates, fit.w, deviation, strict=True)
-        if coordinate.effect == name
-    }
-    return Candidate(name, probability, fit.hypothesis.forms[name], parameters)
-
-
-def estimate_of(coordinate: Coordinate, w: float, deviation: float) -> Estimate:
-    """A parameter with its 90 % interval, from the value of its coordinate and that value's standard deviation."""
-    value, half = coordinate.value(w), 1.645 * deviation
-    if is_phase(coordinate.name):  # at most half a turn to either side, without wrapping at pi
-        half = min(half * coordinate.scale, math.pi)
-        return Estimate(value, (value - half, value + half))
-    low, high = sorted((coordinate.value(w - half), coordinate.value(w + half)))
-    return Estimate(value, (low, high))

@@ -7,10 +7,11 @@ from typing import Final
 import numpy as np
 
 from diagnosis.fits.fit import Fit
+from diagnosis.fits.held_out import FAR_FOR_NO_GAP, HeldOut
 from diagnosis.hypotheses.hypothesis import LEVELS, Hypothesis
 from diagnosis.hypotheses.nuisances import Nuisances
+from diagnosis.judge.judge import Judged
 from diagnosis.result import Gap, Kind, WrongNumber
-from diagnosis.verdict.held_out import FAR_FOR_NO_GAP, HeldOut
 
 # Distance from the described number, in tolerances, from which a number counts as wrong. Smaller: right numbers are listed, at
 # 1.6 one in half of the rigs with eight. Larger: a static force 2.96 off, which closed 12.6 of 12.6 floors, was not listed.
@@ -21,29 +22,42 @@ _MOST = 0.5
 # Distance, in tolerances, from which a number is wrong although the refitted rig leaves no gap. Smaller: right numbers are
 # named, at 2.6 in 7 % of the rigs with seven, at 2.9 in 3 %. Larger: a static force 2.96 off is not.
 _FAR = 2.9
+_HALF = 0.5
 _TWO_SIDED_90 = 1.645
 
 
 def verdict_of(
-    judged: Kind, names: tuple[str, ...], numbers: tuple[WrongNumber, ...], gap: Gap, outside: bool
+    judged: Judged, fitted: bool, numbers: tuple[WrongNumber, ...], gap: Gap, outside: bool
 ) -> tuple[Kind, tuple[str, ...]]:
-    """The verdict and the effects of the format. This is all that depends on the kind of judge.
+    """The verdict and the effects of the format.
 
     Args:
-        judged: verdict of the judge, which does not know `described`.
-        names: effects that the judge names.
+        judged: answer of the judge.
+        fitted: whether its leading explanation has a fit, so that its size and the gap that it closes are known.
         numbers: numbers that moved beyond their tolerance in the best model.
         gap: of that model, on the held-out runs.
-        outside: whether the runs show something that no effect of the library causes.
+        outside: whether a relation shows something that no effect of the library causes.
 
     """
-    if judged == "effect" and LEVELS.keys() >= set(names):
+    names = tuple(sorted(judged.names, key=lambda name: -judged.effects[name]))
+    kind = _kind(judged, fitted, gap)
+    if kind == "effect" and LEVELS.keys() >= set(names):
         return "described", names
-    least = {"unexplained": BEYOND, "no-gap": _FAR}.get(judged, math.inf)
+    least = {"unexplained": BEYOND, "no-gap": _FAR}.get(kind, math.inf)
     closing = {number.name for number in numbers if (number.share or 0.0) > _MOST and (number.off or 0.0) > least}
     if closing and gap.retuned <= FAR_FOR_NO_GAP and not outside:
         return "described", tuple(effect for effect, number in LEVELS.items() if number in closing)
-    return judged, names
+    return kind, names if kind in ("effect", "partly") else ()
+
+
+def _kind(judged: Judged, fitted: bool, gap: Gap) -> Kind:
+    complete = judged.complete >= _HALF
+    if not judged.names:
+        return "no-gap" if complete else "unexplained"
+    if complete and fitted:
+        return "effect"
+    # an explanation that predicts the held-out runs no better than the rig without effects explains nothing
+    return "unexplained" if gap.shrinkage is not None and gap.shrinkage <= 0.0 else "partly"
 
 
 def wrong_numbers(nuisances: Nuisances, fit: Fit, held_out: HeldOut | None) -> Iterator[WrongNumber]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from bridge.log.finding import Finding
 from diagnosis.gap.prepare import Prepared
+from diagnosis.judge.witnesses import Witnesses
 from diagnosis.latent.answer import LatentSignal
 from diagnosis.latent.causes import SCATTER
 from diagnosis.relations.answer import Answered, Relations
@@ -26,14 +27,9 @@ _SIGNALS = {"spring": "spring relation", "motion": "motion relation", "drive": "
 _POINTS = 1500  # most points of a curve
 
 
-def with_relations(
-    done: Diagnosis,
-    runs: list[Prepared],
-    relations: Relations,
-    decision: Decision,
-    latent: Sequence[LatentSignal],
-) -> Diagnosis:
+def with_relations(done: Diagnosis, seen: Witnesses) -> Diagnosis:
     """The diagnosis with shares, remainder and picture of relations and latent friction, and with its sentences."""
+    relations, decision, latent = seen.relations, seen.decision, seen.latent
     answered, missing = relations
     complete = done._replace(
         shares=(*(share for relation in answered for share in _shares(relation)), *latent_shares(latent)),
@@ -41,7 +37,7 @@ def with_relations(
         relations=(*map(_row, answered), *latent_rows(latent)),
         findings=(*done.findings, *_latent_findings(latent)),
         left_out=tuple(LeftOut(signal_of(relation.name), relation.why) for relation in missing),
-        pictures=(*_pictures(relations, runs), *done.pictures),
+        pictures=(*_pictures(relations, seen.runs), *done.pictures),
     )
     return complete._replace(summary=summary(complete))
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 from bridge.units import counted, percent, signal_name, times
 from diagnosis.evidence.foreign_vibration import DISTORTED, PICK_UP
+from diagnosis.fits.held_out import MORE_THAN_RIGHT
 from diagnosis.model.per_run import has_own_phases
 from diagnosis.report.words import (
     SLOW,
@@ -17,7 +18,6 @@ from diagnosis.report.words import (
     wrong_number_in_words,
 )
 from diagnosis.result import Diagnosis
-from diagnosis.verdict.held_out import MORE_THAN_RIGHT
 
 # gap of the baseline over the gap as described from which a refit makes held-out runs worse, not by chance
 _WORSE = 1.1
@@ -89,10 +89,6 @@ def _held_out(diagnosis: Diagnosis) -> Iterator[str]:
             yield "no gap is left to close there, so new data have not tested the name"
         if diagnosis.verdict == "unexplained" and gap.retuned <= 1.0:
             yield "the gap shows in the fitted runs alone"
-    if gap.refuted:
-        names = " and ".join(gap.refuted)
-        left = next((times(row.gap) for row in gap.compared if row.who == names), "more")
-        yield f"with {names}, which would explain the fitted runs, {left} are left there"
 
 
 def _others(diagnosis: Diagnosis) -> Iterator[str]:
@@ -107,12 +103,8 @@ def _others(diagnosis: Diagnosis) -> Iterator[str]:
     if diagnosis.where and diagnosis.verdict in ("partly", "unexplained", "not-finished"):
         yield _where(diagnosis)
     for row in diagnosis.candidates:
-        if row.effect in diagnosis.effects and row.form == "random":
-            yield f"{row.effect} varies at random: its scatter is known, its course is not"
-        elif row.effect in diagnosis.effects and has_own_phases(row.parameters):
+        if row.effect in diagnosis.effects and has_own_phases(row.parameters):
             yield f"the phase of {row.effect} differs from run to run, so on a run of unknown phase it counts as scatter"
-    if diagnosis.verdict == "unexplained" and diagnosis.candidates and diagnosis.candidates[0].form == "random":
-        yield f"it scatters as {diagnosis.candidates[0].effect} at random would, and as bursts of debris would"
     for finding in diagnosis.findings:
         if finding.kind == SLOW:
             yield f"the {finding.where} {SLOWLY}"

@@ -5,9 +5,11 @@ from collections.abc import Sequence
 from typing import Final
 
 from bridge.units import decimals_of, fixed_digits, interval, name_and_unit, percent, prefixed, quantity, times
+from diagnosis.fits.held_out import FAR_FOR_NO_GAP
 from diagnosis.hypotheses.catalogue import CATALOGUE
 from diagnosis.latent.answer import LatentSignal
 from diagnosis.latent.causes import NOISE, SCATTER
+from diagnosis.latent.naming import MOST
 from diagnosis.latent.rows import BREAKAWAY, SLIDING
 from diagnosis.result import (
     PARAMETERS,
@@ -19,8 +21,6 @@ from diagnosis.result import (
     Share,
     WrongNumber,
 )  # fmt: skip
-from diagnosis.verdict.by_latent import MOST
-from diagnosis.verdict.held_out import FAR_FOR_NO_GAP
 from plant.effects.library import EFFECTS
 
 EFFECT_WORDS: Final = {name: row.words for name, row in CATALOGUE.items()} | {

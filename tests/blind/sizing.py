@@ -21,21 +21,22 @@ from diagnosis.features.feature import POWERS
 from diagnosis.fits.batch import together
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
-from diagnosis.fits.retuning import FIRST_REPLICATES, REPLICATES, ROUGHNESS, roughness_of
+from diagnosis.fits.surface import ROUGHNESS, surface_of
 from diagnosis.gap.measure import Floor, cell_names, cell_squares, floor_of, replicates
 from diagnosis.gap.prepare import Prepared, prepare
 from diagnosis.gap.problem import Point, Problem
 from diagnosis.hypotheses.hypothesis import NOTHING
 from diagnosis.hypotheses.nuisances import Nuisances
-from diagnosis.verdict.judge import JITTER
 
 Floats = npt.NDArray[np.floating[Any]]
 # These numbers stay when the diagnosis' own threshold moves; otherwise scores of two versions could not be compared.
 _ALARM = 8.0  # log evidence of a detection limit
+_JITTER = 1.5  # of chi2, by which refits end in other valleys
 _OCCAM = 5.0  # log evidence that one parameter costs in most refits
-LIMIT = math.sqrt(2.0 * JITTER * (_ALARM + _OCCAM))
+LIMIT = math.sqrt(2.0 * _JITTER * (_ALARM + _OCCAM))
 # Chi2 per compared feature above which a refit goes on. Larger: a refit that stopped early counts as visible. Smaller: time.
 _MUCH = 0.6
+_FIRST_REPLICATES, _REPLICATES = 12, 32  # for the roughness, and for the floor
 _APPEARED = 4.0  # difference, in floors, of a feature that only one of two evidences shows
 
 
@@ -55,9 +56,7 @@ class Bench:
         self._nuisances = Nuisances(evidence.rig)
         self._described = self._nuisances.point(np.zeros(len(self._nuisances)), {})
         scattered = Problem(evidence.rig, [run for run in _runs(rough) if not run.holdout])
-        self._roughness = roughness_of(
-            scattered, replicates(scattered, self._described, ROUGHNESS, FIRST_REPLICATES, 1)
-        )
+        self._roughness = surface_of(scattered, replicates(scattered, self._described, ROUGHNESS, _FIRST_REPLICATES, 1))
         self._parts = [
             (problem, self._floor(problem))
             for some in ([run for run in runs if not run.holdout], [run for run in runs if run.holdout])
@@ -81,7 +80,7 @@ class Bench:
 
     def _floor(self, problem: Problem) -> Floor:
         """The noise floor; each evidence has its own, as replicates depend on the forces at the starts of its segments."""
-        return floor_of(problem, self._described, replicates(problem, self._described, self._roughness, REPLICATES, 1))
+        return floor_of(problem, self._described, replicates(problem, self._described, self._roughness, _REPLICATES, 1))
 
     def cells(self, folder: Path) -> list[list[Any]]:
         """The cells of this evidence: signal, regime, run, and difference in compressed floors.

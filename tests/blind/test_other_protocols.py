@@ -6,10 +6,10 @@ The figures of the models that called these rigs a gap are in docs/method/diagno
 from pathlib import Path
 
 import pytest
-
-from diagnosis.evidence.folder import load_evidence
 from diagnosis.fits.expected import NEVER_WITHOUT_GAP
 from diagnosis.fits.retuning import retuned_rig
+
+from diagnosis.evidence.folder import load_evidence
 from diagnosis.gap.prepare import prepare
 from diagnosis.gap.problem import Problem
 from tests.blind.generator import Case, make, runs

@@ -30,12 +30,6 @@ def of_remainder(chi2: float, features: int) -> float:
     return -0.5 * _INDEPENDENT * features * (math.log(times) - math.log1p(_SHARED * times))
 
 
-def shared(chi2: float, features: int) -> float:
-    """Share of a remainder that exceeds the noise, 0 to 1."""
-    times = _SHARED * chi2 / (NOISE * max(features, 1))
-    return times / (1.0 + times)
-
-
 def cost_of_freedom(fit: Fit, noise: float) -> float:
     """Logarithm of the volume that the data leave of the prior of nuisances and coordinates (Laplace), at most 0."""
     scaled: Floats = fit.columns / prior_of(fit.hypothesis, fit.deviations)

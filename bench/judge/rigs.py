@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import ValidationError
 
-from bench.judge.simulated.campaigns import Campaign, between, drawn_campaign
+from bench.judge.campaigns import Campaign, between, drawn_campaign
 from bridge.config import validate
 from bridge.faults import Fault
 from diagnosis.evidence.folder import examine

@@ -20,7 +20,7 @@ _DIFFERS = 10.0
 # Share of the kept runs in a relation: a cause that takes less is the remainder of the formula of another.
 _LEAST = 0.01
 _SURE = 25.0  # log evidence at which half of a pattern counts
-_SAME_SIZE = 0.01  # chance below which the sizes of two runs differ
+SAME_SIZE = 0.01  # chance below which the sizes of two runs differ
 # Effects that act in one relation alone, at a finer noise than any feature.
 _ALONE: Final = SHOWN_BY | dict.fromkeys(PIEZO_EFFECTS, "exciter")
 Names = frozenset[str]
@@ -43,7 +43,7 @@ def speaking(relations: Sequence[Answered], rig: RigTable) -> list[Answered]:
 
 def evidence_of(relations: Sequence[Answered], names: Names) -> float:
     """Log evidence of all relations for these effects against the rig without any."""
-    return math.fsum(_in_relation(answered, names) for answered in relations)
+    return math.fsum(evidence_in(answered, names) for answered in relations)
 
 
 def beyond_library(relations: Sequence[Answered], outside: Sequence[Outside]) -> float:
@@ -65,8 +65,8 @@ def shown(relations: Sequence[Answered]) -> Names:
     )
 
 
-def _in_relation(answered: Answered, names: Names) -> float:
-    """Evidence of the best set of the names that the relation knows.
+def evidence_in(answered: Answered, names: Names) -> float:
+    """Log evidence of one relation: that of the best set of the names that the relation knows.
 
     Nothing is a set as well, except for an effect that acts in this relation alone, and which the relation may exclude: where it
     forbids the sign, the effect has as little evidence as any.
@@ -97,5 +97,5 @@ def _refuted(answered: Answered) -> Names:
     idle -= {share.cause for share in shares if share.share > max(share.null_90, _LEAST)}
     if not shares:
         sizes = zip(answered.chosen.causes, answered.agreement, strict=True)
-        idle = {cause for cause, chance in sizes if chance < _SAME_SIZE}
+        idle = {cause for cause, chance in sizes if chance < SAME_SIZE}
     return frozenset(idle - LEVELS.keys())

@@ -1,0 +1,137 @@
+"""The numbers of the judge from simulated rigs: `python -m bench.judge.training KEPT` prints them for `diagnosis/judge/judge.py`.
+
+KEPT holds the ledger of every rig, one JSON file each, 20 s of CPU; a further call draws the missing rigs only.
+"""
+
+import math
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+import typer
+from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableType]
+from scipy.optimize import minimize
+from scipy.special import log_softmax
+
+from bench.judge.rigs import drawn_rig
+from bridge.arrays import Floats
+from bridge.files import read_json
+from bridge.results import strict_json, write_json
+from diagnosis.judge.judge import KNEE, Explained, explained_by, remainders
+from diagnosis.judge.ledger import Ledger
+from diagnosis.judge.witnesses import before_fits, ledger_of, with_fits
+from diagnosis.processes import one_thread
+from diagnosis.result import LedgerRow
+
+_HELD = 1e-2  # penalty on squares of the numbers. Larger: they stay near 0. Smaller: chance is learned from few rigs
+_KNOWN = 0.5  # probability of its effect from which a rig without this effect in the library counts as outside
+_BEYOND = 0.15  # of the rigs have an effect that the library lacks. More: known effects are called unknown
+
+
+class Example(NamedTuple):
+    """A rig."""
+
+    ledger: Ledger
+    effects: frozenset[str]
+
+
+class Numbers(NamedTuple):
+    """The numbers of the judge."""
+
+    explanations: Floats  # _STEEP, _REFITTED, and _PRIOR of one and two effects
+    something_else: Floats  # _ELSE, _LEFT, _LEFT_OF_KEPT
+
+
+def train(
+    kept: Annotated[Path, typer.Argument(help="Folder of the ledgers of every rig.")],
+    rigs: Annotated[int, typer.Option(min=1, help="Rigs to draw.")] = 300,
+    jobs: Annotated[int, typer.Option(min=1, help="Processes to use.")] = 1,
+) -> None:
+    """Draw the rigs that are missing in KEPT, and print the numbers."""
+    kept.mkdir(parents=True, exist_ok=True)
+    missing = [seed for seed in range(rigs) if not (kept / f"{seed}.json").exists()]
+    Parallel(n_jobs=jobs)(delayed(keep)(kept / f"{seed}.json", seed) for seed in missing)
+    examples = read(kept)
+    numbers = numbers_of(examples)
+    typer.echo(f"{len(examples)} rigs, knee {KNEE:g}")
+    typer.echo("_STEEP, _REFITTED, _PRIOR[1:] = " + ", ".join(f"{value:.2f}" for value in numbers.explanations))
+    typer.echo("_ELSE, _LEFT, _LEFT_OF_KEPT = " + ", ".join(f"{value:.2f}" for value in numbers.something_else))
+
+
+def keep(path: Path, seed: int) -> None:
+    """Draw one rig and write its ledger."""
+    rig = drawn_rig(seed)
+    if rig is None:
+        write_json(path, {})
+        return
+    with one_thread():
+        ledger = ledger_of(with_fits(before_fits(rig.evidence, 1, math.inf), lambda *_: None))
+    write_json(path, {"effects": rig.effects, "ledger": strict_json(ledger)})
+
+
+def read(kept: Path) -> list[Example]:
+    """The kept rigs."""
+    tables = [read_json(path) for path in sorted(kept.glob("*.json"))]
+    return [Example(from_json(table["ledger"]), frozenset(table["effects"])) for table in tables if table]
+
+
+def from_json(table: dict[str, Any]) -> Ledger:
+    """A ledger from its JSON."""
+    rows: list[LedgerRow] = []
+    for row in table["rows"]:
+        evidence = math.nan if row["evidence"] is None else row["evidence"]
+        rows.append(LedgerRow(**(row | {"causes": tuple(row["causes"]), "evidence": evidence})))
+    return Ledger(tuple(rows), tuple(table["possible"]), table["beyond"], table["foreign"])
+
+
+def numbers_of(examples: list[Example]) -> Numbers:
+    """The numbers of the highest likelihood."""
+    explained = [explained_by(example.ledger) for example in examples]
+    targets = [_target(each, example.effects) for each, example in zip(explained, examples, strict=True)]
+    shown = [(each.columns, target) for each, target in zip(explained, targets, strict=True) if target is not None]
+
+    def loss(numbers: Floats) -> float:
+        of_rigs = [-float(target @ log_softmax(columns @ numbers)) for columns, target in shown]
+        return float(np.mean(of_rigs)) + 0.5 * _HELD * float(numbers @ numbers)
+
+    numbers = minimize(loss, np.array([1.0, 0.0, 0.0, 0.0])).x
+    lacks = [
+        without
+        for example, each in zip(examples, explained, strict=True)
+        if (without := _without_its_effect(example, each, numbers)) is not None
+    ]
+    rows = np.array([(1.0, *remainders(ledger)) for ledger in (*(example.ledger for example in examples), *lacks)])
+    outside = np.repeat([0.0, 1.0], [len(examples), len(lacks)])
+    many = _BEYOND / (1.0 - _BEYOND) * len(examples) / max(len(lacks), 1)
+    counts = np.where(outside > 0.0, many, 1.0) / (len(examples) / (1.0 - _BEYOND))
+
+    def loss_of_else(odds: Floats) -> float:
+        scores = rows @ odds
+        return float(counts @ (np.logaddexp(0.0, scores) - outside * scores)) + 0.5 * _HELD * float(odds[1:] @ odds[1:])
+
+    return Numbers(numbers, minimize(loss_of_else, np.zeros(3)).x)
+
+
+def _target(explained: Explained, effects: frozenset[str]) -> Floats:
+    """All on the right explanation; without it, on the largest explanations within it."""
+    inside = [len(names) if names <= effects else -1 for names in explained.names]
+    most = np.array(inside) == max(inside)
+    return most / most.sum()
+
+
+def _without_its_effect(example: Example, explained: Explained, numbers: Floats) -> Ledger | None:
+    """The ledger of a library that lacks the effect that leads; None where the library did not show it."""
+    probabilities = np.exp(log_softmax(explained.columns @ numbers))
+    by_name = {
+        name: sum(p for p, names in zip(probabilities, explained.names, strict=True) if name in names)
+        for name in example.effects
+    }
+    leading = max(by_name, key=lambda name: by_name[name], default="")
+    if not leading or by_name[leading] <= _KNOWN:
+        return None
+    ledger = example.ledger
+    return ledger._replace(rows=tuple(row for row in ledger.rows if leading not in row.causes))
+
+
+if __name__ == "__main__":
+    typer.run(train)

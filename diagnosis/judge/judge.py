@@ -1,0 +1,90 @@
+"""The judge: from a ledger to probabilities of all explanations, and of something that the library lacks. It has no state.
+
+An explanation is no effect, one effect, or two. The log evidence of its rows is one sum. A softmax over the sums answers which
+effects act. A second question, with its own probability, is whether anything else acts: a right explanation leaves noise.
+"""
+
+import math
+from collections import defaultdict
+from typing import Final, NamedTuple
+
+import numpy as np
+from scipy.special import expit, softmax
+
+from bridge.arrays import Floats
+from diagnosis.judge.ledger import Ledger, Names
+
+NONE: Final = "none"
+KNEE: Final = 3.0  # log evidence up to which it counts in full: a formula that is not quite the rig's makes thousands
+# The following numbers maximise the likelihood of the truth of simulated rigs: `python -m bench.judge.training`.
+_STEEP = 2.38  # log odds of an explanation for each unit of compressed evidence
+_REFITTED = 0.92  # log odds of an explanation with a fit of its own over one that the linear model of the rig promises
+_PRIOR = (-0.99, -2.25)  # log odds of one and of two effects over none
+# Log odds that something else acts: with a right explanation's remainder, and for each e-fold of more, in fitted and kept runs.
+_ELSE, _LEFT, _LEFT_OF_KEPT = -3.0, 0.2, 1.1
+# Probability that a vibration that the library cannot make is more than a pick-up. Below a half: it alone is never reported.
+_FOREIGN = 0.8
+
+
+class Judged(NamedTuple):
+    """The answer."""
+
+    effects: dict[
+        str, float
+    ]  # probability of every effect and of NONE; the effects of a pair share its; they add up to 1
+    explanations: dict[Names, float]  # probability of every explanation, the largest first; they add up to 1
+    complete: float  # probability that nothing else acts
+
+    @property
+    def names(self) -> Names:
+        """The effects of the most probable explanation."""
+        return next(iter(self.explanations))
+
+
+class Explained(NamedTuple):
+    """The explanations of a ledger, and the numbers that decide between them."""
+
+    names: list[Names]
+    columns: Floats  # compressed evidence, whether it has a fit, whether it is one effect, two [explanations, 4]
+
+
+def judge(ledger: Ledger) -> Judged:
+    """Answer both questions."""
+    names, columns = explained_by(ledger)
+    probabilities = softmax(columns @ np.array([_STEEP, _REFITTED, *_PRIOR])).tolist()
+    explanations = dict(sorted(zip(names, probabilities, strict=True), key=lambda item: -item[1]))
+    effects = dict.fromkeys((NONE, *ledger.possible), 0.0)
+    for effects_of_one, probability in explanations.items():
+        for name in effects_of_one or {NONE}:
+            effects[name] += probability / max(len(effects_of_one), 1)
+    left, left_of_kept = remainders(ledger)
+    acts = float(expit(_ELSE + _LEFT * left + _LEFT_OF_KEPT * left_of_kept))
+    complete = (1.0 - acts) * (1.0 - ledger.beyond) * (1.0 - (_FOREIGN if ledger.foreign else 0.0))
+    return Judged(dict(sorted(effects.items(), key=lambda item: -item[1])), explanations, complete)
+
+
+def explained_by(ledger: Ledger) -> Explained:
+    """The sum of the log evidence of each explanation."""
+    total: dict[Names, float] = defaultdict(float, {frozenset(): 0.0})
+    total |= {frozenset((name,)): 0.0 for name in ledger.possible}
+    fitted: set[Names] = set()
+    for row in ledger.rows:
+        names = frozenset(row.causes)
+        if math.isfinite(row.evidence):
+            total[names] += row.evidence
+        if row.source == "fit":
+            fitted.add(names)
+    rows = [
+        (math.asinh(evidence / KNEE), names in fitted, len(names) == 1, len(names) == 2)
+        for names, evidence in total.items()
+    ]
+    return Explained(list(total), np.array(rows, np.float64))
+
+
+def remainders(ledger: Ledger) -> tuple[float, float]:
+    """The least remainder of the fitted and of the kept runs, as logarithms; 0 where there is none."""
+    fitted, kept = (
+        min((row.left for row in ledger.rows if row.source == source and row.left is not None), default=0.0)
+        for source in ("fit", "kept runs")
+    )
+    return fitted, kept
