@@ -133,7 +133,6 @@ def diagnosis() -> Diagnosis:
                 Shrinkage("drive-backlash", 1.08, 0.98, (0.95, 1.0)),
                 Shrinkage("drive-hardening", 3.1, 0.57, (0.41, 0.7)),
                 Shrinkage("parameters alone", 5.9, 0.0, None),
-                Shrinkage("flexible residual", 1.4, 0.92, (0.8, 0.97)),
             ),
         ),
         next_experiment=Experiment(

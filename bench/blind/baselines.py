@@ -10,17 +10,11 @@ Said = dict[str, Any]
 # Gap that the baseline leaves on held-out runs, in noise floors, from which these methods report a gap.
 # Too small: rigs without a gap get one. Too large: small effects are missed. Counted: docs/method/diagnosis.md.
 _NO_GAP = 1.25
-FLEXIBLE = "flexible residual"
 
 
 def parameters_only(case: Opened) -> Opened:
     """Refitting the rig's numbers alone: reports whether a gap remains, and names no effect."""
     return _gap_or_none(case, PARAMETERS)
-
-
-def flexible_residual(case: Opened) -> Opened:
-    """A blend of all effects: closes the gap as far as it can, and names no effect."""
-    return _gap_or_none(case, FLEXIBLE)
 
 
 def lowest_bic(case: Opened) -> Opened:

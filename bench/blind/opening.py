@@ -56,7 +56,6 @@ def scored(opened_set: OpenedSet) -> dict[str, Scores]:
         TOOL: cases,
         "parameters": [baselines.parameters_only(case) for case in cases],
         "BIC": [baselines.lowest_bic(case) for case in cases],
-        "flexible": [baselines.flexible_residual(case) for case in cases],
     }
     if best is not None:
         methods["oracle"] = [baselines.told(case, best.get(case.name)) for case in cases]

@@ -26,7 +26,7 @@ from diagnosis.judge.ledger import Ledger
 from diagnosis.judge.witnesses import NO_FIT, Witnesses
 from diagnosis.latent.naming import named_by
 from diagnosis.pictures.choice import pictures
-from diagnosis.report.outcome import verdict_of, wrong_numbers
+from diagnosis.report.outcome import Model, verdict_of, wrong_numbers
 from diagnosis.result import PARAMETERS, Candidate, Cell, Diagnosis, Experiment, Gap, Shrinkage, WrongNumber
 
 HOLD = Experiment(
@@ -60,11 +60,9 @@ def assembled(seen: Witnesses, ledger: Ledger, judged: Judged) -> Diagnosis:
         cells += _in_time(lambda: _cells(held_out.floor, held_out.differences(baseline)), [])
         judged_gap = _in_time(lambda: _gap(held_out, baseline, named, rival), judged_gap)
     numbers = _in_time(lambda: tuple(wrong_numbers(fitter.nuisances, best, held_out)), ())
-    kind, effects = verdict_of(judged, named is not None, numbers, judged_gap, bool(seen.decision.outside))
+    model = Model(named is not None, numbers, judged_gap, _outside(seen))
+    kind, effects = verdict_of(judged, model, named_by(seen.latent))
     cells += _vibrating(evidence)
-    latent = named_by(seen.latent)[:1]
-    if kind == "unexplained" and latent and not any(run.foreign for run in evidence.runs):
-        kind, effects, named = "partly", latent, None
     total = sum(cell.share for cell in cells)
     where = sorted((cell._replace(share=cell.share / total) for cell in cells), key=lambda cell: -cell.share)
     shown = Problem(evidence.rig, seen.runs)
@@ -95,17 +93,18 @@ def assembled(seen: Witnesses, ledger: Ledger, judged: Judged) -> Diagnosis:
 
 def _without_fits(seen: Witnesses, ledger: Ledger, judged: Judged) -> Diagnosis:
     """The diagnosis from relations and latent friction alone."""
-    kind, effects = verdict_of(judged, False, (), Gap(DEFINITION), bool(seen.decision.outside))
-    latent = named_by(seen.latent)[:1]
-    if kind in ("unexplained", "no-gap") and latent:
-        kind, effects = "partly", latent
-    if kind == "no-gap" or not seen.runs:  # the relations do not see every effect
+    model = Model(fitted=False, numbers=(), gap=Gap(DEFINITION), outside=_outside(seen))
+    kind, effects = verdict_of(judged, model, named_by(seen.latent))
+    if kind == "no-gap":  # the relations do not see every effect
         kind = "not-finished"
+    candidates = _candidates(judged, None, None)
+    if kind == "not-finished":
+        candidates = tuple(candidate._replace(probability=math.nan) for candidate in candidates)
     return Diagnosis(
         verdict=kind,
         effects=effects,
         summary=(),
-        candidates=_candidates(judged, None, None),
+        candidates=candidates,
         complete=math.nan if kind == "not-finished" else judged.complete,
         not_distinguishable=(),
         where=(),
@@ -119,6 +118,10 @@ def _without_fits(seen: Witnesses, ledger: Ledger, judged: Judged) -> Diagnosis:
         ledger=ledger.rows,
         cannot_show=seen.hidden,
     )
+
+
+def _outside(seen: Witnesses) -> bool:
+    return bool(seen.decision.outside) or any(run.foreign for run in seen.evidence.runs)
 
 
 def _in_time(work: Callable[[], R], otherwise: R) -> R:

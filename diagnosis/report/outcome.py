@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -26,38 +26,46 @@ _HALF = 0.5
 _TWO_SIDED_90 = 1.645
 
 
-def verdict_of(
-    judged: Judged, fitted: bool, numbers: tuple[WrongNumber, ...], gap: Gap, outside: bool
-) -> tuple[Kind, tuple[str, ...]]:
+class Model(NamedTuple):
+    """The model of the leading explanation."""
+
+    fitted: bool  # otherwise its size and the gap that it closes are unknown
+    numbers: tuple[WrongNumber, ...]  # described numbers that moved beyond their tolerance
+    gap: Gap  # on the held-out runs
+    outside: bool  # whether a relation, or a vibration, shows something that no effect of the library causes
+
+
+def verdict_of(judged: Judged, model: Model, latent: tuple[str, ...]) -> tuple[Kind, tuple[str, ...]]:
     """The verdict and the effects of the format.
 
     Args:
         judged: answer of the judge.
-        fitted: whether its leading explanation has a fit, so that its size and the gap that it closes are known.
-        numbers: numbers that moved beyond their tolerance in the best model.
-        gap: of that model, on the held-out runs.
-        outside: whether a relation shows something that no effect of the library causes.
+        model: the model of its leading explanation.
+        latent: effects that the latent friction shows, for runs that no formula explains.
 
     """
     names = tuple(sorted(judged.names, key=lambda name: -judged.effects[name]))
-    kind = _kind(judged, fitted, gap)
+    kind = _kind(judged, model)
     if kind == "effect" and LEVELS.keys() >= set(names):
         return "described", names
     least = {"unexplained": BEYOND, "no-gap": _FAR}.get(kind, math.inf)
-    closing = {number.name for number in numbers if (number.share or 0.0) > _MOST and (number.off or 0.0) > least}
-    if closing and gap.retuned <= FAR_FOR_NO_GAP and not outside:
+    closing = {number.name for number in model.numbers if (number.share or 0.0) > _MOST and (number.off or 0.0) > least}
+    if closing and model.gap.retuned <= FAR_FOR_NO_GAP and not model.outside:
         return "described", tuple(effect for effect, number in LEVELS.items() if number in closing)
+    hidden = kind == "no-gap" and model.gap.retuned > FAR_FOR_NO_GAP  # a gap that only the held-out runs show
+    if (kind == "unexplained" or hidden) and latent and not model.outside:
+        return "partly", latent[:1]
     return kind, names if kind in ("effect", "partly") else ()
 
 
-def _kind(judged: Judged, fitted: bool, gap: Gap) -> Kind:
+def _kind(judged: Judged, model: Model) -> Kind:
     complete = judged.complete >= _HALF
     if not judged.names:
         return "no-gap" if complete else "unexplained"
-    if complete and fitted:
+    if complete and model.fitted:
         return "effect"
     # an explanation that predicts the held-out runs no better than the rig without effects explains nothing
-    return "unexplained" if gap.shrinkage is not None and gap.shrinkage <= 0.0 else "partly"
+    return "unexplained" if model.gap.shrinkage is not None and model.gap.shrinkage <= 0.0 else "partly"
 
 
 def wrong_numbers(nuisances: Nuisances, fit: Fit, held_out: HeldOut | None) -> Iterator[WrongNumber]:

@@ -13,9 +13,9 @@ import numpy.typing as npt
 
 from diagnosis.latent.answer import LatentSignal, signal_of
 from diagnosis.latent.causes import DIRECTION, FORCE_PLACE, LOAD, PLACE, SPEED, TIME
+from diagnosis.latent.naming import named_by
 from diagnosis.latent.rows import BREAKAWAY, SLIDING, ExcessRows
 from diagnosis.processes import one_thread
-from diagnosis.verdict.by_latent import named_by
 
 Floats = npt.NDArray[np.floating[Any]]
 JUDGED = (PLACE, DIRECTION, FORCE_PLACE, TIME, SPEED, LOAD)

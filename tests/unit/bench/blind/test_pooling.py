@@ -62,7 +62,7 @@ def test_scores_are_the_same_again(tmp_path):
 def test_several_sets_count_as_one(tmp_path):
     files = [kept(tmp_path, number) for number in (1, 2)]
     together, alone = scored(pooled(files)), scored(opened_set(1))
-    assert list(together) == list(alone) == ["diagnosis", "parameters", "BIC", "flexible", "oracle"]
+    assert list(together) == list(alone) == ["diagnosis", "parameters", "BIC", "oracle"]
     for name, scores in together.items():
         assert scores.cases == 2 * alone[name].cases
         assert scores.visible.top_1.n == 2

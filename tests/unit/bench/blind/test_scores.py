@@ -173,7 +173,6 @@ def test_baselines_answer_from_the_same_result():
             "compared": [
                 {"who": "drive-damping", "shrinkage": 0.7, "interval_90": [0.6, 0.8]},
                 {"who": "parameters alone", "shrinkage": 0.0, "interval_90": None},
-                {"who": "flexible residual", "shrinkage": 0.9, "interval_90": [0.8, 1.0]},
             ],
         },
     }
@@ -187,7 +186,6 @@ def test_baselines_answer_from_the_same_result():
     assert bic.probability("none") == pytest.approx(weights[0] / sum(weights))
     assert bic.said["gap"]["shrinkage"] == 0.7
     assert baselines.parameters_only(one).verdict == "unexplained"
-    assert baselines.flexible_residual(one).said["gap"]["shrinkage"] == 0.9
     answer = baselines.told(one, 0.75)
     assert (answer.named, answer.probability("drive-damping")) == ({"drive-damping"}, 1.0)
     assert baselines.lowest_bic(one._replace(said=verdict_table | {"compared_features": 0})).verdict == "fault"

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from diagnosis.evidence.folder import load_evidence
+from diagnosis.fits.baseline import Baseline
 from diagnosis.fits.batch import together
+from diagnosis.fits.explanations import Search
 from diagnosis.fits.gauss_newton import Fitter
-from diagnosis.fits.screening import screened
-from diagnosis.fits.search import refitted
 from diagnosis.gap.measure import Floor, differences, floor_of, gap, replicates
 from diagnosis.gap.prepare import prepare
 from diagnosis.gap.problem import Problem
@@ -19,6 +19,7 @@ from diagnosis.model.rig import Roughness
 from tests.real.evidences import AXIS, MISSING, axis
 
 pytestmark = pytest.mark.slow
+SURFACE = Roughness(0.003, 2e-4, 0)
 
 
 @pytest.mark.skipif(not AXIS.is_dir(), reason=MISSING)
@@ -31,12 +32,15 @@ def test_the_offset_that_a_rigid_model_without_one_leaves(tmp_path: Path) -> Non
     fitted, held_out = (Problem(evidence.rig, [run for run in runs if run.holdout == held]) for held in (False, True))
 
     def floor(problem: Problem) -> Floor:
-        return floor_of(problem, point, replicates(problem, point, Roughness(0.003, 2e-4, 0), 12, 1))
+        return floor_of(problem, point, replicates(problem, point, SURFACE, 12, 1))
 
     fitter, judge = Fitter(fitted, floor(fitted), nuisances), floor(held_out)
     retuned = together(fitter.predicted_many, [fitter.retuning(np.zeros(len(nuisances)))])[0]
     offsets = [trial for trial in trials(fitted) if "force-sensor-bias" in trial.hypothesis.forms]
-    with_bias = refitted(fitter, retuned.chi2, screened(fitter, retuned, offsets))[0]
+    search = Search(Baseline(fitter, retuned, SURFACE), offsets, lambda _: 0.0)
+    search.run(frozenset(), lambda *_: None)
+    with_bias = search.of(frozenset(("force-sensor-bias",)))
+    assert with_bias is not None
     gaps = [
         gap(judge, differences(judge, held_out, held_out.predicted(nuisances.point(fit.deviations, fit.effects))))
         for fit in (retuned, with_bias)

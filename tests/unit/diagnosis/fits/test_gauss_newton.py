@@ -1,18 +1,16 @@
 """Refits: an effect on a number of the rig table takes over the deviation of that number."""
 
 import time
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from diagnosis.fits.batch import together
 from diagnosis.fits.fit import step_within
-from diagnosis.fits.gauss_newton import FAR_KNEE, Fitter
-from diagnosis.gap.measure import KNEE, floor_of, replicates
+from diagnosis.fits.gauss_newton import Fitter
+from diagnosis.gap.measure import floor_of, replicates
 from diagnosis.gap.problem import OutOfTimeError, Problem
 from diagnosis.hypotheses.catalogue import trials
-from diagnosis.hypotheses.hypothesis import NOTHING
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.model.rig import Roughness
 from tests.prepared import fitter_of, prepared
@@ -72,47 +70,6 @@ def test_a_rig_that_cannot_be_is_further_off_than_any_other(fitter):
         sliding.hypothesis, (described, rough), fitter.predicted(described, sliding.hypothesis.tables(rough))
     )
     assert fitter.far_chi2(yielding.hypothesis, (described, weightless), impossible) > even > 1e3
-
-
-@pytest.mark.parametrize(("left", "knees"), [(0.5, [FAR_KNEE, KNEE]), (0.99, [FAR_KNEE]), (2.0, [FAR_KNEE, KNEE])])
-def test_a_trial_ends_after_its_first_steps_where_it_gains_nothing(monkeypatch, left, knees):
-    """It goes on where it gains, and where chi2 rises: more steps may help there. The two stages are replaced by stubs."""
-    fitter, seen = Fitter.__new__(Fitter), []
-    far = SimpleNamespace(chi2=left * 100.0, deviations=np.zeros(1), w=np.zeros(1))
-
-    def fitting(*arguments):
-        seen.append(arguments[-1].knee)
-        yield from ()
-        return far
-
-    def judging(fit):
-        yield from ()
-        return fit
-
-    monkeypatch.setattr(fitter, "fitting", fitting)
-    monkeypatch.setattr(fitter, "_judging", judging)
-    (fit,) = together(lambda *_: [], [fitter.trying(NOTHING, np.zeros(1), np.zeros(1), 100.0)])
-    assert fit is far
-    assert seen == knees
-
-
-@pytest.mark.slow
-@pytest.mark.nightly  # 6 s of CPU
-def test_a_form_that_leads_nowhere_is_left_early():
-    fitter = fitter_of(*prepared("short", {"drive-damping": {"damping_Ns_per_m": 12.0}}))
-    described = np.zeros(len(fitter.nuisances))
-    base = fitter.refit(NOTHING, described, described[:0]).chi2
-
-    def tried_and_refitted(name):
-        start = start_of(fitter, name)
-        at = (start.hypothesis, described, start.w)
-        return [predictions_and_fit(fitter, work) for work in (fitter.trying(*at, base), fitter.refitting(*at))]
-
-    (tried, _), (refitted, _) = tried_and_refitted("accelerometer-gain")
-    assert tried < 0.6 * refitted
-    (_, tried), (_, refitted) = tried_and_refitted("drive-damping")
-    assert tried.chi2 < 0.5 * base
-    assert tried.chi2 < 1.05 * refitted.chi2
 
 
 @pytest.mark.slow

@@ -1,6 +1,5 @@
 """The latent friction: shares of made rows whose truth is known, and rows of made runs."""
 
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -8,12 +7,11 @@ import pytest
 
 from diagnosis.latent.answer import LatentSignal, latent_of, signal_of
 from diagnosis.latent.causes import DIRECTION, FORCE_PLACE, LOAD, NOISE, PLACE, SCATTER, TIME
+from diagnosis.latent.naming import named_by
 from diagnosis.latent.rows import BREAKAWAY, SLIDING, ExcessRows
 from diagnosis.latent.shares import LatentShare
 from diagnosis.report.relations_block import latent_rows, latent_shares
 from diagnosis.report.words import latent_line, share_in_words
-from diagnosis.verdict.by_latent import named_by, with_latent
-from diagnosis.verdict.judge import Verdict
 from tests.unit.diagnosis.relations.kinematic import rig, runs
 
 ROWS = 90
@@ -188,25 +186,6 @@ def test_a_drift_over_an_axis_that_comes_back_is_one_over_time():
     signal = signal_of(rows._replace(excess_N=rows.excess_N + 0.1 * rows.t_s))
     assert of(signal, TIME).share > 0.9
     assert named_by([signal]) == (TIME,)
-
-
-def test_unexplained_becomes_partly_by_a_named_share_and_other_verdicts_stay():
-    signal = signal_of(one_pass(0.3))
-    names = (PLACE, "none", "unexplained")
-    verdict = Verdict("unexplained", None, dict.fromkeys(names, 1.0 / 3.0), None, (), 1.0)
-    after = with_latent(verdict, [signal], None)
-    assert (after.kind, after.names) == ("partly", (PLACE,))
-    assert sum(after.probabilities.values()) == pytest.approx(1.0)
-    assert with_latent(verdict._replace(kind="no-gap"), [signal], None).kind == "no-gap"
-    assert with_latent(verdict._replace(refuted=(PLACE,)), [signal], None).kind == "unexplained"
-    assert with_latent(verdict, [signal._replace(left=signal.differs)], None).kind == "unexplained"
-
-
-@pytest.mark.parametrize(("left", "kind"), [(1.6, "no-gap"), (20.5, "partly")])
-def test_no_gap_becomes_partly_where_the_held_out_runs_show_one(left: float, kind: str):
-    verdict = Verdict("no-gap", None, dict.fromkeys((PLACE, "none", "unexplained"), 1.0 / 3.0), None, (), 1.0)
-    held_out: Any = SimpleNamespace(retuned=left)
-    assert with_latent(verdict, [signal_of(one_pass(0.3))], held_out).kind == kind
 
 
 @pytest.mark.slow

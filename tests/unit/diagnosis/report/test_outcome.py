@@ -12,7 +12,8 @@ from diagnosis.evidence.manifest import RigTable
 from diagnosis.fits.fit import Fit
 from diagnosis.hypotheses.hypothesis import Coordinate, Hypothesis
 from diagnosis.hypotheses.nuisances import Nuisances
-from diagnosis.report.outcome import verdict_of, wrong_numbers
+from diagnosis.judge.judge import Judged
+from diagnosis.report.outcome import Model, verdict_of, wrong_numbers
 from diagnosis.result import Gap, WrongNumber
 from tests import made_up
 
@@ -27,24 +28,48 @@ RIG: Any = {
 }  # fmt: skip
 
 
+NAMED = Gap("", nominal=12.6, retuned=5.0, with_effect=1.1, shrinkage=0.97)
+USELESS = NAMED._replace(with_effect=5.5, shrinkage=-0.1)
+
+
+def judged(names: tuple[str, ...], complete: float) -> Judged:
+    probabilities = dict.fromkeys(("static-level", "drive-damping", "friction-drift", "none"), 0.25)
+    return Judged(probabilities, {frozenset(names): 1.0}, complete)
+
+
 @pytest.mark.parametrize(
-    ("judged", "names", "numbers", "gap", "outside", "expected"),
+    ("names", "complete", "model", "expected"),
     [
-        ("effect", ("static-level",), (STATIC,), CLOSED, False, ("described", ("static-level",))),
-        ("effect", ("static-level", "drive-damping"), (), CLOSED, False, ("effect", ("static-level", "drive-damping"))),
-        ("partly", ("static-level",), (STATIC,), CLOSED, False, ("partly", ("static-level",))),
-        ("unexplained", (), (STATIC, IDLE), CLOSED, False, ("described", ("static-level",))),
-        ("unexplained", (), (MASS,), CLOSED, False, ("described", ())),
-        ("unexplained", (), (IDLE,), CLOSED, False, ("unexplained", ())),
-        ("unexplained", (), (STATIC,), OPEN, False, ("unexplained", ())),
-        ("unexplained", (), (STATIC,), CLOSED, True, ("unexplained", ())),
-        ("no-gap", (), (STATIC, MASS), CLOSED, False, ("described", ("static-level",))),
-        ("no-gap", (), (MASS,), CLOSED, False, ("no-gap", ())),
-        ("not-finished", (), (STATIC,), CLOSED, False, ("not-finished", ())),
+        (("drive-damping",), 0.9, Model(True, (), NAMED, False), ("effect", ("drive-damping",))),
+        (("drive-damping",), 0.1, Model(True, (), NAMED, False), ("partly", ("drive-damping",))),
+        (("drive-damping",), 0.1, Model(True, (), USELESS, False), ("unexplained", ())),
+        (("drive-damping",), 0.9, Model(False, (), CLOSED, False), ("partly", ("drive-damping",))),
+        ((), 0.9, Model(True, (), CLOSED, False), ("no-gap", ())),
+        ((), 0.1, Model(True, (), OPEN, False), ("unexplained", ())),
+        (("static-level",), 0.9, Model(True, (STATIC,), CLOSED, False), ("described", ("static-level",))),
+        (("static-level",), 0.1, Model(True, (STATIC,), CLOSED, False), ("partly", ("static-level",))),
+        ((), 0.1, Model(True, (STATIC, IDLE), CLOSED, False), ("described", ("static-level",))),
+        ((), 0.1, Model(True, (MASS,), CLOSED, False), ("described", ())),
+        ((), 0.1, Model(True, (IDLE,), CLOSED, False), ("unexplained", ())),
+        ((), 0.1, Model(True, (STATIC,), OPEN, False), ("unexplained", ())),
+        ((), 0.1, Model(True, (STATIC,), CLOSED, True), ("unexplained", ())),
+        ((), 0.9, Model(True, (STATIC, MASS), CLOSED, False), ("described", ("static-level",))),
+        ((), 0.9, Model(True, (MASS,), CLOSED, False), ("no-gap", ())),
     ],
 )
-def test_a_verdict_is_described_where_numbers_alone_close_the_gap(judged, names, numbers, gap, outside, expected):
-    assert verdict_of(judged, names, numbers, gap, outside) == expected
+def test_the_verdict_follows_from_both_answers_and_from_the_model(
+    names: tuple[str, ...], complete: float, model: Model, expected: tuple[str, tuple[str, ...]]
+) -> None:
+    assert verdict_of(judged(names, complete), model, ()) == expected
+
+
+def test_latent_friction_names_a_part_only_where_no_formula_explains_the_runs() -> None:
+    latent = ("friction-drift", "position-dependent-friction")
+    unexplained, fine = judged((), 0.1), judged((), 0.9)
+    assert verdict_of(unexplained, Model(True, (), OPEN, False), latent) == ("partly", latent[:1])
+    assert verdict_of(unexplained, Model(True, (), OPEN, True), latent) == ("unexplained", ())
+    assert verdict_of(fine, Model(True, (), CLOSED, False), latent) == ("no-gap", ())
+    assert verdict_of(fine, Model(True, (), OPEN, False), latent) == ("partly", latent[:1])
 
 
 def fitted(nuisances: Nuisances, deviations: dict[str, float], level: float | None) -> Fit:

@@ -48,7 +48,6 @@ def test_the_answer_comes_first_and_everything_is_there_in_order(tmp_path):
         "These runs cannot separate: force-sensor-delay, drive-damping",
         "How far is the model off?",
         "closes 98 % of the gap that the baseline leaves open (90 %: 95 % to 100 %)",
-        "flexible residual",
         "What do the relations between the channels show?",
         "spring relation: 0.8 N as described, 0.3 N refitted, noise 12 mN",
         "drive-backlash 73 % 61 % to 92 % 12 %",
@@ -245,13 +244,6 @@ def test_without_a_fit_the_probabilities_are_unknown():
     assert lines["numbers"] == "none was refitted"
 
 
-@pytest.mark.parametrize(("form", "expected"), [("random", True), ("sine", False)])
-def test_an_unexplained_verdict_names_a_random_effect_that_would_scatter_likewise(form, expected):
-    nearest = (Candidate("normal-load-fluctuation", 0.9, form), Candidate("none", 0.1))
-    lines = by_label(made_up.diagnosis()._replace(verdict="unexplained", effects=(), candidates=nearest))
-    assert ("it scatters as normal-load-fluctuation at random would" in lines["else"]) is expected
-
-
 def test_the_summary_agrees_with_the_held_out_runs():
     made = made_up.diagnosis()
     worse = made._replace(gap=made.gap._replace(retuned=2.9, with_effect=3.6, shrinkage=-0.37))
@@ -259,13 +251,6 @@ def test_the_summary_agrees_with_the_held_out_runs():
     refit_worse = made._replace(gap=made.gap._replace(retuned=7.9))
     assert (
         by_label(refit_worse)["numbers"] == "the refitted numbers make the held-out runs worse: keep the described ones"
-    )
-    two = ("coulomb-level", "drive-backlash")
-    gap = made.gap._replace(refuted=two, compared=(Shrinkage(" and ".join(two), 5.0, 0.1, None),))
-    lines = by_label(made._replace(verdict="unexplained", effects=(), gap=gap))
-    assert (
-        "with coulomb-level and drive-backlash, which would explain the fitted runs, 5 are left there"
-        in lines["held out"]
     )
     assert units.percent(-0.003) == "0 %"
 
