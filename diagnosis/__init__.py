@@ -15,11 +15,11 @@ model/          prediction of one run under the commands of that run, as its sen
 synthetic/      evidence made from the plant
 gap/            measured features against predicted features, in noise floors
 relations/      relations between channels as regressions over all samples, without a simulation; share of each cause
-latent/         latent friction: shares of place, direction, time, speed and load in the friction, from a mixed model
+latent/         latent friction: shares of place, direction, time, speed and load in the friction, as predictions
 hypotheses/     nuisances, effects in every form, and the points where their fits start
 fits/           refits: a single fit, many at once, the search over all effects
 pictures/       measured and predicted curves; residuals over the variable that explains them
-verdict/        whether there is a gap, which effect closes it, how sure that is, and the check on held-out runs
+judge/          all witnesses, the ledger of their log evidence, and the judge: which effects, and whether anything else acts
 experiments/    the next run to measure, and checks by hand
 report/         the answer in words, as a page, as a rig file; the shares come from relations and latent
 """

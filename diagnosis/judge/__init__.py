@@ -1,6 +1,7 @@
 """Which effects a rig has, and whether anything else acts: one log evidence for each explanation, and two questions.
 
-evidence    the log evidence of a fit: its remainder, and the cost of its freedom
-ledger      the rows of all witnesses: fits, kept runs, relations, latent friction
-judge       the ledger's answer, without state
+witnesses   relations, latent friction, fits and held-out runs of an evidence, as far as they end in time
+relations   the log evidence of the relations for an explanation
+ledger      the rows of all witnesses
+judge       the answer to a ledger, without state
 """
