@@ -64,7 +64,7 @@ def judge(ledger: Ledger) -> Judged:
 
 
 def explained_by(ledger: Ledger) -> Explained:
-    """The sum of the log evidence of each explanation."""
+    """The log evidence of each explanation. That of a second effect is compressed by itself, or a large first one hides it."""
     total: dict[Names, float] = defaultdict(float, {frozenset(): 0.0})
     total |= {frozenset((name,)): 0.0 for name in ledger.possible}
     fitted: set[Names] = set()
@@ -74,10 +74,12 @@ def explained_by(ledger: Ledger) -> Explained:
             total[names] += row.evidence
         if row.source == "fit":
             fitted.add(names)
-    rows = [
-        (math.asinh(evidence / KNEE), names in fitted, len(names) == 1, len(names) == 2)
-        for names, evidence in total.items()
-    ]
+
+    def compressed(names: Names) -> float:
+        first = max((total[frozenset((name,))] for name in names), default=0.0)
+        return math.asinh(first / KNEE) + math.asinh((total[names] - first) / KNEE)
+
+    rows = [(compressed(names), names in fitted, len(names) == 1, len(names) == 2) for names in total]
     return Explained(list(total), np.array(rows, np.float64))
 
 

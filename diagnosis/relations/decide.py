@@ -135,7 +135,8 @@ def _decided(answered: Answered) -> list[Decided]:
     for number, term in enumerate(answered.chosen.terms):
         lost, share = answered.lost[number], shares.get((term.cause, term.form))
         # a number beyond its tolerance: the refitted rig follows it, so it closes nothing that the baseline leaves
-        borne_out = share is None or share.share > share.null_90 or term.cause in _LEVELS
+        tested = share is not None and share.expected > share.null_90 and term.cause not in _LEVELS
+        borne_out = share is None or not tested or share.share > share.null_90
         if (
             lost > limit
             and lost > _ADDS * answered.chosen.evidence

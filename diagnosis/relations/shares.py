@@ -31,6 +31,7 @@ class RelationShare(NamedTuple):
     share: float
     interval_90: tuple[float, float]
     null_90: float  # share that noise alone would give this cause in 9 of 10
+    expected: float  # share of the size that was fitted; below the null the held-out runs cannot refute it
 
 
 class Shares(NamedTuple):
@@ -69,6 +70,7 @@ def shares_of(
         share = (ways[number] - ways[number + 1]) / ways[0]
         low, high = np.quantile(share, _LEVELS)
         null = _null(products, held_out, noise, steps[number + 1], term)
+        change = _padded(steps[number + 1].size, width) - _padded(steps[number].size, width)
         causes.append(
             RelationShare(
                 term.cause,
@@ -76,6 +78,7 @@ def shares_of(
                 (squares[number] - squares[number + 1]) / squares[0],
                 (float(low), float(high)),
                 null,
+                float(change @ total[:-1, :-1] @ change) / squares[0],
             )
         )
     rest = np.maximum(ways[-1] - least, 0.0) / ways[0]
