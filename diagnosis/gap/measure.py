@@ -79,22 +79,6 @@ class Floor(NamedTuple):
         """
         return logarithms(predicted + self.bias, self.powers)
 
-    def of_features(self, mask: npt.NDArray[np.bool_]) -> "Floor":
-        """The floor of the features marked in `mask` [features]: all features of one or several runs.
-
-        Runs are independent of each other, so the whitening may be cut at their borders.
-        """
-        rows = mask[self.compared]
-        return Floor(
-            bias=self.bias[mask],
-            powers=self.powers[mask],
-            scatter=self.scatter[mask],
-            compared=self.compared[mask],
-            whitening=self.whitening[rows][:, rows],
-            cells=tuple(cell for cell, marked in zip(self.cells, rows, strict=True) if marked),
-            level=self.level,
-        )
-
 
 def compress(z: Floats, knee: float = KNEE) -> Floats:
     """Function T of the definition of the gap, of `z` in noise floors; fits begin with a larger knee."""

@@ -1,7 +1,7 @@
 """Every effect of the diagnosis: its meaning, the residual that shows it, how each form is tried, the check by hand.
 
 The physics is in `plant.effects`. A form that is missing here is not tried: it is a random form, whose path no prediction can
-follow; `diagnosis.fits.random_friction` searches for it.
+follow.
 """
 
 from collections.abc import Callable, Sequence

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis.fits.batch import together
+from diagnosis.fits.estimates import estimate_of
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.gap.measure import floor_of, replicates
 from diagnosis.gap.problem import Problem
@@ -16,7 +17,6 @@ from diagnosis.hypotheses.starts import wave_trial
 from diagnosis.hypotheses.waves import Wave
 from diagnosis.model.per_run import PHASE, as_in_rig_file, has_own_phases, in_run, is_phase, of_run
 from diagnosis.model.rig import Roughness
-from diagnosis.report.assemble import estimate_of
 from diagnosis.report.words import estimate_in_words
 from diagnosis.result import Estimate
 from tests.prepared import prepared
