@@ -24,9 +24,10 @@ def of_remainder(chi2: float, features: int) -> float:
 
     A formula that differs a little from the rig leaves more than the noise, in all explanations alike. So the ratio of two
     remainders counts, and it counts less where both are large: d value / d log(chi2) = - independent differences / 2, which are
-    few where errors of formulas, each smooth over many features, make most of the remainder.
+    few where errors of formulas, each smooth over many features, make most of the remainder. Below the noise a remainder is
+    chance.
     """
-    times = max(chi2, 1e-9) / (NOISE * max(features, 1))
+    times = max(chi2 / (NOISE * max(features, 1)), 1.0)
     return -0.5 * _INDEPENDENT * features * (math.log(times) - math.log1p(_SHARED * times))
 
 

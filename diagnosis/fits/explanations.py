@@ -73,11 +73,21 @@ class Search:
                 progress(f"best single effect: {', '.join(lead.effects)}; looking for a second", 0.65)
                 self.fits += self._pairs(promises.pairs, lead, shown)
 
+    def fitted(self, names: Names) -> Fit | None:
+        """The fit of these effects; None without one."""
+        return next((fit for fit in self.fits if frozenset(fit.effects) == names), None)
+
+    def add(self, names: Names) -> bool:
+        """Fit these effects; False where that was done, or no trial has them."""
+        if self.fitted(names) is not None or (start := self.promised.get(names) or self._beside(names)) is None:
+            return False
+        self.fits += refitted(self.rig.fitter, [start], 1)
+        return True
+
     def of(self, names: Names) -> Fit | None:
         """The fit of these effects, refitted as long as that gains; None where no trial has them."""
-        fit = next((fit for fit in self.fits if frozenset(fit.effects) == names), None)
-        if fit is None and (start := self.promised.get(names)):
-            fit = refitted(self.rig.fitter, [start], 1)[0]
+        self.add(names)
+        fit = self.fitted(names)
         if fit is None or not names:
             return fit
         return together(self.rig.fitter.predicted_many, [self.rig.fitter.going_further(fit)])[0]
@@ -99,6 +109,12 @@ class Search:
             if id(trial) in kept
         ]
         return of_changes(fitter, fit, trials, changes, paired)
+
+    def _beside(self, names: Names) -> Screened | None:
+        """The start of two effects on top of the better fit of one of them."""
+        alone = [fit for fit in self.fits[1:] if names > set(fit.effects)]
+        starts = self._promises(min(alone, key=lambda fit: fit.chi2)).singles if alone else []
+        return next((start for start in starts if frozenset(start.hypothesis.effects) == names), None)
 
     def _improve_baseline(self, singles: Sequence[Fit]) -> None:
         """Refit the rig from the numbers of its nearest rival as well: more starts find deeper valleys of chi2."""

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from diagnosis.judge import witnesses
+from diagnosis.judge.ledger import Ledger
 from diagnosis.judge.witnesses import Witnesses, with_fits
 
 
@@ -29,8 +30,9 @@ def test_nothing_leaks_from_the_held_out_run(monkeypatch: pytest.MonkeyPatch) ->
         "ruled_out": lambda *_: set(),
         "trials": lambda _: [],
         "baseline_of": baseline,
-        "Search": lambda rig, *_: SimpleNamespace(rig=rig, fits=[fit], run=lambda *_: None),
+        "Search": lambda rig, *_: SimpleNamespace(rig=rig, fits=[fit], run=lambda *_: None, add=lambda _: False),
         "HeldOut": held_out,
+        "ledger_of": lambda _: Ledger((), (), 0.0, foreign=False),
     }.items():
         monkeypatch.setattr(witnesses, name, stand_in)
     rig = SimpleNamespace(drive_stiffness_N_per_m=0.0, static_force_N=1.0)

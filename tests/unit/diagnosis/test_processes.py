@@ -25,10 +25,10 @@ def seen(_shared: None, wanted: int) -> set[int]:
 
 
 def test_a_diagnosis_has_one_thread_wherever_it_works(monkeypatch):
-    def stop(_evidence):
+    def stop(*_):
         raise _SeenError(threads())
 
-    monkeypatch.setattr(diagnose, "prepare", stop)
+    monkeypatch.setattr(diagnose, "before_fits", stop)
     with threadpool_limits(limits=2):
         assert threads() == {2}
         with pytest.raises(_SeenError, match=r"\{1\}"):
