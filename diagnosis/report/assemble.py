@@ -28,6 +28,7 @@ from diagnosis.latent.naming import named_by
 from diagnosis.pictures.choice import pictures
 from diagnosis.report.outcome import Model, verdict_of, wrong_numbers
 from diagnosis.result import PARAMETERS, Candidate, Cell, Diagnosis, Experiment, Gap, Shrinkage, WrongNumber
+from plant.effects.library import EFFECTS
 
 HOLD = Experiment(
     f"Hold each speed and each vibration for {SHORTEST_S:g} s or more in some runs.",
@@ -176,7 +177,8 @@ def _candidates(judged: Judged, search: Search | None, named: Fit | None) -> tup
         chi2[NONE] = round(search.rig.fit.chi2, 2)
     best = alone | ({} if named is None else dict.fromkeys(named.effects, named))
     result: list[Candidate] = []
-    for name, probability in judged.effects.items():
+    excluded = dict.fromkeys((name for name in EFFECTS if name not in judged.effects), 0.0)
+    for name, probability in (judged.effects | excluded).items():
         fit = best.get(name)
         if fit is None:
             result.append(Candidate(name, probability, chi2=chi2.get(name)))

@@ -65,8 +65,6 @@ def _sure(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"these runs cannot separate {', '.join(group)}"
     if diagnosis.verdict == "no-gap":
         yield "an effect too small to show here is not excluded"
-    if not known:
-        yield "the probabilities are unknown, as no simulated fit was made"
 
 
 def _held_out(diagnosis: Diagnosis) -> Iterator[str]:

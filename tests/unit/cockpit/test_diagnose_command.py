@@ -62,7 +62,7 @@ def test_all_prints_candidates_relations_and_data_below_the_answer(tmp_path):
         "           3.1 with drive-hardening, 57 % closed",
         "           5.9 with baseline, 0 % closed",
     ]
-    assert lines[after + 5 : after + 12] == [
+    assert lines[after + 4 : after + 11] == [
         "relations  spring relation: 0.8 N as described, 0.3 N refitted, noise 12 mN",
         "             drive-backlash 73 % (90 %: 61 % to 92 %); chance alone shows up to 12 %",
         "             noise 25 %",

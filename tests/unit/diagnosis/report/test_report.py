@@ -236,11 +236,8 @@ def test_a_number_that_no_effect_stands_for_has_no_rival_candidates():
     )
 
 
-def test_without_a_fit_the_probabilities_are_unknown():
-    made = made_up.diagnosis()
-    candidates = tuple(row._replace(probability=NAN) for row in made.candidates)
-    lines = by_label(made._replace(verdict="partly", candidates=candidates, complete=NAN, rig=(), numbers=()))
-    assert "the probabilities are unknown, as no simulated fit was made" in lines["sure"]
+def test_without_a_fit_no_number_was_refitted():
+    lines = by_label(made_up.diagnosis()._replace(verdict="partly", rig=(), numbers=()))
     assert lines["numbers"] == "none was refitted"
 
 
