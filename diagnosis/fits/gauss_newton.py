@@ -163,7 +163,7 @@ class Fitter:
         return self._chi2(prior_of(hypothesis, at[0]), residual, np.concatenate(at))
 
     def refitting(self, hypothesis: Hypothesis, deviations: Floats, w: Floats) -> Work[Fit]:
-        """As `refit`, as a work that proceeds beside others."""
+        """As `refit`, as a work that proceeds with others."""
         (predicted,) = yield Question([(deviations, hypothesis.tables(w))])
         if np.abs(differences(self.floor, self.problem, predicted)).max() > _FAR_OFF:
             fit = yield from self.fitting(hypothesis, deviations, w, _FAR)

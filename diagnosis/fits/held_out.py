@@ -1,6 +1,6 @@
 """How far an explanation closes the gap, on runs that no fit has seen.
 
-The held-out runs are a problem of their own: the fitter that knows the fitted runs never holds them, so nothing can leak.
+The held-out runs are another problem: the fitter that knows the fitted runs never holds them, so nothing can leak.
 """
 
 import math
@@ -37,7 +37,7 @@ class GapLeft(NamedTuple):
 
 
 class HeldOut:
-    """The held-out runs and their floor, which is that of the fit `best`.
+    """The held-out runs and their floor, under the fit `best`.
 
     Attributes:
         problem: the held-out runs.

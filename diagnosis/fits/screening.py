@@ -1,4 +1,4 @@
-"""An estimate of what each trial and each pair of trials gains, from one prediction a trial: enough to choose what to refit.
+"""An estimate of the gain of each trial and each pair of trials, from one prediction a trial: enough to choose the refits.
 
 All directions are freed of the nuisances, which move along. From their inner products follow the gains of every trial alone and
 of every pair of trials; no further prediction is needed.
@@ -27,7 +27,7 @@ _PAIRS = 8  # of effects that a screening keeps
 class Screened(NamedTuple):
     """A trial with a better start, and the chi2 that would be left if the model were linear."""
 
-    hypothesis: Hypothesis  # the trial's effects together with those of the fit that the trial is added to
+    hypothesis: Hypothesis  # the trial's effects, and the effects of the fit that the trial is added to
     deviations: Floats  # start of the nuisances, in tolerances [nuisances]
     w: Floats  # start of the coordinates [coordinates]
     chi2: float  # infinite for a start that was not screened
@@ -52,7 +52,7 @@ class Column(NamedTuple):
 class Directions:
     """The columns of a fit's nuisances and coordinates, which may move along with a further direction.
 
-    A nuisance at its bound stays there; if it went beyond, it would take what an effect causes (docs/method/diagnosis.md).
+    A nuisance at its bound stays there; if it went beyond, it would take the place of an effect (docs/method/diagnosis.md).
     """
 
     def __init__(self, fit: Fit, most: Floats) -> None:
@@ -162,6 +162,6 @@ def _start(base: Fit, directions: Directions, columns: list[Column], sizes: list
     count = len(base.deviations)
     deviations = np.clip(moved[:count], -_FURTHEST_TOLERANCES, _FURTHEST_TOLERANCES)
     unmoved = np.concatenate(coordinates)
-    # a large effect may have pulled the nuisances into a valley of their own: where the rig is described is a start as well
+    # a large effect may have pulled the nuisances into another valley: the rig as described is a start as well
     others = ((base.deviations, unmoved), (np.zeros_like(base.deviations), unmoved))
     return Screened(hypothesis, deviations, np.concatenate([moved[count:], *coordinates[1:]]), chi2, others)

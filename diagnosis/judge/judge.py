@@ -1,6 +1,6 @@
 """The judge: from a ledger to probabilities of all explanations, and of something that the library lacks. It has no state.
 
-An explanation is no effect, one effect, or two. The log evidence of its rows is one sum. A softmax over the sums answers which
+Explanations are: no effect, one effect, two effects. The log evidence of its rows is one sum. A softmax over the sums answers which
 effects act. A second question, with its own probability, is whether anything else acts: a right explanation leaves noise.
 """
 
@@ -18,7 +18,7 @@ NONE: Final = "none"
 KNEE: Final = 3.0  # log evidence up to which it counts in full: a formula that is not quite the rig's makes thousands
 # The following numbers maximise the likelihood of the truth of simulated rigs: `python -m bench.judge.training`.
 _STEEP = 0.96  # log odds of an explanation for each unit of compressed evidence
-_REFITTED = 2.31  # log odds of an explanation with a fit of its own over one that the linear model of the rig promises
+_REFITTED = 2.31  # log odds of a fitted explanation over a promise of the linear model of the rig
 _PRIOR = (-1.3, -2.78)  # log odds of one and of two effects over none
 # Log odds that something else acts: with a right explanation's remainder, and for each e-fold of more, in fitted and kept runs.
 _ELSE, _LEFT, _LEFT_OF_KEPT = -2.59, 0.02, 0.62
@@ -64,7 +64,7 @@ def judge(ledger: Ledger) -> Judged:
 
 
 def explained_by(ledger: Ledger) -> Explained:
-    """The log evidence of each explanation. That of a second effect is compressed by itself, or a large first one hides it."""
+    """The log evidence of each explanation. The second effect of a pair is compressed by itself, or a large first one hides it."""
     total: dict[Names, float] = defaultdict(float, {frozenset(): 0.0})
     total |= {frozenset((name,)): 0.0 for name in ledger.possible}
     fitted: set[Names] = set()
@@ -84,7 +84,7 @@ def explained_by(ledger: Ledger) -> Explained:
 
 
 def remainders(ledger: Ledger) -> tuple[float, float]:
-    """The least remainder of the fitted and of the kept runs, as logarithms; 0 where there is none."""
+    """The least remainder of the fitted and of the kept runs, as logarithms; 0 without any."""
     fitted, kept = (
         min((row.left for row in ledger.rows if row.source == source and row.left is not None), default=0.0)
         for source in ("fit", "kept runs")

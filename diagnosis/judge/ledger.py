@@ -1,4 +1,4 @@
-"""The ledger: what every witness says about every explanation, in log evidence against no effect."""
+"""The ledger: the log evidence of every witness for every explanation, against no effect."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -59,7 +59,7 @@ def by_relations(explanations: Sequence[Names], answered: Sequence[Answered]) ->
 
 
 def by_latent(latent: Sequence[LatentSignal]) -> Iterator[LedgerRow]:
-    """The rows of the latent friction: shares, which are no evidence for a formula."""
+    """The rows of the latent friction: shares, without evidence for a formula."""
     for signal in latent:
         for share in signal.shares:
             if share.null_90 is not None:

@@ -66,7 +66,7 @@ def shown(relations: Sequence[Answered]) -> Names:
 
 
 def evidence_in(answered: Answered, names: Names) -> float:
-    """Log evidence of one relation: that of the best set of the names that the relation knows.
+    """Log evidence of one relation: its best set of the names that it knows.
 
     Nothing is a set as well, except for an effect that acts in this relation alone, and which the relation may exclude: where it
     forbids the sign, the effect has as little evidence as any.

@@ -50,7 +50,7 @@ class Witnesses(NamedTuple):
 
 
 def before_fits(evidence: Evidence, jobs: int, until_s: float) -> Witnesses:
-    """The runs, the relations and the latent friction; what does not end by `until_s` of `time.monotonic` is left out."""
+    """The runs, the relations and the latent friction, as far as they end by `until_s` of `time.monotonic`."""
     seen = Witnesses(evidence, [], until_s=until_s, jobs=jobs)
     with suppress(OutOfTimeError), limited(until_s):
         seen = seen._replace(runs=prepare(evidence))
