@@ -23,8 +23,9 @@ from plant.effects.library import EFFECTS
 
 NONE = "none"
 _SHARES = {0: 0.2, 1: 0.6, 2: 0.2}  # of rigs without, with one and with two effects
-# Size of an effect in the catalogue's scale, which is clearly visible. Smaller: the judge learns to doubt `none`, as invisible effects
-# look like it (at 0.3 a rig without a gap has a probability of 0.5 for none). Larger: small effects are not learned.
+# Size of an effect in the catalogue's scale, which is clearly visible. Smaller: the judge learns to doubt `none`, as
+# invisible effects look like it (at 0.3 a rig without a gap has a probability of 0.5 for none). Larger: small effects are not
+# learned.
 _TIMES = (0.8, 5.0)
 _TIMES_OF_LEVEL = (0.8, 3.0)  # of 10 %: a smaller one is within 2.5 tolerances
 # Scatter of the friction along the track, of a bench and of any machine, and its length. Narrower: every real surface is an

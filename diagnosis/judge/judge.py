@@ -1,7 +1,7 @@
 """The judge: from a ledger to probabilities of all explanations, and of something that the library lacks. It has no state.
 
-Explanations are: no effect, one effect, two effects. The log evidence of its rows is one sum. A softmax over the sums answers which
-effects act. A second question, with its own probability, is whether anything else acts: a right explanation leaves noise.
+Explanations are: no effect, one effect, two effects. The log evidence of its rows is one sum. A softmax over the sums answers
+which effects act. A second question, with its own probability, is whether anything else acts: a right explanation leaves noise.
 """
 
 import math
@@ -64,7 +64,7 @@ def judge(ledger: Ledger) -> Judged:
 
 
 def explained_by(ledger: Ledger) -> Explained:
-    """The log evidence of each explanation. The second effect of a pair is compressed by itself, or a large first one hides it."""
+    """The log evidence of each explanation. The second effect of a pair is compressed by itself, or the first one hides it."""
     total: dict[Names, float] = defaultdict(float, {frozenset(): 0.0})
     total |= {frozenset((name,)): 0.0 for name in ledger.possible}
     fitted: set[Names] = set()
