@@ -5,14 +5,12 @@
 
 cases      cases and their answers; the fixed halves: designs are developed on half a and decided on half b
 methods    the methods by name, and their kept answers: a method that did not change is not asked again
-refits     the diagnosis' own verdict, and BIC over its single refits, from kept fits (fits.json.gz)
+refits     the verdict of the diagnosis, and BIC over single refits of an earlier version, from kept fits (fits.json.gz)
 lines      straight lines over all samples, ranked by evidence
 columns    their columns, by relation
 trees      trees on rigs that the plant simulates under the campaign at hand
 features   the inputs of the trees
-linear/    evidence of the linearised, then refitted rig, of relations and of kept runs
-simulated/ witnesses weighed on simulated rigs
-weighed/   the evidences of both designs for each explanation, weighed on simulated rigs
+training   the numbers of the judge, from simulated rigs; campaigns, rigs: the rigs and their runs
 scoring    right, wrong and cost of every method
 command    the command line
 """

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from itertools import combinations
 from typing import NamedTuple
 
 from diagnosis.fits.evidence import NOISE, cost_of_freedom, of_remainder
@@ -40,8 +41,7 @@ def explanations_of(possible: Sequence[str], search: Search | None, answered: Se
         alone = {names: left for names, left in search.left.items() if len(names) == 1}
         leading |= {name for names in sorted(alone, key=lambda names: alone[names])[:_BEST] for name in names}
         pairs = {names for names in search.left if len(names) == 2}
-    order = sorted(leading & set(possible))
-    pairs |= {frozenset((one, other)) for one in order for other in order if one < other}
+    pairs |= {frozenset(pair) for pair in combinations(leading & set(possible), 2)}
     return [*singles, *sorted(pairs, key=sorted)]
 
 
