@@ -93,7 +93,7 @@ def _refuted(answered: Answered) -> Names:
     A number beyond its tolerance is never refuted so: the refitted rig follows it, and it closes no further part.
     """
     shares = () if answered.shares is None else answered.shares.causes
-    idle = {share.cause for share in shares if share.expected > max(share.null_90, _LEAST)}
+    idle = {share.cause for share in shares if share.expected > share.null_90}
     idle -= {share.cause for share in shares if share.share > max(share.null_90, _LEAST)}
     if not shares:
         sizes = zip(answered.chosen.causes, answered.agreement, strict=True)

@@ -54,3 +54,16 @@ def test_the_fit_of_the_named_effect_goes_to_its_end(seen: Witnesses) -> None:
     assert fit.finished
     assert fit.effects[DAMPING]["damping_Ns_per_m"] == pytest.approx(12.0, rel=0.2)
     assert seen.search.of(frozenset(("no such effect",))) is None
+
+
+@pytest.mark.slow
+def test_an_explanation_that_is_only_promised_is_fitted_once(seen: Witnesses) -> None:
+    search = seen.search
+    assert search is not None
+    promised = next(names for names in search.promised if len(names) == 2 and search.fitted(names) is None)
+    assert search.add(promised)
+    fit = search.fitted(promised)
+    assert fit is not None
+    assert search.left[promised] == fit.chi2
+    assert not search.add(promised)
+    assert not search.add(frozenset())
