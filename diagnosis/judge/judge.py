@@ -17,11 +17,11 @@ from diagnosis.judge.ledger import Ledger, Names
 NONE: Final = "none"
 KNEE: Final = 3.0  # log evidence up to which it counts in full: a formula that is not quite the rig's makes thousands
 # The following numbers maximise the likelihood of the truth of simulated rigs: `python -m bench.judge.training`.
-_STEEP = 0.96  # log odds of an explanation for each unit of compressed evidence
-_REFITTED = 2.31  # log odds of a fitted explanation over a promise of the linear model of the rig
-_PRIOR = (-1.3, -2.78)  # log odds of one and of two effects over none
+_STEEP = 0.63  # log odds of an explanation for each unit of compressed evidence
+_REFITTED = 2.2  # log odds of a fitted explanation over a promise of the linear model of the rig
+_PRIOR = (-0.88, -2.83)  # log odds of one and of two effects over none
 # Log odds that something else acts: with a right explanation's remainder, and for each e-fold of more, in fitted and kept runs.
-_ELSE, _LEFT, _LEFT_OF_KEPT = -2.59, 0.02, 0.62
+_ELSE, _LEFT, _LEFT_OF_KEPT = -3.64, 0.52, 0.59
 # Probability that a vibration that the library cannot make is more than a pick-up. Below a half: it alone is never reported.
 _FOREIGN = 0.8
 
