@@ -9,17 +9,19 @@ from pydantic import TypeAdapter, ValidationError
 from bridge.faults import Fault
 from bridge.guard.config import VibrationLimits
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.channels import CHANNELS
 from bridge.wire.payloads import refuse_other_schema
-from controller.config import ControllerConfig, within
+from controller.config import ControllerConfig, seeing, within
 
 _LIMITS = TypeAdapter(VibrationLimits)
 
 
 def for_rig(header: wire.Header | None, config: ControllerConfig) -> ControllerConfig:
-    """The configuration with the limits of the rig's header.
+    """The configuration with the limits of the rig's header, and without the channels that the rig lacks.
 
     Raises Fault BAD_MESSAGE for another schema version, CONFIG for blocks of another length or number of samples, for unreadable
-    limits, and for a given limit that is looser. The blocks of a rig without a header are checked as they arrive.
+    limits, for a given limit that is looser, and if its channels show no stick. The blocks of a rig without a header are checked
+    as they arrive.
     """
     if header is None:
         return config
@@ -33,8 +35,10 @@ def for_rig(header: wire.Header | None, config: ControllerConfig) -> ControllerC
         if isinstance(theirs, int | float) and abs(theirs - ours) > 0.01 * ours:
             line = f"header/plant: rig.solver.{name} = {theirs:g}: must be controller.{name} = {ours:g}"
             raise Fault("CONFIG", f"{line}; set both to the same number")
-    limits = _part(table, "limits")
+    limits, channels = _part(table, "limits"), _part(_part(table, "rig"), "channels")
+    absent = [name for name in CHANNELS if _part(_part(channels, name), "absent") is True]
     try:
+        config = seeing(config, absent)
         return config if limits is None else within(config, _LIMITS.validate_python(limits))
     except ValidationError as error:
         problem = error.errors()[0]

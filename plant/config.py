@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from bridge.config import Strict, in_short
+from bridge.guard.absent import ChannelName, PresentOrAbsent
 from bridge.guard.config import GuardConfig, VibrationLimits
 from plant.drive_config import DriveConfig, NotNegative, Positive
 from plant.effects.library import checked
@@ -160,6 +161,9 @@ class RigConfig(Strict):
     solver: SolverConfig = SolverConfig()
     loop: LoopConfig = LoopConfig()
     guard: GuardConfig = GuardConfig()
+    channels: dict[ChannelName, PresentOrAbsent] = Field(
+        {}, description="[channels.NAME]; without any: all are present."
+    )
     effects: dict[str, dict[str, float | str]] = Field({}, description="[effects.NAME]; without any: the ideal rig.")
 
     @property

@@ -1,12 +1,14 @@
 """The records of a guard: parameters derived once from the rig file, and the changing state."""
 
 import math
+from collections.abc import Collection
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from bridge.arrays import Records
 from bridge.faults import Fault
+from bridge.guard.absent import refuse_absent
 from bridge.guard.config import MOST_BANDS, GuardConfig, Level, merged_bands_Hz
 from bridge.kernel import record
 from bridge.wire import stickslip_pb2 as wire
@@ -42,7 +44,8 @@ PARAMS = np.dtype(
         )
     ]
     + [(name, "i8") for name in ("timeout_blocks", "lost_blocks", "window_blocks", "bands", "tones")]
-    + [("band_Hz", "f8", (MOST_BANDS, 2)), ("tone_Hz", "f8", (MOST_TONES,))],
+    + [("band_Hz", "f8", (MOST_BANDS, 2)), ("tone_Hz", "f8", (MOST_TONES,))]
+    + [("absent", "i8", (len(CHANNELS),))],  # 1: the rig has no such channel
     align=True,
 )
 
@@ -83,15 +86,19 @@ class ExciterLimits(NamedTuple):
     command_timeout_s: float
 
 
-def build(config: GuardConfig, exciter: ExciterLimits, run: int, arm: bool = False) -> tuple[Records, Records]:
+def build(
+    config: GuardConfig, exciter: ExciterLimits, run: int, arm: bool = False, absent: Collection[str] = ()
+) -> tuple[Records, Records]:
     """Parameters and state of a guard at power-up.
 
-    Raises Fault CONFIG if the limits lack the fastest drive or v_a, or the loop check lacks an allowed tone.
+    Raises Fault CONFIG if the limits lack the fastest drive or v_a, the loop check lacks an allowed tone, or the rig lacks a
+    channel that the guard needs.
 
     Args:
         config, exciter: limits and exciter of the rig file.
         run: the number that each command must carry.
         arm: the rig is simulated, and its scenario arms it.
+        absent: channels that the rig does not have.
 
     """
     params = record(PARAMS)
@@ -138,6 +145,8 @@ def build(config: GuardConfig, exciter: ExciterLimits, run: int, arm: bool = Fal
         raise Fault("CONFIG", str(error)) from None
     p.tones = len(tones)
     p.tone_Hz[: len(tones)] = tones
+    refuse_absent(absent)
+    p.absent[:] = [name in absent for name in CHANNELS]
 
     state = record(STATE)
     s: Any = state[0]

@@ -13,13 +13,13 @@ from typing import NamedTuple
 
 from bridge.faults import Fault
 from bridge.processes import pid_here
+from bridge.rig.faults.kinds import PROCESS
+from bridge.rig.faults.schedule import BEGAN
+from bridge.rig.faults.table import FaultTable
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import FAULT, PLANT_EVENT
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
-from plant.faults.kinds import PROCESS
-from plant.faults.schedule import BEGAN
-from plant.faults.table import FaultTable
 
 _DIAL_S = 2.0  # timeout of the connection
 _HEADERS_S = 2.0  # timeout for the headers of the processes

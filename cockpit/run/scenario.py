@@ -11,17 +11,18 @@ from pydantic import AfterValidator, Field, model_validator
 
 from bridge.config import Strict, made_with, read_toml, validate, with_overrides
 from bridge.faults import Fault
+from bridge.guard.absent import absent
 from bridge.log.storage.log_files import Rotation
+from bridge.rig.faults.kinds import PROCESS
+from bridge.rig.faults.table import FaultTable
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.payloads import SCHEMA_VERSION
 from bridge.wire.zenoh_link import BusConfig
 from cockpit.run.scenario_file import RIG_FILE, find, rig_table, with_rig
 from cockpit.run.sensor_needs import refuse_blind_sensors, refuse_out_of_travel
-from controller.config import ControllerConfig, within
+from controller.config import ControllerConfig, seeing, within
 from plant.config import RigConfig
 from plant.config_limits import refuse_a_spring_of_another_rig, refuse_what_no_rig_does
-from plant.faults.kinds import PROCESS
-from plant.faults.table import FaultTable
 
 # Shortest allowed block in real time. With a shorter one the command for a block would arrive after the next block is due.
 _SHORTEST_IN_REAL_TIME_S = 1e-3
@@ -77,7 +78,8 @@ class Scenario(Strict):
                 line = f"fault: {table.in_words()}: from_s = {table.from_s:g}: must be before the end of the run"
                 raise ValueError(f"{line}, duration_s = {self.duration_s:g}; begin it earlier, or run longer")
         try:
-            return self.model_copy(update={"controller": within(controller, self.rig.vibration_limits)})
+            controller = within(seeing(controller, absent(self.rig.channels)), self.rig.vibration_limits)
+            return self.model_copy(update={"controller": controller})
         except ValueError as error:
             raise ValueError(f"controller.{error}") from None
 

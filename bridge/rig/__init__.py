@@ -1,0 +1,8 @@
+"""A rig of any kind behind its guard, as a process on the bus. Nothing here knows the plant or an adapter.
+
+device   the contract of a device: converter and exciter
+node     a rig behind its guard, block by block: `GuardedNode`; around a device: `DeviceNode`
+step     a block between its messages, compiled; the plant's loop calls the same parts
+process  the loop on the bus: fade, latch, kept gain, missing commands, run number
+faults/  injected faults of sensors, clock and bus
+"""

@@ -1,0 +1,294 @@
+"""A rig behind its guard: commands in, sensor blocks and the applied vibration out, block by block."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from bridge.arrays import Records
+from bridge.guard.check import gain_report
+from bridge.guard.core import NO_COMMAND
+from bridge.guard.states import LEAVE, apply_order
+from bridge.kernel_cache import compile_once
+from bridge.rig.device import LONGEST_READ_BLOCKS, Device, DeviceBlock, DeviceError
+from bridge.rig.faults.schedule import Faults
+from bridge.rig.step import begin, device_memory, end, fill
+from bridge.wire.clock import time
+from bridge.wire.messages import ANNOUNCE as ANNOUNCE_LAYOUT
+from bridge.wire.messages import APPLIED as APPLIED_LAYOUT
+from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
+from bridge.wire.messages import sealed, sensor_block
+from bridge.wire.stickslip_pb2 import FAULT, STOP_BY_PERSON, STOP_KEPT
+from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, SENSORS, Outgoing
+
+_OPEN_AGAIN_S = 1.0  # interval of the attempts to open a lost device
+
+
+class GuardedNode(ABC):
+    """A rig of any kind with its guard; a kind of rig adds the samples of a block.
+
+    Args:
+        guard: parameters and memory, records of `bridge.guard.records`.
+        block_ns: length of a block by the rig's clock.
+        samples: number of samples of a channel in a block.
+        faults: injected faults.
+
+    """
+
+    kernels: str  # owner of its kernels, for the operator
+
+    def __init__(self, guard: tuple[Records, Records], block_ns: int, samples: int, faults: Faults) -> None:
+        self.block_ns = block_ns
+        self._samples = samples
+        self.faults = faults
+        self.announcements: list[Outgoing] = []  # to be sent before the samples of the last block
+        self._guard_params, self._guard_state = guard
+        self._sensors = sensor_block(samples).blank()
+        self._applied = APPLIED_LAYOUT.blank()
+
+    def warm_up(self) -> None:
+        """Compile or load the kernels on copies, so that the first block is not late."""
+        compile_once(self.kernels, self._step_copies)
+
+    def advance(
+        self, commands: list[bytes], commands_late: int = 0, round_trip_ns: int = 0, late_ns: int = 0
+    ) -> tuple[Outgoing, ...]:
+        """Advance one block under the newest of `commands` accepted by the guard; return sensor block and applied vibration.
+
+        Send `announcements` before them. Without a block of the rig nothing is returned.
+
+        Raises Fault BAD_MESSAGE if a command cannot be read, CONFIG if a simulated rig cannot be stepped.
+        """
+        faults, block = self.faults, self.block
+        if faults.busy:
+            faults.begin_block(block)
+        payloads = b"".join(COMMAND_LAYOUT.canonical(payload, COMMAND.name) for payload in commands)
+        accepted = self._act(COMMAND_LAYOUT.record(payloads))
+        if accepted is None:
+            return ()
+        if faults.busy:
+            faults.spoil(self._sensors, block)
+        self._report(accepted, commands_late, round_trip_ns, late_ns)
+        if faults.busy:
+            faults.misdate((self._sensors, self._applied), block)
+        return Outgoing(SENSORS, sealed(self._sensors.tobytes())), Outgoing(APPLIED, self._applied.tobytes())
+
+    @abstractmethod
+    def _step_copies(self) -> None:
+        """Call every kernel of a block on copies."""
+
+    @abstractmethod
+    def _act(self, commands: Records) -> int | None:
+        """Apply the commands and fill the samples of a block; the number of accepted commands, None without a block."""
+
+    @abstractmethod
+    def _report(self, accepted: int, commands_late: int, round_trip_ns: int, late_ns: int) -> None:
+        """Pass the samples to the guard, and fill the guard's fields and the applied vibration."""
+
+    @abstractmethod
+    def let_go(self) -> None:
+        """Drop all commands in force or delayed and enter DISARMED: the vibration fades to zero at the exciter's rate."""
+
+    @property
+    @abstractmethod
+    def at_rest(self) -> bool:
+        """Whether the base is at rest."""
+
+    def news(self) -> list[tuple[str, str]]:
+        """Codes and texts of new events of the rig itself and of its injected faults."""
+        return self.faults.news()
+
+    @property
+    def paced_by_rig(self) -> bool:
+        """Whether `advance` waits until the rig has a block."""
+        return False
+
+    @property
+    def waiting(self) -> int:
+        """Complete blocks that the rig holds back."""
+        return 0
+
+    @abstractmethod
+    def close(self) -> None:
+        """Disconnect from the rig, which is at rest."""
+
+    def apply_order(self, order: int) -> bool:
+        """Apply an operator's order (`wire.Operator.Action`), HOLD or LEAVE. Returns whether it changed the state."""
+        return bool(apply_order(self._guard_state[0], order))
+
+    @property
+    def block(self) -> int:
+        """Number of the next block."""
+        return int(self._guard_state[0].block)
+
+    @property
+    def check_tones_Hz(self) -> list[float]:
+        """Frequencies of the loop check."""
+        p = self._guard_params[0]
+        return [float(tone_Hz) for tone_Hz in p.tone_Hz[: int(p.tones)]]
+
+    def accept_gain(self, gains: Sequence[float]) -> None:
+        """Set the gains that later checks are compared with, one per tone, from an earlier run; empty: no comparison."""
+        self._guard_state[0].accepted[: len(gains)] = gains
+
+    def warm(self, heat_share: float) -> None:
+        """Set the modelled warmth of the exciter from an earlier run, over the largest allowed."""
+        self._guard_state["heat"] = heat_share
+
+    @property
+    def accepted_gain(self) -> list[float]:
+        """The accepted exciter gain at each tone of the loop check; empty before the first check."""
+        gains = [float(gain) for gain in self._guard_state[0].accepted[: int(self._guard_params[0].tones)]]
+        return gains if all(gains) else []
+
+    @property
+    def gain_report(self) -> str:
+        """The measured and the expected gain at each tone of the last loop check, as text."""
+        return gain_report(self._guard_params[0], self._guard_state[0])
+
+    @property
+    def applied(self) -> Any:
+        """The applied vibration of the last block, a record of `Applied`."""
+        return self._applied[0]
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether the guard is in FAULT because of an operator's stop."""
+        s = self._guard_state[0]
+        return s.state == FAULT and s.cause in (STOP_BY_PERSON, STOP_KEPT)
+
+
+class DeviceNode(GuardedNode):
+    """A device behind its guard. While the device is silent or gone, its exciter is kept at rest.
+
+    Args:
+        device: open, with its exciter at rest.
+        guard: parameters and memory of its guard.
+        faults: injected faults.
+        memory: calibration of its channels, a record of `bridge.rig.step.DEVICE`; None: SI units in the order of CHANNELS.
+
+    """
+
+    kernels = "a device's rig"
+
+    def __init__(
+        self, device: Device, guard: tuple[Records, Records], faults: Faults, memory: Records | None = None
+    ) -> None:
+        super().__init__(guard, round(device.block_s * 1e9), device.samples_per_block, faults)
+        self._device = device
+        self._memory = device_memory() if memory is None else memory
+        self._block = DeviceBlock(np.zeros((1, 1)), 0.0, 0.0)
+        self._silent_since_s: float | None = None  # None while blocks arrive
+        self._is_open = True
+        self._open_again_s = 0.0
+        self._news: list[tuple[str, str]] = []
+
+    @property
+    def paced_by_rig(self) -> bool:
+        """Whether `advance` waits until the device has a block."""
+        return self._device.pace == "device"
+
+    @property
+    def waiting(self) -> int:
+        """Complete blocks that the device holds back."""
+        return self._block.waiting
+
+    def _step_copies(self) -> None:
+        state, memory, sensors = self._guard_state.copy(), self._memory.copy(), sensor_block(self._samples).blank()
+        apply_order(state[0], LEAVE)
+        begin(self._guard_params, state, memory, COMMAND_LAYOUT.blank(0), ANNOUNCE_LAYOUT.blank(0))
+        rows = np.zeros((int(memory["source"].max()) + 1, self._samples))
+        fill(state, memory, self.block_ns, 0, rows, sensors)
+        end(self._guard_params, state, memory, 0.0, 0.0, 0, 0, 0, 0, sensors, APPLIED_LAYOUT.blank())
+
+    def _act(self, commands: Records) -> int | None:
+        accepted = 0
+        if self._silent_since_s is None:
+            announce = self._device.announcements()
+            self.announcements = [Outgoing(ANNOUNCE, announce[row : row + 1].tobytes()) for row in range(len(announce))]
+            accepted = begin(self._guard_params, self._guard_state, self._memory, commands, announce)
+            self._write()
+        block = self._read()
+        if block is None:
+            return None
+        self._block = block
+        if block.lost:
+            self._news.append(("SAMPLES_LOST", f"{block.lost} blocks"))
+        fill(self._guard_state, self._memory, self.block_ns, block.lost, block.samples, self._sensors)
+        return accepted
+
+    def _write(self) -> None:
+        """Order the vibration that the guard allows; after a refusal it begins again from rest."""
+        device, g = self._device, self._guard_state[0]
+        is_on = bool(g.enable)
+        try:
+            if device.has_enable_line:
+                device.enable(is_on, int(g.toggle))
+            device.write(float(g.frequency_Hz), float(g.amplitude_m) if is_on or device.has_enable_line else 0.0)
+        except DeviceError as error:
+            self._rest()
+            self._news.append(("DEVICE_REFUSED", f"{error}: the exciter is at rest, and begins again from 0"))
+
+    def _rest(self) -> None:
+        self._device.safe()
+        self._guard_state["amplitude_m"] = 0.0
+
+    def _read(self) -> DeviceBlock | None:
+        why = f"no block within {LONGEST_READ_BLOCKS} block lengths"
+        block = None
+        try:
+            if not self._is_open:
+                self._open_again()
+            block = self._device.read() if self._is_open else None
+        except DeviceError as error:
+            why = str(error)
+            self._device.close()
+            self._is_open, self._open_again_s = False, time.monotonic() + _OPEN_AGAIN_S
+        if block is None and self._silent_since_s is None:
+            self._silent_since_s = time.monotonic()
+            self._rest()
+            self._news.append(("DEVICE_SILENT", f"{why}: the exciter is at rest"))
+        elif block is not None and self._silent_since_s is not None:
+            silent_s = time.monotonic() - self._silent_since_s
+            self._silent_since_s = None
+            self._news.append(("DEVICE_BACK", f"after {silent_s:.2f} s"))
+        return block
+
+    def _open_again(self) -> None:
+        """Try to open a lost device, once each second. Raises DeviceError."""
+        if time.monotonic() < self._open_again_s:
+            time.sleep(self.block_ns * 1e-9)
+            return
+        self._device.open()
+        self._device.safe()
+        self._is_open = True
+
+    def _report(self, accepted: int, commands_late: int, round_trip_ns: int, late_ns: int) -> None:
+        block = self._block
+        end(
+            self._guard_params, self._guard_state, self._memory, block.frequency_Hz, block.amplitude_m, accepted,
+            commands_late, round_trip_ns, late_ns, self._sensors, self._applied,
+        )  # fmt: skip
+
+    def let_go(self) -> None:
+        """Drop the command in force and enter DISARMED: the vibration fades to zero at the exciter's rate."""
+        self._memory["command_block"] = NO_COMMAND
+        self.apply_order(LEAVE)
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the guard allows no vibration and the device executes none, or the exciter was switched off."""
+        return self._guard_state["amplitude_m"][0] == 0.0 and (
+            self._silent_since_s is not None or self._block.amplitude_m == 0.0
+        )
+
+    def news(self) -> list[tuple[str, str]]:
+        """Codes and texts of new events of the device and of its injected faults."""
+        events, self._news = self._news + super().news(), []
+        return events
+
+    def close(self) -> None:
+        """Bring the exciter to rest and disconnect."""
+        self._device.safe()
+        self._device.close()
