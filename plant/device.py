@@ -1,9 +1,11 @@
 """The physics of the simulated rig as a device: the twin of `plant.step`, without a guard. It has the true vibration."""
 
+from pathlib import Path
+
 import numpy as np
 
 from bridge.arrays import Records
-from bridge.rig.device import Device, DeviceBlock
+from bridge.rig.device import Device, DeviceBlock, Setup
 from bridge.wire.channels import CHANNELS
 from bridge.wire.messages import sensor_block
 from plant.config import RigConfig
@@ -23,15 +25,17 @@ class PlantDevice(Device):
     """
 
     pace = "computer"
-    has_enable_line = True
 
     def __init__(self, config: RigConfig, seed: int) -> None:
-        self.block_s, self.samples_per_block = config.solver.block_s, config.solver.samples_per_block
+        solver = config.solver
+        rate_Hz = solver.samples_per_block / solver.block_s
+        super().__init__(Setup({}, Path(), rate_Hz, solver.samples_per_block, len(CHANNELS), has_enable_line=True))
+        self.block_s = solver.block_s
         self.params, self._state = build(config)
         self._inputs = RigInputs(config, seed)
-        self._sensors = sensor_block(self.samples_per_block).blank()
-        self._analogue = np.zeros((len(CHANNELS), self.samples_per_block))
-        self._truth = np.empty((len(TRUTH), self.samples_per_block))
+        self._sensors = sensor_block(solver.samples_per_block).blank()
+        self._analogue = np.zeros((len(CHANNELS), solver.samples_per_block))
+        self.truth = np.empty((len(TRUTH), solver.samples_per_block))  # of the last block, rows as plant.records.TRUTH
         self._frequency_Hz, self._amplitude_m, self._is_on = config.piezo.frequency_max_Hz, 0.0, False
         self._drawn = self._inputs.draw(1)
 
@@ -46,16 +50,16 @@ class PlantDevice(Device):
         """Set the enable line; this device has no watchdog."""
         self._is_on = on
 
-    def write(self, frequency_Hz: float, amplitude_m: float) -> None:
+    def write(self, frequency_Hz: float, amplitude: float) -> None:
         """Set the vibration of the next block."""
-        self._frequency_Hz, self._amplitude_m = frequency_Hz, amplitude_m
+        self._frequency_Hz, self._amplitude_m = frequency_Hz, amplitude
 
     def read(self) -> DeviceBlock:
         """The next block."""
         amplitude_m = self._amplitude_m if self._is_on or self.params[0].always_on else 0.0
         drive_mps, noise = self._drawn.velocity_mps[0], self._drawn.noise[0]
         vibrate(
-            self.params, self._state, drive_mps, self._frequency_Hz, amplitude_m, noise, self._analogue, self._truth,
+            self.params, self._state, drive_mps, self._frequency_Hz, amplitude_m, noise, self._analogue, self.truth,
             self._sensors,
         )  # fmt: skip
         state = self._state[0]

@@ -158,16 +158,7 @@ def notes(config: RigConfig) -> list[tuple[str, str]]:
 
 
 def _exciter(config: RigConfig) -> ExciterLimits:
-    piezo, solver = config.piezo, config.solver
-    return ExciterLimits(
-        piezo.amplitude_max_m,
-        piezo.frequency_min_Hz,
-        piezo.frequency_max_Hz,
-        piezo.amplitude_slew_m_per_s,
-        solver.block_s,
-        solver.samples_per_block,
-        piezo.command_timeout_s,
-    )
+    return ExciterLimits.of(config.piezo, config.solver.block_s, config.solver.samples_per_block)
 
 
 def _add_effects(p: Any, config: RigConfig) -> None:

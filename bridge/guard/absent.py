@@ -6,7 +6,6 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 
 from bridge.config import Strict
-from bridge.faults import Fault
 from bridge.wire.channels import SENSOR_CHANNELS
 
 
@@ -30,11 +29,13 @@ def absent(channels: Mapping[str, PresentOrAbsent]) -> list[str]:
     return [name for name, channel in channels.items() if channel.absent]
 
 
-def refuse_absent(absent: Collection[str]) -> None:
-    """Raise Fault CONFIG, with the reason, for an absent channel that the guard needs."""
-    for name in absent:
-        if reason := SENSOR_CHANNELS[name].needed:
-            raise Fault("CONFIG", f"channels.{name}.absent = true: a rig needs this channel: {reason}; connect it")
+def refusal(absent: Collection[str]) -> str:
+    """The reason to refuse a rig without these channels, as text; empty if the guard needs none of them."""
+    reasons = ((name, SENSOR_CHANNELS[name].needed) for name in absent)
+    lines = [
+        f"channels.{name}.absent = true: a rig needs this channel: {text}; connect it" for name, text in reasons if text
+    ]
+    return lines[0] if lines else ""
 
 
 def lost_protection(absent: Collection[str]) -> list[str]:

@@ -8,8 +8,8 @@ import numpy as np
 
 from bridge.arrays import Records
 from bridge.faults import Fault
-from bridge.guard.absent import refuse_absent
-from bridge.guard.config import MOST_BANDS, GuardConfig, Level, merged_bands_Hz
+from bridge.guard.absent import refusal
+from bridge.guard.config import MOST_BANDS, ExciterConfig, GuardConfig, Level, merged_bands_Hz
 from bridge.kernel import record
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.channels import CHANNELS
@@ -85,6 +85,19 @@ class ExciterLimits(NamedTuple):
     samples_per_block: int
     command_timeout_s: float
 
+    @classmethod
+    def of(cls, exciter: ExciterConfig, block_s: float, samples_per_block: int) -> "ExciterLimits":
+        """The limits of an exciter of a rig file, for blocks of this length."""
+        return cls(
+            exciter.amplitude_max_m,
+            exciter.frequency_min_Hz,
+            exciter.frequency_max_Hz,
+            exciter.amplitude_slew_m_per_s,
+            block_s,
+            samples_per_block,
+            exciter.command_timeout_s,
+        )
+
 
 def build(
     config: GuardConfig, exciter: ExciterLimits, run: int, arm: bool = False, absent: Collection[str] = ()
@@ -145,7 +158,8 @@ def build(
         raise Fault("CONFIG", str(error)) from None
     p.tones = len(tones)
     p.tone_Hz[: len(tones)] = tones
-    refuse_absent(absent)
+    if reason := refusal(absent):
+        raise Fault("CONFIG", reason)
     p.absent[:] = [name in absent for name in CHANNELS]
 
     state = record(STATE)

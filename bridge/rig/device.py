@@ -1,45 +1,64 @@
 """The contract of a device: a converter that samples the sensors, and an exciter. An adapter implements it, in one file.
 
-Calls come from one thread, in this order: `open`, then `write` and `read` in turn, at last `safe` and `close`. No method keeps
-a rig alive: the guard decides in front of the device, and a device has its own watchdog behind it.
+Calls come from one thread, in this order: `open`, then `write` and `read` in turn, at last `safe` and `close`. The guard decides
+in front of the device; the device's own watchdog ends the vibration when this process is gone.
 """
 
 from abc import ABC, abstractmethod
-from typing import Literal, NamedTuple
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
 
 from bridge.arrays import Floats, Records
 from bridge.wire.messages import ANNOUNCE
 
 LONGEST_READ_BLOCKS = 3  # a `read` returns after this many block lengths at the latest
-Pace = Literal["device", "computer"]
+LONGEST_READ_S = 5.0  # and of a device that makes a block for each `write`, which has no clock, after this time
+Pace = Literal["device", "computer", "caller"]
 
 
 class DeviceError(Exception):
     """The device refused an order or is gone; the text goes to the operator."""
 
 
-class DeviceBlock(NamedTuple):
-    """One block of samples."""
+class Setup(NamedTuple):
+    """The facts of the rig file that an adapter receives."""
 
-    samples: (
-        Floats  # float64 [channels of the device, samples], as the device measures them; NaN: missing, never filled
-    )
+    settings: Mapping[str, Any]  # table [device]
+    folder: Path  # of the rig file; relative paths in it begin there
+    sample_rate_Hz: float
+    samples_per_block: int
+    channels: int  # number of channels that the rig file uses
+    has_enable_line: bool  # whether `enable` switches the amplifier
+
+
+class DeviceBlock(NamedTuple):
+    """One block, in units of the device."""
+
+    samples: Floats  # as measured, float64 [channels of the device, samples]; NaN: missing, never filled
     frequency_Hz: float  # of the exciter at the block's end, as the device executed it
-    amplitude_m: float
+    amplitude: float  # the same, in the unit of `write`
     lost: int = 0  # whole blocks that were lost before this one
     waiting: int = 0  # complete blocks that wait behind it
+    dropped: str = ""  # data before this block that could not be read, for the operator
 
 
 class Device(ABC):
-    """A converter and an exciter. The facts below are valid after `open`."""
+    """A converter and an exciter."""
 
-    block_s: float  # length of a block by the device's clock, as its maker states it
-    samples_per_block: int
-    # whose clock makes a block: the device's, if `read` waits until a block is complete; or the computer's, whose loop reads one
-    # each block length
+    # whose clock makes a block: the device's, if `read` waits until a block is complete; the computer's, whose loop reads one
+    # each block length; or none, as a simulated device makes a block for each `write`
     pace: Pace = "device"
-    watchdog_s: float = 0.0  # silence after which the device ends the vibration by itself; 0: it has no watchdog
-    has_enable_line: bool = False  # whether `enable` switches the amplifier
+
+    def __init__(self, setup: Setup) -> None:
+        """Read the settings, without a connection. Raises Fault CONFIG."""
+        self.setup = setup
+        self.block_s = setup.samples_per_block / setup.sample_rate_Hz  # by the device's clock, as its maker states it
+
+    @property
+    def longest_read_s(self) -> float:
+        """Time after which a `read` without a block returns."""
+        return LONGEST_READ_S if self.pace == "caller" else LONGEST_READ_BLOCKS * self.block_s
 
     @abstractmethod
     def open(self) -> None:
@@ -47,13 +66,13 @@ class Device(ABC):
 
     @abstractmethod
     def read(self) -> DeviceBlock | None:
-        """The next block; None if none is complete within LONGEST_READ_BLOCKS block lengths. Raises DeviceError."""
+        """The next block; None if none is complete within `longest_read_s`. Raises DeviceError."""
 
     @abstractmethod
-    def write(self, frequency_Hz: float, amplitude_m: float) -> None:
-        """Set the vibration: amplitude of the base's displacement [m], 0 for rest. Raises DeviceError if the device refuses.
+    def write(self, frequency_Hz: float, amplitude: float) -> None:
+        """Set the vibration: displacement amplitude [m], or [V] for a rig file with `stroke_m_per_V`; 0: rest.
 
-        After a refusal the exciter must be at rest; the next amplitude begins near 0.
+        After a refusal the exciter must be at rest; the next amplitude begins near 0. Raises DeviceError if the device refuses.
         """
 
     @abstractmethod

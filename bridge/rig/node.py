@@ -11,8 +11,9 @@ from bridge.guard.check import gain_report
 from bridge.guard.core import NO_COMMAND
 from bridge.guard.states import LEAVE, apply_order
 from bridge.kernel_cache import compile_once
-from bridge.rig.device import LONGEST_READ_BLOCKS, Device, DeviceBlock, DeviceError
+from bridge.rig.device import Device, DeviceBlock, DeviceError
 from bridge.rig.faults.schedule import Faults
+from bridge.rig.rate import RateWatch
 from bridge.rig.step import begin, device_memory, end, fill
 from bridge.wire.clock import time
 from bridge.wire.messages import ANNOUNCE as ANNOUNCE_LAYOUT
@@ -22,6 +23,9 @@ from bridge.wire.messages import sealed, sensor_block
 from bridge.wire.stickslip_pb2 import FAULT, STOP_BY_PERSON, STOP_KEPT
 from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, SENSORS, Outgoing
 
+# Blocks that may wait behind a block without a report. Smaller: each short stall of the computer is reported. Larger: a loop that
+# is 4 ms behind is not.
+_FEW_WAITING = 3
 _OPEN_AGAIN_S = 1.0  # interval of the attempts to open a lost device
 
 
@@ -95,19 +99,14 @@ class GuardedNode(ABC):
     def at_rest(self) -> bool:
         """Whether the base is at rest."""
 
-    def news(self) -> list[tuple[str, str]]:
-        """Codes and texts of new events of the rig itself and of its injected faults."""
-        return self.faults.news()
+    def problems(self) -> list[tuple[str, str, int]]:
+        """Codes, texts and numbers of new problems with the rig itself, which are reported once a second at most."""
+        return []
 
     @property
     def paced_by_rig(self) -> bool:
         """Whether `advance` waits until the rig has a block."""
         return False
-
-    @property
-    def waiting(self) -> int:
-        """Complete blocks that the rig holds back."""
-        return 0
 
     @abstractmethod
     def close(self) -> None:
@@ -167,32 +166,34 @@ class DeviceNode(GuardedNode):
         guard: parameters and memory of its guard.
         faults: injected faults.
         memory: calibration of its channels, a record of `bridge.rig.step.DEVICE`; None: SI units in the order of CHANNELS.
+        stroke_m: stroke of the exciter for one unit of its amplitude.
 
     """
 
     kernels = "a device's rig"
 
     def __init__(
-        self, device: Device, guard: tuple[Records, Records], faults: Faults, memory: Records | None = None
+        self,
+        device: Device,
+        guard: tuple[Records, Records],
+        faults: Faults,
+        memory: Records | None = None,
+        stroke_m: float = 1.0,
     ) -> None:
-        super().__init__(guard, round(device.block_s * 1e9), device.samples_per_block, faults)
-        self._device = device
+        super().__init__(guard, round(device.block_s * 1e9), device.setup.samples_per_block, faults)
+        self._device, self._stroke_m = device, stroke_m
         self._memory = device_memory() if memory is None else memory
         self._block = DeviceBlock(np.zeros((1, 1)), 0.0, 0.0)
         self._silent_since_s: float | None = None  # None while blocks arrive
         self._is_open = True
         self._open_again_s = 0.0
-        self._news: list[tuple[str, str]] = []
+        self._problems: list[tuple[str, str, int]] = []
+        self._clock = RateWatch(device.block_s)
 
     @property
     def paced_by_rig(self) -> bool:
         """Whether `advance` waits until the device has a block."""
         return self._device.pace == "device"
-
-    @property
-    def waiting(self) -> int:
-        """Complete blocks that the device holds back."""
-        return self._block.waiting
 
     def _step_copies(self) -> None:
         state, memory, sensors = self._guard_state.copy(), self._memory.copy(), sensor_block(self._samples).blank()
@@ -213,8 +214,7 @@ class DeviceNode(GuardedNode):
         if block is None:
             return None
         self._block = block
-        if block.lost:
-            self._news.append(("SAMPLES_LOST", f"{block.lost} blocks"))
+        self._note_block(block)
         fill(self._guard_state, self._memory, self.block_ns, block.lost, block.samples, self._sensors)
         return accepted
 
@@ -223,19 +223,29 @@ class DeviceNode(GuardedNode):
         device, g = self._device, self._guard_state[0]
         is_on = bool(g.enable)
         try:
-            if device.has_enable_line:
+            if has_line := device.setup.has_enable_line:
                 device.enable(is_on, int(g.toggle))
-            device.write(float(g.frequency_Hz), float(g.amplitude_m) if is_on or device.has_enable_line else 0.0)
+            device.write(float(g.frequency_Hz), float(g.amplitude_m) / self._stroke_m if is_on or has_line else 0.0)
         except DeviceError as error:
             self._rest()
-            self._news.append(("DEVICE_REFUSED", f"{error}: the exciter is at rest, and begins again from 0"))
+            self._problems.append(("DEVICE_REFUSED", f"{error}: the exciter rests, and begins again from 0", 1))
+
+    def _note_block(self, block: DeviceBlock) -> None:
+        if block.lost:
+            self._problems.append(("SAMPLES_LOST", "blocks were lost before they were read", block.lost))
+        if block.dropped:
+            self._problems.append(("DEVICE_DATA", f"{block.dropped}: dropped", 1))
+        if block.waiting > _FEW_WAITING:
+            self._problems.append(("BEHIND", f"{block.waiting} blocks waited to be read", 1))
+        if self.paced_by_rig and (text := self._clock.add(1 + block.lost, time.monotonic())):
+            self._problems.append(("DEVICE_RATE", text, 1))
 
     def _rest(self) -> None:
         self._device.safe()
         self._guard_state["amplitude_m"] = 0.0
 
     def _read(self) -> DeviceBlock | None:
-        why = f"no block within {LONGEST_READ_BLOCKS} block lengths"
+        why = f"no block within {self._device.longest_read_s:g} s"
         block = None
         try:
             if not self._is_open:
@@ -248,11 +258,12 @@ class DeviceNode(GuardedNode):
         if block is None and self._silent_since_s is None:
             self._silent_since_s = time.monotonic()
             self._rest()
-            self._news.append(("DEVICE_SILENT", f"{why}: the exciter is at rest"))
+            self._problems.append(("DEVICE_SILENT", f"{why}: the exciter rests", 1))
         elif block is not None and self._silent_since_s is not None:
             silent_s = time.monotonic() - self._silent_since_s
             self._silent_since_s = None
-            self._news.append(("DEVICE_BACK", f"after {silent_s:.2f} s"))
+            self._clock = RateWatch(self._device.block_s)
+            self._problems.append(("DEVICE_BACK", f"blocks again after {silent_s:.2f} s", 1))
         return block
 
     def _open_again(self) -> None:
@@ -266,9 +277,11 @@ class DeviceNode(GuardedNode):
 
     def _report(self, accepted: int, commands_late: int, round_trip_ns: int, late_ns: int) -> None:
         block = self._block
+        if self.paced_by_rig:
+            late_ns = block.waiting * self.block_ns
         end(
-            self._guard_params, self._guard_state, self._memory, block.frequency_Hz, block.amplitude_m, accepted,
-            commands_late, round_trip_ns, late_ns, self._sensors, self._applied,
+            self._guard_params, self._guard_state, self._memory, block.frequency_Hz, block.amplitude * self._stroke_m,
+            accepted, commands_late, round_trip_ns, late_ns, self._sensors, self._applied,
         )  # fmt: skip
 
     def let_go(self) -> None:
@@ -280,13 +293,13 @@ class DeviceNode(GuardedNode):
     def at_rest(self) -> bool:
         """Whether the guard allows no vibration and the device executes none, or the exciter was switched off."""
         return self._guard_state["amplitude_m"][0] == 0.0 and (
-            self._silent_since_s is not None or self._block.amplitude_m == 0.0
+            self._silent_since_s is not None or self._block.amplitude == 0.0
         )
 
-    def news(self) -> list[tuple[str, str]]:
-        """Codes and texts of new events of the device and of its injected faults."""
-        events, self._news = self._news + super().news(), []
-        return events
+    def problems(self) -> list[tuple[str, str, int]]:
+        """Codes, texts and numbers of new problems with the device."""
+        problems, self._problems = self._problems, []
+        return problems
 
     def close(self) -> None:
         """Bring the exciter to rest and disconnect."""

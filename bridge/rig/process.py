@@ -33,6 +33,9 @@ _ANSWER_TIMEOUT_S = 5.0  # lockstep: longest wait for the command that answers a
 _GOODBYE_S = 3.0  # longest wait of the ended plant for the other processes to leave the bus
 _ROUND_TRIPS_KEPT = 1024  # blocks whose time of sending is kept; answers to older blocks have no round trip
 _LONGEST_FADE_BLOCKS = 1000  # longest wait until the exciter rests [blocks]
+# Longest wait for the answer to a block of a device, in block lengths. Smaller: a command of a busy computer acts a block later.
+# Larger: the next block is read late.
+_ANSWER_SHARE = 0.5
 _LATE_NS = 1_000_000  # round trip beyond which a command counts as late
 # Change of the exciter's warmth, over the largest allowed, after which it is stored. Smaller: more writes; with 0.05 there are 20
 # on the way to the limit, and 20 as it cools. Larger: a crash forgets more.
@@ -176,6 +179,7 @@ class GuardedRig:
         self._bus = bus
         self._complaints = Complaints(self.event)
         self._commands = CommandQueue(self._complaints)
+        self._heard = threading.Event()  # a command arrived since the last block
         self._answers = Inbox(64)  # commands, read in lockstep only
         self._on_the_way: collections.deque[Received] = collections.deque(maxlen=WAITING)  # commands on the faulty bus
         self._events = 0
@@ -192,6 +196,7 @@ class GuardedRig:
         # while a bus fault acts, the loop passes the commands through it first
         (self._on_the_way.append if self._node.faults.on_the_bus else self._commands.push)(received)
         self._answers.push(received)
+        self._heard.set()
 
     def event(self, code: str, text: str) -> None:
         """Publish an event with a code and a text."""
@@ -223,8 +228,10 @@ class GuardedRig:
             realtime.let_the_bus_send()
             self._send_applied(applied.payload)
         self._publish_events()
-        for code, text in self._node.news():
+        for code, text in self._node.faults.news():
             self.event(code, text)
+        for code, text, times in self._node.problems():
+            self._complaints.note(code, "device", text, times)
 
     def _let_commands_arrive(self) -> None:
         """Pass the received commands through the faults of the bus."""
@@ -305,7 +312,7 @@ class GuardedRig:
         for tick in range(_LONGEST_FADE_BLOCKS):
             if node.at_rest:
                 return
-            late_ns = pacer.wait(tick) if paced else 0
+            late_ns = pacer.wait(tick) if paced and not node.paced_by_rig else 0
             self._send(node.advance([], 0, 0, late_ns))
 
     def _advance_to(self, blocks: int, stop: threading.Event) -> None:
@@ -314,7 +321,7 @@ class GuardedRig:
         tick = 0
         remind_ticks = _REMIND_NS // node.block_ns
         while node.block < blocks and not stop.is_set():
-            late_ns = pacer.wait(tick)
+            late_ns = self._await_answer() if node.paced_by_rig else pacer.wait(tick)
             if tick % remind_ticks == 0 and (text := self._bus.expiring()):
                 self.event("CERTIFICATE", text)
             tick += 1
@@ -333,6 +340,7 @@ class GuardedRig:
             messages = node.advance(commands, late_commands, round_trip_ns, late_ns)
             sent_ns[(node.block - 1) % _ROUND_TRIPS_KEPT] = time.perf_counter_ns()
             self._send(messages)
+            late_ns = int(node.applied.late_ns)
             self._complaints.report_when_due()
             if self._keeper is not None:
                 self._keeper.at_rest = node.is_stopped and node.at_rest
@@ -340,6 +348,12 @@ class GuardedRig:
                 self._paused_ns = max(self._paused_ns, late_ns)
             elif late_ns < node.block_ns and commands:  # commands arrive again: the link is up
                 self._report_stall()
+
+    def _await_answer(self) -> int:
+        """Wait for a command after the newest block, at most half a block: a device executes it while it makes the next block."""
+        self._heard.wait(_ANSWER_SHARE * self._node.block_ns * 1e-9)
+        self._heard.clear()
+        return 0
 
     def _report_stall(self) -> None:
         if self._paused_ns:

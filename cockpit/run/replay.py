@@ -216,7 +216,7 @@ def _add(replayer: Replayer, piece: Piece) -> None:
 
 def likely_reason(headers: Headers, path: Path, settings: list[str]) -> str:
     """Likely reason for which a replay differs from its log, in words: settings, versions, or changed code."""
-    from cockpit.run.scenario import versions
+    from cockpit.run.run_tables import versions
 
     if settings:
         return f"the configuration was changed: {', '.join(settings)}"

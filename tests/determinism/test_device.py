@@ -27,7 +27,7 @@ def device_node(scenario: Scenario) -> DeviceNode:
     rig = scenario.rig
     device = PlantDevice(rig, scenario.seed)
     exciter = ExciterFaults(device.params[0])
-    faults = Faults(scenario.fault, scenario.seed, device.block_s, device.samples_per_block, exciter.set)
+    faults = Faults(scenario.fault, scenario.seed, device.block_s, rig.solver.samples_per_block, exciter.set)
     return DeviceNode(device, guard_records(rig, 1, scenario.arm), faults)
 
 

@@ -1,0 +1,47 @@
+"""`stickslip rig ...`: serve a real rig, check it, and simulate a device."""
+
+import threading
+from pathlib import Path
+from typing import Annotated, NamedTuple
+
+import typer
+
+from cockpit.commands.as_json.option import Json, JsonGroup, print_result
+from cockpit.commands.options import SharedOptions, command
+from cockpit.commands.processes import WaitFor, serve_rig
+
+rig_app = typer.Typer(cls=JsonGroup, help="Serve a real rig behind the guard; simulate a device.", no_args_is_help=True)
+RigArgument = Annotated[str, typer.Argument(metavar="RIG", help="A rig file of a real rig, .toml.")]
+
+
+class Boxed(NamedTuple):
+    """Result of `rig box`."""
+
+    port: int
+
+
+@rig_app.command("serve")
+@command("scenario", "settings", "endpoint", "prefix", "certs", "insecure", "wait")
+def rig_serve(shared: SharedOptions, rig: RigArgument, wait_for: WaitFor = "controller", as_json: Json = None) -> None:
+    """Serve a rig on the bus, as `plant --rig`: open its device behind the guard, or simulate it."""
+    serve_rig(shared, rig, wait_for, as_json)
+
+
+@rig_app.command("box")
+@command()
+def rig_box(
+    box: Annotated[Path, typer.Argument(metavar="BOX", help="File of a simulated device, .toml.")], as_json: Json = None
+) -> None:
+    """Simulate a device for the adapter `stream` until Ctrl-C: the plant's physics behind a TCP port, with a dead man."""
+    from bridge.config import read_toml, validate
+    from bridge.plain import print_line
+    from cockpit.run.child_process import stop_event
+    from cockpit.run.scenario import load_rig
+    from plant.box import Box, BoxConfig
+
+    config = validate(BoxConfig, read_toml(box), box.name)
+    made = Box(config, load_rig(config.rig, config.settings))
+    print_line(f"box      {config.rig} at {config.host}:{made.port}")
+    stop: threading.Event = stop_event()
+    made.run(stop)
+    print_result(as_json, Boxed(made.port), [])
