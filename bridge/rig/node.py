@@ -1,5 +1,6 @@
 """A rig behind its guard: commands in, sensor blocks and the applied vibration out, block by block."""
 
+import contextlib
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any
@@ -108,6 +109,15 @@ class GuardedNode(ABC):
         """Whether `advance` waits until the rig has a block."""
         return False
 
+    @property
+    def is_behind(self) -> bool:
+        """Whether more blocks of the rig wait to be read."""
+        return False
+
+    def idle(self) -> None:
+        """Discard the blocks before a run; call it at least each 0.2 s until the run begins."""
+        return
+
     @abstractmethod
     def close(self) -> None:
         """Disconnect from the rig, which is at rest."""
@@ -184,6 +194,12 @@ class DeviceNode(GuardedNode):
         self._device, self._stroke_m = device, stroke_m
         self._memory = device_memory() if memory is None else memory
         self._block = DeviceBlock(np.zeros((1, 1)), 0.0, 0.0)
+        self._is_begun, self._accepted = (
+            False,
+            0,
+        )  # whether the vibration of the block under way is set; its accepted commands
+        self._heard_s = time.monotonic()  # of the newest block
+        self._timeout_s = int(guard[0][0].timeout_blocks) * device.block_s
         self._silent_since_s: float | None = None  # None while blocks arrive
         self._is_open = True
         self._open_again_s = 0.0
@@ -195,6 +211,18 @@ class DeviceNode(GuardedNode):
         """Whether `advance` waits until the device has a block."""
         return self._device.pace == "device"
 
+    @property
+    def is_behind(self) -> bool:
+        """Whether more blocks of the device wait to be read."""
+        return self._block.waiting > 0
+
+    def idle(self) -> None:
+        """Discard the blocks of a device that makes them by its own clock; the loop of the run reports a lost device."""
+        with contextlib.suppress(DeviceError):
+            while self.paced_by_rig and (block := self._device.read()) is not None and block.waiting:
+                pass
+        self._heard_s = time.monotonic()
+
     def _step_copies(self) -> None:
         state, memory, sensors = self._guard_state.copy(), self._memory.copy(), sensor_block(self._samples).blank()
         apply_order(state[0], LEAVE)
@@ -204,19 +232,23 @@ class DeviceNode(GuardedNode):
         end(self._guard_params, state, memory, 0.0, 0.0, 0, 0, 0, 0, sensors, APPLIED_LAYOUT.blank())
 
     def _act(self, commands: Records) -> int | None:
-        accepted = 0
-        if self._silent_since_s is None:
-            announce = self._device.announcements()
-            self.announcements = [Outgoing(ANNOUNCE, announce[row : row + 1].tobytes()) for row in range(len(announce))]
-            accepted = begin(self._guard_params, self._guard_state, self._memory, commands, announce)
-            self._write()
+        if self._silent_since_s is None and not self._is_begun:
+            self._begin(commands)
         block = self._read()
         if block is None:
             return None
-        self._block = block
+        self._block, self._is_begun = block, False
         self._note_block(block)
         fill(self._guard_state, self._memory, self.block_ns, block.lost, block.samples, self._sensors)
-        return accepted
+        return self._accepted
+
+    def _begin(self, commands: Records) -> None:
+        """Set the vibration of the next block; later commands are dropped until it is there, as they answer older blocks."""
+        announce = self._device.announcements()
+        self.announcements = [Outgoing(ANNOUNCE, announce[row : row + 1].tobytes()) for row in range(len(announce))]
+        self._accepted = begin(self._guard_params, self._guard_state, self._memory, commands, announce)
+        self._write()
+        self._is_begun = True
 
     def _write(self) -> None:
         """Order the vibration that the guard allows; after a refusal it begins again from rest."""
@@ -245,26 +277,33 @@ class DeviceNode(GuardedNode):
         self._guard_state["amplitude_m"] = 0.0
 
     def _read(self) -> DeviceBlock | None:
-        why = f"no block within {self._device.longest_read_s:g} s"
-        block = None
         try:
             if not self._is_open:
                 self._open_again()
             block = self._device.read() if self._is_open else None
         except DeviceError as error:
-            why = str(error)
+            self._fall_silent(str(error))
             self._device.close()
             self._is_open, self._open_again_s = False, time.monotonic() + _OPEN_AGAIN_S
-        if block is None and self._silent_since_s is None:
-            self._silent_since_s = time.monotonic()
-            self._rest()
-            self._problems.append(("DEVICE_SILENT", f"{why}: the exciter rests", 1))
-        elif block is not None and self._silent_since_s is not None:
-            silent_s = time.monotonic() - self._silent_since_s
+            return None
+        now_s = time.monotonic()
+        if block is None:
+            if now_s - self._heard_s > self._timeout_s:
+                self._fall_silent(f"no block for {self._timeout_s:g} s")
+            return None
+        self._heard_s = now_s
+        if self._silent_since_s is not None:
+            self._problems.append(("DEVICE_BACK", f"blocks again after {now_s - self._silent_since_s:.2f} s", 1))
             self._silent_since_s = None
             self._clock = RateWatch(self._device.block_s)
-            self._problems.append(("DEVICE_BACK", f"blocks again after {silent_s:.2f} s", 1))
         return block
+
+    def _fall_silent(self, why: str) -> None:
+        """Let the exciter rest until blocks arrive again."""
+        if self._silent_since_s is None:
+            self._silent_since_s, self._is_begun, self._accepted = self._heard_s, False, 0
+            self._rest()
+            self._problems.append(("DEVICE_SILENT", f"{why}: the exciter rests", 1))
 
     def _open_again(self) -> None:
         """Try to open a lost device, once each second. Raises DeviceError."""

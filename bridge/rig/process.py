@@ -111,7 +111,7 @@ def serve(
         bus.announce()
         if wait_for and bus.wait_for(wait_for, 0.0):
             report("waiting", f"for {' and '.join(wait_for)} at {bus_config.endpoint}, at most {bus_config.wait_s:g} s")
-        wait_for_peers(bus, bus_config, wait_for, stop)
+        wait_for_peers(bus, bus_config, wait_for, stop, node.idle)
         if wait_for and not stop.is_set():
             report("joined", " and ".join(wait_for))
         process.event("START", granted)
@@ -128,6 +128,7 @@ def serve(
             process.event(code, text)
         if keeper is not None and keeper.holder is not None:
             node.apply_order(HOLD)
+        node.idle()
         advance = process.lockstep if lockstep else process.realtime
         advance(blocks, stop)
         process.end()
@@ -136,12 +137,15 @@ def serve(
     return node.block
 
 
-def wait_for_peers(bus: Bus, config: BusConfig, roles: list[str], stop: threading.Event) -> None:
-    """Wait until all `roles` are on the bus, or `stop` is set. Raises Fault NO_PEER."""
+def wait_for_peers(
+    bus: Bus, config: BusConfig, roles: list[str], stop: threading.Event, idle: Callable[[], object] = int
+) -> None:
+    """Wait until all `roles` are on the bus, or `stop` is set; `idle` is called each 0.2 s. Raises Fault NO_PEER."""
     until_s = time.monotonic() + config.wait_s
     missing = bus.wait_for(roles, 0.0)
     while missing and time.monotonic() < until_s and not stop.is_set():
         missing = bus.wait_for(roles, 0.2)
+        idle()
     if missing and not stop.is_set():
         line = f"{config.endpoint}: no {' and no '.join(sorted(missing))} within {config.wait_s:g} s"
         raise Fault("NO_PEER", f"{line}; start the missing process, or wait longer with --wait S")
@@ -351,7 +355,8 @@ class GuardedRig:
 
     def _await_answer(self) -> int:
         """Wait for a command after the newest block, at most half a block: a device executes it while it makes the next block."""
-        self._heard.wait(_ANSWER_SHARE * self._node.block_ns * 1e-9)
+        if not self._node.is_behind:
+            self._heard.wait(_ANSWER_SHARE * self._node.block_ns * 1e-9)
         self._heard.clear()
         return 0
 

@@ -35,12 +35,15 @@ def rig_box(
     """Simulate a device for the adapter `stream` until Ctrl-C: the plant's physics behind a TCP port, with a dead man."""
     from bridge.config import read_toml, validate
     from bridge.plain import print_line
+    from bridge.wire import realtime
     from cockpit.run.child_process import stop_event
     from cockpit.run.scenario import load_rig
     from plant.box import Box, BoxConfig
 
     config = validate(BoxConfig, read_toml(box), box.name)
     made = Box(config, load_rig(config.rig, config.settings))
+    if not config.waits:
+        realtime.claim(realtime.core(1))
     print_line(f"box      {config.rig} at {config.host}:{made.port}")
     stop: threading.Event = stop_event()
     made.run(stop)

@@ -34,6 +34,7 @@ _HEAD = struct.Struct("<4sIQdd")
 _COMMAND = struct.Struct("<4sIddII")
 _LENGTH_BYTES = 8  # of mark and length, which the length does not count
 _READ_BYTES = 1 << 16
+_MOST_BYTES = 1 << 24  # most bytes that wait in this process: 30 s of blocks of 1 ms
 _CONNECT_S = 2.0
 _END_S = 1.0  # longest wait for a program to end
 # A number this far below the expected one is late or repeated; a lower one begins a new count. Larger: a device that restarts
@@ -105,6 +106,7 @@ class Adapter(Device):
     def read(self) -> DeviceBlock | None:
         """The next frame as a block."""
         until_s = time.monotonic() + self.longest_read_s
+        self._receive()
         while (block := self._next()) is None:
             left_s = until_s - time.monotonic()
             if left_s <= 0.0 or not select.select([self._in], [], [], left_s)[0]:
@@ -113,15 +115,19 @@ class Adapter(Device):
         return block
 
     def _receive(self) -> None:
-        try:
-            received = os.read(self._in, _READ_BYTES)
-        except BlockingIOError:
-            return
-        except OSError as error:
-            raise DeviceError(f"the connection is lost: {error.strerror}") from None
-        if not received:
-            raise DeviceError("the device ended the connection")
-        self._bytes += received
+        """Take all received bytes, as their number shows how far this process is behind."""
+        while len(self._bytes) < _MOST_BYTES:
+            try:
+                received = os.read(self._in, _READ_BYTES)
+            except BlockingIOError:
+                return
+            except OSError as error:
+                raise DeviceError(f"the connection is lost: {error.strerror}") from None
+            if not received:
+                raise DeviceError("the device ended the connection")
+            self._bytes += received
+            if len(received) < _READ_BYTES:
+                return
 
     def _next(self) -> DeviceBlock | None:
         """The first block in the received bytes; bytes before it that are no frame are dropped."""
