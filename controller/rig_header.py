@@ -12,7 +12,11 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.channels import CHANNELS
 from bridge.wire.payloads import refuse_other_schema
 from controller.config import ControllerConfig, seeing, within
+from controller.freshness import COMPUTERS
 
+# Largest drift of a converter's clock. Smaller: 500 ppm are reported as LATE after a minute. Larger: a delay that lasts for less
+# than 1.5 s is not reported.
+_CONVERTERS = 1e-2
 _LIMITS = TypeAdapter(VibrationLimits)
 
 
@@ -47,6 +51,15 @@ def for_rig(header: wire.Header | None, config: ControllerConfig) -> ControllerC
         raise Fault("CONFIG", f"{line}; see bridge/wire/PROTOCOL.md for its fields") from None
     except ValueError as error:
         raise Fault("CONFIG", f"controller.{error}") from None
+
+
+def clock_drift(header: wire.Header | None) -> float:
+    """Largest relative drift of the rig's clock against a computer's: a converter paces the blocks of a real rig."""
+    table: Any = None
+    if header is not None:
+        with contextlib.suppress(ValueError, RecursionError):
+            table = json.loads(header.configuration)
+    return COMPUTERS if _part(_part(table, "rig"), "converter") is None else _CONVERTERS
 
 
 def _part(table: Any, name: str) -> Any:

@@ -70,6 +70,7 @@ class Adapter(Device):
         self.pace = "caller" if self._settings.waits else "device"
         self._shape = setup.samples_per_block, setup.channels
         self._size = _HEAD.size + 4 * setup.samples_per_block * setup.channels
+        self._begin_of_frame = _MARK + (self._size - _LENGTH_BYTES).to_bytes(4, "little")
         self._socket: socket.socket | None = None
         self._program: subprocess.Popen[bytes] | None = None
         self._in = self._out = -1
@@ -138,6 +139,9 @@ class Adapter(Device):
                 made, due = length + _LENGTH_BYTES, self._size
                 self._drop(len(_MARK), f"a frame of {made} bytes, where {self._shape} samples and channels make {due}")
                 continue
+            if (within := self._bytes.find(self._begin_of_frame, 1, self._size)) > 0:
+                self._drop(within, f"a frame that ended after {within} of {self._size} bytes")
+                continue
             if len(self._bytes) < self._size:
                 return None
             samples = np.frombuffer(self._bytes, "<f4", offset=_HEAD.size, count=self._shape[0] * self._shape[1])
@@ -158,7 +162,7 @@ class Adapter(Device):
     def _is_next(self, number: int) -> bool:
         """Whether a block continues the count, perhaps after a loss, or begins another one."""
         behind = 0 if self._expected is None else self._expected - number
-        if 0 < behind <= _LATE_BLOCKS and number > 0:
+        if behind == 1 or (0 < behind <= _LATE_BLOCKS and number > 0):
             self._dropped = f"block {number} after block {number + behind - 1}"
             return False
         self._lost += max(-behind, 0)
