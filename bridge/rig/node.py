@@ -24,9 +24,9 @@ from bridge.wire.messages import sealed, sensor_block
 from bridge.wire.stickslip_pb2 import FAULT, STOP_BY_PERSON, STOP_KEPT
 from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, SENSORS, Outgoing
 
-# Blocks that may wait behind a block without a report. Smaller: each short stall of the computer is reported. Larger: a loop that
-# is 4 ms behind is not.
-_FEW_WAITING = 3
+# Time of the blocks that may wait without a report. Smaller: each short stall of the computer is reported. Larger: v_a swings by
+# more than 4 % (the margin of the controller's LATE) without a report.
+_BEHIND_S = 0.015
 _OPEN_AGAIN_S = 1.0  # interval of the attempts to open a lost device
 
 
@@ -267,7 +267,7 @@ class DeviceNode(GuardedNode):
             self._problems.append(("SAMPLES_LOST", "blocks were lost before they were read", block.lost))
         if block.dropped:
             self._problems.append(("DEVICE_DATA", f"{block.dropped}: dropped", 1))
-        if block.waiting > _FEW_WAITING:
+        if block.waiting * self._device.block_s > _BEHIND_S:
             self._problems.append(("BEHIND", f"{block.waiting} blocks waited to be read", 1))
         if self.paced_by_rig and (text := self._clock.add(1 + block.lost, time.monotonic())):
             self._problems.append(("DEVICE_RATE", text, 1))
