@@ -50,6 +50,7 @@ _PANELS: dict[str, dict[str, tuple[str, ...]]] = {
         "plant": ("processes.plant",),
         "rig": (
             "rig.rig_app",
+            "stickslip rig check mine.toml",
             "stickslip rig serve mine.toml",
             "stickslip rig box box.toml",
         ),

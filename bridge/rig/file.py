@@ -4,13 +4,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from bridge.arrays import Records
 from bridge.config import Strict
 from bridge.guard.absent import ChannelName, PresentOrAbsent, absent, refusal
 from bridge.guard.config import ExciterConfig, GuardConfig, Positive, VibrationLimits
-from bridge.guard.records import ExciterLimits
-from bridge.guard.wide import protection
-from bridge.rig.step import device_memory
 from bridge.wire.channels import CHANNELS
 
 _NOT_ZERO = "scale = 0: must not be 0; give the SI units for one unit of the device"
@@ -106,11 +102,6 @@ class DeviceRig(Strict):
         return self.guard.vibration_limits(self.exciter)
 
     @property
-    def exciter_limits(self) -> ExciterLimits:
-        """The exciter for the guard."""
-        return ExciterLimits.of(self.exciter, self.converter.block_s, self.converter.samples_per_block)
-
-    @property
     def solver(self) -> ConverterConfig:
         """Length and samples of a block, by the name that a simulated rig and the header give them."""
         return self.converter
@@ -119,25 +110,6 @@ class DeviceRig(Strict):
     def sources(self) -> int:
         """Number of channels that the device must have."""
         return 1 + max(channel.source for channel in self.channels.values() if channel.source is not None)
-
-    def notes(self) -> list[tuple[str, str]]:
-        """Codes and texts of the events at the start of a run: wide limits, and protection that this rig lacks."""
-        fastest_mps = self.guard.fastest_drive_mps or 0.0
-        notes = protection(self.guard, self.exciter_limits, fastest_mps, absent(self.channels))
-        if not self.exciter.enable_line:
-            notes.append(("UNPROTECTED", "no enable line: the loop check finds no exciter that cannot be switched off"))
-        if self.exciter.watchdog_s == 0.0:
-            notes.append(("UNPROTECTED", "no watchdog: a killed process leaves the exciter vibrating"))
-        return notes
-
-    def memory(self) -> Records:
-        """The calibration as the memory of a `DeviceNode`."""
-        memory = device_memory()
-        for row, name in enumerate(CHANNELS):
-            channel = self.channels[name]
-            memory["source"][0, row] = -1 if channel.source is None else channel.source
-            memory["scale"][0, row], memory["offset"][0, row] = channel.sign * channel.scale, channel.offset
-        return memory
 
     def header(self) -> dict[str, Any]:
         """The rig in the header of its process: rate, blocks, calibration, exciter and guard."""

@@ -1,4 +1,4 @@
-"""The adapter that a rig file names, and the node of a real rig."""
+"""The device of a rig file, by the adapter that it names. Nothing here needs compiled kernels."""
 
 import importlib
 import importlib.util
@@ -6,13 +6,8 @@ from pathlib import Path
 from types import ModuleType
 
 from bridge.faults import Fault
-from bridge.guard.absent import absent
-from bridge.guard.records import build
-from bridge.rig.device import Device, DeviceError, Setup
-from bridge.rig.faults.schedule import Faults
+from bridge.rig.device import Device, Setup
 from bridge.rig.file import DeviceRig
-from bridge.rig.node import DeviceNode
-from bridge.rig.process import Served
 
 
 def device_of(rig: DeviceRig, folder: Path) -> Device:
@@ -54,20 +49,3 @@ def _module(rig: DeviceRig, folder: Path) -> ModuleType:
     except (OSError, SyntaxError) as error:
         raise Fault("CONFIG", f"{place}: cannot be read: {error}; correct the file") from None
     return module
-
-
-def served(rig: DeviceRig, folder: Path) -> Served:
-    """A real rig for `bridge.rig.process.serve`; it never starts ARMED."""
-    return Served(rig.name, rig.guard, rig.notes(), lambda run, _may_arm: open_node(rig, folder, run))
-
-
-def open_node(rig: DeviceRig, folder: Path, run: int) -> DeviceNode:
-    """The node of a rig whose device is open. Raises Fault CONFIG, NO_DEVICE; a rig that cannot be opened is never simulated."""
-    device = device_of(rig, folder)
-    guard = build(rig.guard, rig.exciter_limits, run, absent=absent(rig.channels))
-    faults = Faults((), 0, rig.converter.block_s, rig.converter.samples_per_block)
-    try:
-        device.open()
-    except DeviceError as error:
-        raise Fault("NO_DEVICE", f"{rig.name}: {error}") from None
-    return DeviceNode(device, guard, faults, rig.memory(), rig.exciter.stroke_m_per_V or 1.0)

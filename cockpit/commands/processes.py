@@ -82,8 +82,8 @@ def serve_rig(shared: SharedOptions, rig: str | None, wait_for: str, as_json: Js
         if folder is None:
             blocks = _simulated(made, roles, shared.lockstep, stop, kept, report)
         else:
-            from bridge.rig.load import served
             from bridge.rig.process import serve
+            from bridge.rig.real import served
             from cockpit.run.device_run import device_header
 
             described = device_header(made, "plant", shared.lockstep)

@@ -1,4 +1,4 @@
-"""`stickslip rig ...`: serve a real rig, check it, and simulate a device."""
+"""`stickslip rig ...`: serve and check a real rig; simulate a device."""
 
 import threading
 from pathlib import Path
@@ -10,7 +10,9 @@ from cockpit.commands.as_json.option import Json, JsonGroup, print_result
 from cockpit.commands.options import SharedOptions, command
 from cockpit.commands.processes import WaitFor, serve_rig
 
-rig_app = typer.Typer(cls=JsonGroup, help="Serve a real rig behind the guard; simulate a device.", no_args_is_help=True)
+rig_app = typer.Typer(
+    cls=JsonGroup, help="Serve a real rig behind the guard, check it; simulate a device.", no_args_is_help=True
+)
 RigArgument = Annotated[str, typer.Argument(metavar="RIG", help="A rig file of a real rig, .toml.")]
 
 
@@ -25,6 +27,34 @@ class Boxed(NamedTuple):
 def rig_serve(shared: SharedOptions, rig: RigArgument, wait_for: WaitFor = "controller", as_json: Json = None) -> None:
     """Serve a rig on the bus, as `plant --rig`: open its device behind the guard, or simulate it."""
     serve_rig(shared, rig, wait_for, as_json)
+
+
+@rig_app.command("check")
+@command("settings")
+def rig_check(
+    shared: SharedOptions,
+    rig: RigArgument,
+    seconds: Annotated[float, typer.Option("--seconds", min=1.0, max=600.0, metavar="S", help="Length.")] = 5.0,
+    as_json: Json = None,
+) -> int:
+    """Check the device of a rig with its exciter at rest; exit status 0: ok, 1: problems, each with a remedy."""
+    from bridge.faults import Fault
+    from bridge.rig.check import check
+    from bridge.rig.device import DeviceError
+    from bridge.rig.load import device_of
+    from cockpit.run.device_run import load_device_rig
+
+    made, folder = load_device_rig(rig, shared.settings)
+    device = device_of(made, folder)
+    try:
+        device.open()
+        result = check(device, made, seconds)
+    except DeviceError as error:
+        raise Fault("NO_DEVICE", f"{made.name}: {error}") from None
+    finally:
+        device.close()
+    print_result(as_json, result, result.in_words())
+    return 0 if result.ok else 1
 
 
 @rig_app.command("box")

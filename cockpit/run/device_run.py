@@ -7,11 +7,12 @@ from typing import Any, NamedTuple
 from pydantic import model_validator
 
 from bridge.config import made_with, read_toml, validate, with_overrides
+from bridge.faults import Fault
 from bridge.guard.absent import absent
 from bridge.rig.file import DeviceRig
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.run.run_tables import RunTables, header_of
-from cockpit.run.scenario_file import RIG_FILE, find, is_real_rig, path_of_rig, with_rig
+from cockpit.run.scenario_file import RIG_FILE, find, is_real_rig, path_of_rig, rig_table, with_rig
 from controller.config import seeing, within
 
 # The default scenario describes the paper's simulated rig; a real rig without another scenario runs with the controller's
@@ -67,6 +68,19 @@ def load_device_run(name: str, settings: list[str]) -> tuple[DeviceRun, Path]:
         return validate(DeviceRun, _tables(name, given).run, source)
 
     return made_with(make, source, settings, of_rig), folder
+
+
+def load_device_rig(name: str, settings: list[str]) -> tuple[DeviceRig, Path]:
+    """A real rig by name or path with `key=value` settings, and the folder of its file. Raises Fault CONFIG."""
+    path = find(name, "rigs")
+    table = rig_table(path)
+    if not is_real_rig(table):
+        raise Fault("CONFIG", f"{path.name}: adapter: not given: is a simulated rig; name the adapter of a real rig")
+
+    def make(given: Sequence[str]) -> DeviceRig:
+        return validate(DeviceRig, with_overrides(table, given), path.name)
+
+    return made_with(make, path.name, settings), path.absolute().parent
 
 
 def _tables(name: str, settings: Sequence[str]) -> _Tables:

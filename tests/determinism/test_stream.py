@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from bridge.rig.load import open_node
+from bridge.rig.real import open_node
 from cockpit.run.scenario import load_scenario
 from plant.node import PlantNode
 from tests.determinism.test_device import played

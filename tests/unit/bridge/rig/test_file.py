@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 
 from bridge.faults import Fault
-from bridge.rig.load import device_of, open_node
+from bridge.rig.load import device_of
+from bridge.rig.real import notes, open_node
 from tests.unit.bridge.rig.boxes import GUARD, rig_file, table, toml
 
 ADAPTER = """
@@ -91,12 +92,12 @@ def test_a_device_that_cannot_be_opened_is_an_error_and_never_a_simulation(tmp_p
 
 
 def test_lost_protection_is_noted_for_lines_and_watchdogs() -> None:
-    assert [text.partition(":")[0] for code, text in rig_file(exciter={}).notes() if code == "UNPROTECTED"] == [
+    assert [text.partition(":")[0] for code, text in notes(rig_file(exciter={})) if code == "UNPROTECTED"] == [
         "no enable line",
         "no watchdog",
     ]
     whole = rig_file(exciter={"enable_line": True, "watchdog_s": 0.1})
-    assert [code for code, _ in whole.notes() if code == "UNPROTECTED"] == []
+    assert [code for code, _ in notes(whole) if code == "UNPROTECTED"] == []
 
 
 def test_the_header_holds_blocks_calibration_and_limits() -> None:

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from bridge.guard.absent import absent
-from bridge.guard.records import build
+from bridge.guard.records import ExciterLimits, build
 from bridge.guard.states import ARM
 from bridge.rig.device import Device, DeviceBlock, DeviceError, Setup
 from bridge.rig.faults.schedule import Faults
 from bridge.rig.faults.table import FaultTable
 from bridge.rig.node import DeviceNode
+from bridge.rig.real import calibration
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.clock import time
 from bridge.wire.messages import COMMAND, sensor_block
@@ -78,10 +79,10 @@ class Rig:
 
     def __init__(self, device: Bench, arm: bool = True, faults: tuple[FaultTable, ...] = (), **more: Any) -> None:
         rig = rig_file(**more)
-        guard = build(rig.guard, rig.exciter_limits, 1, arm, absent(rig.channels))
+        guard = build(rig.guard, ExciterLimits.of(rig.exciter, STEP_S, 20), 1, arm, absent(rig.channels))
         schedule = Faults(faults, 1, STEP_S, 20)
         self.device = device
-        self.node = DeviceNode(device, guard, schedule, rig.memory(), rig.exciter.stroke_m_per_V or 1.0)
+        self.node = DeviceNode(device, guard, schedule, calibration(rig), rig.exciter.stroke_m_per_V or 1.0)
         self.sensors: list[Any] = []
         self.problems: list[str] = []
         self.applied_m: list[float] = []
