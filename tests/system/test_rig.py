@@ -43,6 +43,7 @@ def test_a_real_rig_runs_in_lockstep_with_the_rig_file_alone(tmp_path: Path) -> 
             timeout=PATIENCE_S,
             capture_output=True,
             text=True,
+            check=False,
         )
     assert result.returncode in (0, 1, 14), result.stderr
     run = read_run(log)
@@ -69,7 +70,7 @@ def test_a_rig_that_cannot_be_opened_ends_the_run_with_its_reason(tmp_path: Path
     [
         (["run", "--in-process"], "names a real rig: this command needs a simulated rig"),
         (["plant", "--set", "arm=true"], "arm = true: a real rig is armed by an operator alone"),
-        (["controller", "--set", "controller.block_s=0.002"], "controller.block_s = 0.002: must equal 0.001"),
+        (["controller", "--set", "controller.block_s=0.0005"], "controller.block_s = 0.0005: must equal 0.001"),
         (["rig", "check"], "Connection refused"),
     ],
 )
@@ -108,8 +109,8 @@ def test_however_the_rigs_process_ends_the_vibration_ends(
                 time.sleep(0.2)
             while rows(record)[-1][5] < 1e-8 and time.monotonic() < until_s:
                 time.sleep(0.1)
-            before = len(rows(record))
             os.kill(plant.pid, getattr(signal, signal_name))
+            before = record.read_bytes().count(b"\n") - 1
             time.sleep(1.0)
             after = [row[1] for row in rows(record)[before:]]
         finally:
