@@ -1,4 +1,4 @@
-"""A simulated device in a process of its own, for tests of the adapter `stream`: the plant's physics behind a TCP port.
+"""A simulated device in another process, for tests of the adapter `stream`: the plant's physics behind a TCP port.
 
 It shares no code with the adapter. Its clock may be wrong, it has a dead man, and it records its true vibration.
 """

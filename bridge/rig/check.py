@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bridge.arrays import Floats
+from bridge.results import in_json
 from bridge.rig.device import Device, DeviceError
 from bridge.rig.file import DeviceRig
 from bridge.wire.channels import CHANNELS, SENSOR_CHANNELS
@@ -57,7 +58,7 @@ class RigCheck(NamedTuple):
     channels: list[ChannelCheck]
     problems: list[Problem]
 
-    @property
+    @in_json
     def ok(self) -> bool:
         """Whether nothing was found."""
         return not self.problems
@@ -75,7 +76,7 @@ class RigCheck(NamedTuple):
 
 
 class _Heard:
-    """What a device sent."""
+    """Blocks and failures of a device."""
 
     def __init__(self) -> None:
         self.samples: list[Floats] = []

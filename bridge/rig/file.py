@@ -33,7 +33,8 @@ class ChannelConfig(PresentOrAbsent):
     lowest: float | None = Field(default=None, description="Lowest value that the sensor measures, in SI units.")
     highest: float | None = Field(default=None, description="Highest value that the sensor measures, in SI units.")
     bandwidth_Hz: Positive | None = Field(
-        default=None, description="Bandwidth of the sensor; the controller corrects v_a by that of base_accel_mps2."
+        default=None,
+        description="Bandwidth of the sensor. For base_accel_mps2 the controller corrects v_a by it, and knows its range.",
     )
 
     @model_validator(mode="after")

@@ -13,7 +13,7 @@ from bridge.rig.file import DeviceRig
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.run.run_tables import RunTables, header_of
 from cockpit.run.scenario_file import RIG_FILE, find, is_real_rig, path_of_rig, rig_table, with_rig
-from controller.config import seeing, within
+from controller.config import AmplitudeConfig, seeing, within
 
 # The default scenario describes the paper's simulated rig; a real rig without another scenario runs with the controller's
 # defaults until Ctrl-C.
@@ -40,10 +40,19 @@ class DeviceRun(RunTables):
                     f"controller.{name} = {given}: must equal {of_rig}, from [converter] of the rig; leave it out"
                 )
         try:
-            controller = seeing(controller.model_copy(update=blocks), absent(self.rig.channels))
+            accelerometer = {"amplitude": self._amplitude(controller.amplitude)}
+            controller = seeing(controller.model_copy(update=blocks | accelerometer), absent(self.rig.channels))
             return self.model_copy(update={"controller": within(controller, self.rig.vibration_limits)})
         except ValueError as error:
             raise ValueError(f"controller.{error}") from None
+
+    def _amplitude(self, given: AmplitudeConfig) -> AmplitudeConfig:
+        """The table with bandwidth and range of the base accelerometer, where it does not give them."""
+        base = self.rig.channels["base_accel_mps2"]
+        ends = [abs(end) for end in (base.lowest, base.highest) if end is not None]
+        stated = {"accel_bandwidth_Hz": base.bandwidth_Hz, "accel_range_mps2": min(ends, default=None)}
+        known = {key: value for key, value in stated.items() if value and key not in given.model_fields_set}
+        return given.model_copy(update=known)
 
 
 class _Tables(NamedTuple):

@@ -1,4 +1,4 @@
-"""A real rig over the bus: its device is a process of its own, behind the adapter `stream`."""
+"""A real rig over the bus: its device is another process, behind the adapter `stream`."""
 
 import json
 import os
@@ -31,10 +31,11 @@ def written(folder: Path, port: int, **more: Any) -> Path:
 
 
 def test_a_real_rig_runs_in_lockstep_with_the_rig_file_alone(tmp_path: Path) -> None:
-    """Its header sets blocks, channels and limits of the controller; nobody arms it, so it never vibrates."""
+    """Its header sets blocks, channels and limits of the controller; without an operator it never vibrates."""
     log = tmp_path / "run.mcap"
     with boxed(tmp_path, settings=["solver.samples_per_block=25"]) as port:
-        channels = table()["channels"] | {"drive_force_N": {"absent": True}}
+        accelerometer = {"source": 2, "bandwidth_Hz": 8000.0, "highest": 100.0}
+        channels = table()["channels"] | {"drive_force_N": {"absent": True}, "base_accel_mps2": accelerometer}
         converter = {"sample_rate_Hz": 25_000.0, "samples_per_block": 25}
         rig = written(tmp_path, port, channels=channels, converter=converter)
         arguments = ["run", "--rig", str(rig), "--lockstep", "--set", "duration_s=0.4", "--log", str(log)]
@@ -54,6 +55,8 @@ def test_a_real_rig_runs_in_lockstep_with_the_rig_file_alone(tmp_path: Path) -> 
     controller = json.loads(run.headers["controller"]["configuration"])
     assert controller["samples_per_block"] == 25
     assert controller["estimator"]["use_force"] is False
+    assert controller["amplitude"]["accel_bandwidth_Hz"] == 8000.0
+    assert controller["amplitude"]["accel_range_mps2"] == 100.0
     events = {event.code: event.text for event in run.events}
     assert events["UNPROTECTED"].startswith("no watchdog")
 

@@ -131,7 +131,7 @@ class Adapter(Device):
                 return
 
     def _next(self) -> DeviceBlock | None:
-        """The first block in the received bytes; bytes before it that are no frame are dropped."""
+        """The first block in the received bytes; other bytes before it are dropped."""
         while (at := self._bytes.find(_MARK)) >= 0 and len(self._bytes) >= at + _HEAD.size:
             self._drop(at, f"{at} bytes between two frames")
             _, length, number, frequency_Hz, amplitude = _HEAD.unpack_from(self._bytes)

@@ -1,4 +1,4 @@
-"""A simulated device in a process of its own, and the rig file for it."""
+"""A simulated device in another process, and the rig file for it."""
 
 import json
 import re

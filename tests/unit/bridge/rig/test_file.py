@@ -1,4 +1,4 @@
-"""A rig file of a real rig: what it must hold, what it is refused for, and the adapter that it names."""
+"""A rig file of a real rig: its necessary keys, its refusals, and the adapter that it names."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""The adapter `stream` reads whole frames alone, counts what is lost, and reports what it drops."""
+"""The adapter `stream` reads whole frames alone, counts lost blocks, and reports dropped data."""
 
 import math
 import socket
