@@ -1,6 +1,7 @@
 """A rig behind its guard: commands in, sensor blocks and the applied vibration out, block by block."""
 
 import contextlib
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any
@@ -194,10 +195,8 @@ class DeviceNode(GuardedNode):
         self._device, self._stroke_m = device, stroke_m
         self._memory = device_memory() if memory is None else memory
         self._block = DeviceBlock(np.zeros((1, 1)), 0.0, 0.0)
-        self._is_begun, self._accepted = (
-            False,
-            0,
-        )  # whether the vibration of the block under way is set; its accepted commands
+        self._is_begun = False  # whether the vibration of the block under way is set
+        self._accepted = 0  # number of commands accepted for it
         self._heard_s = time.monotonic()  # of the newest block
         self._timeout_s = int(guard[0][0].timeout_blocks) * device.block_s
         self._silent_since_s: float | None = None  # None while blocks arrive
@@ -262,6 +261,21 @@ class DeviceNode(GuardedNode):
             self._rest()
             self._problems.append(("DEVICE_REFUSED", f"{error}: the exciter rests, and begins again from 0", 1))
 
+    def _whole(self, block: DeviceBlock | None) -> DeviceBlock | None:
+        """A block for the kernels; None for a block of another shape, or with a vibration that is not finite."""
+        if block is None:
+            return None
+        samples = np.ascontiguousarray(block.samples, np.float64)
+        needed, numbers = int(self._memory["source"].max()) + 1, (block.frequency_Hz, block.amplitude)
+        if samples.ndim != 2 or len(samples) < needed or samples.shape[1] != self._samples:
+            due = f"must be {needed} channels or more x {self._samples}"
+            self._problems.append(("DEVICE_DATA", f"samples of shape {samples.shape}: {due}: dropped", 1))
+            return None
+        if not all(map(math.isfinite, numbers)):
+            self._problems.append(("DEVICE_DATA", f"a vibration of {numbers}: dropped", 1))
+            return None
+        return block._replace(samples=samples)
+
     def _note_block(self, block: DeviceBlock) -> None:
         if block.lost:
             self._problems.append(("SAMPLES_LOST", "blocks were lost before they were read", block.lost))
@@ -280,7 +294,7 @@ class DeviceNode(GuardedNode):
         try:
             if not self._is_open:
                 self._open_again()
-            block = self._device.read() if self._is_open else None
+            block = self._whole(self._device.read()) if self._is_open else None
         except DeviceError as error:
             self._fall_silent(str(error))
             self._device.close()

@@ -323,9 +323,15 @@ class GuardedRig:
         node, pacer = self._node, realtime.Pacer(self._node.block_ns)
         sent_ns = [0] * _ROUND_TRIPS_KEPT
         tick = 0
+        longest_wait_s = _ANSWER_SHARE * node.block_ns * 1e-9
         remind_ticks = _REMIND_NS // node.block_ns
         while node.block < blocks and not stop.is_set():
-            late_ns = self._await_answer() if node.paced_by_rig else pacer.wait(tick)
+            late_ns = 0
+            if not node.paced_by_rig:
+                late_ns = pacer.wait(tick)
+            elif not node.is_behind:  # a command after the newest block acts while the device makes the next one
+                self._heard.wait(longest_wait_s)
+            self._heard.clear()
             if tick % remind_ticks == 0 and (text := self._bus.expiring()):
                 self.event("CERTIFICATE", text)
             tick += 1
@@ -352,13 +358,6 @@ class GuardedRig:
                 self._paused_ns = max(self._paused_ns, late_ns)
             elif late_ns < node.block_ns and commands:  # commands arrive again: the link is up
                 self._report_stall()
-
-    def _await_answer(self) -> int:
-        """Wait for a command after the newest block, at most half a block: a device executes it while it makes the next block."""
-        if not self._node.is_behind:
-            self._heard.wait(_ANSWER_SHARE * self._node.block_ns * 1e-9)
-        self._heard.clear()
-        return 0
 
     def _report_stall(self) -> None:
         if self._paused_ns:

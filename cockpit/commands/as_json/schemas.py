@@ -183,11 +183,11 @@ _RESULTS = {
 }
 TOML = (
     Format("rig", "A rig file of a simulated rig, as in deploy/rigs: `--rig FILE.toml`.", _rig),
+    Format("scenario", "A scenario file, as in deploy/scenarios: `--scenario FILE.toml`.", scenario),
     Format(
         "real-rig", "A rig file of a real rig: `--rig FILE.toml`, `stickslip rig check`.", "bridge.rig.file:DeviceRig"
     ),
     Format("box", "A simulated device: `stickslip rig box FILE.toml`.", "plant.box:BoxConfig"),
-    Format("scenario", "A scenario file, as in deploy/scenarios: `--scenario FILE.toml`.", scenario),
     Format(
         "faults",
         "A group of the catalogue of `python -m bench faults`, as in deploy/faults.",

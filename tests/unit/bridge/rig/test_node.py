@@ -176,6 +176,31 @@ def test_missing_samples_are_never_filled(device: Bench) -> None:
     assert np.isfinite(rig.sensors[-1].drive_force_N).all()
 
 
+@pytest.mark.parametrize(
+    "bad",
+    [
+        DeviceBlock(np.zeros((4, 20)), 2600.0, 3e-8),
+        DeviceBlock(np.zeros((5, 19)), 2600.0, 3e-8),
+        DeviceBlock(np.zeros(100), 2600.0, 3e-8),
+        DeviceBlock(np.zeros((5, 20)), 2600.0, np.nan),
+    ],
+)
+def test_a_block_that_is_none_is_dropped_and_reported(device: Bench, bad: DeviceBlock) -> None:
+    rig = Rig(device)
+    rig.run(60)
+    read = device.read
+    device.read = lambda: bad if read() else None
+    rig.run(3)
+    assert rig.problems == ["DEVICE_DATA"] * 3
+    assert len(rig.sensors) == 60
+    rig.run(60)
+    assert "DEVICE_SILENT" in rig.problems
+    assert device.orders[-1][1] == 0.0
+    device.read = read
+    rig.run(1)
+    assert len(rig.sensors) == 61
+
+
 def test_channels_are_wired_and_calibrated_and_the_exciter_takes_volts(device: Bench) -> None:
     channels = table()["channels"] | {
         "drive_force_N": {"source": 1, "scale": 50.0, "offset": 2.0, "sign": -1},
