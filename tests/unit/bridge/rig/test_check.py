@@ -140,6 +140,7 @@ def test_a_device_that_fails_is_reported_with_its_reason(checked: Callable[..., 
     assert [problem.text for problem in problems] == ["the cable is out", "it sends no blocks"]
 
 
+@pytest.mark.slow
 def test_a_rig_that_is_no_simulation_imports_no_plant() -> None:
     code = (
         "import sys, bridge.rig.check, bridge.rig.real, bridge.rig.adapters.stream\n"

@@ -243,6 +243,7 @@ def test_the_end_lets_the_exciter_rest(device: Bench) -> None:
     assert device.safes == 1
 
 
+@pytest.mark.slow
 def test_a_rate_that_is_far_off_is_reported_once(device: Bench) -> None:
     rig = Rig(device)
     rig.run(5000)
