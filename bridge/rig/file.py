@@ -1,5 +1,7 @@
 """The rig file of a real rig: its adapter, the wiring and calibration of its channels, its exciter and its guard."""
 
+import hashlib
+import json
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
@@ -113,6 +115,7 @@ class DeviceRig(Strict):
         return 1 + max(channel.source for channel in self.channels.values() if channel.source is not None)
 
     def header(self) -> dict[str, Any]:
-        """The rig in the header of its process: rate, blocks, calibration, exciter and guard."""
+        """The rig in the header of its process: rate, blocks, calibration, exciter and guard, and a checksum of all of it."""
         blocks = {"block_s": self.converter.block_s, "samples_per_block": self.converter.samples_per_block}
-        return self.model_dump(mode="json", exclude={"device"}) | {"solver": blocks}
+        table = self.model_dump(mode="json", exclude={"device"}) | {"solver": blocks}
+        return table | {"checksum": hashlib.sha256(json.dumps(table, sort_keys=True).encode()).hexdigest()}

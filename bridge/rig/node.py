@@ -2,8 +2,10 @@
 
 import contextlib
 import math
+import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -203,7 +205,7 @@ class DeviceNode(GuardedNode):
         self._is_open = True
         self._open_again_s = 0.0
         self._problems: list[tuple[str, str, int]] = []
-        self._clock = RateWatch(device.block_s)
+        self._clock = RateWatch(device.setup.sample_rate_Hz, self._samples)
 
     @property
     def paced_by_rig(self) -> bool:
@@ -217,7 +219,7 @@ class DeviceNode(GuardedNode):
 
     def idle(self) -> None:
         """Discard the blocks of a device that makes them by its own clock; the loop of the run reports a lost device."""
-        with contextlib.suppress(DeviceError):
+        with contextlib.suppress(Exception):
             while self.paced_by_rig and (block := self._device.read()) is not None and block.waiting:
                 pass
         self._heard_s = time.monotonic()
@@ -257,9 +259,11 @@ class DeviceNode(GuardedNode):
             if has_line := device.setup.has_enable_line:
                 device.enable(is_on, int(g.toggle))
             device.write(float(g.frequency_Hz), float(g.amplitude_m) / self._stroke_m if is_on or has_line else 0.0)
-        except DeviceError as error:
+        except Exception as error:
             self._rest()
-            self._problems.append(("DEVICE_REFUSED", f"{error}: the exciter rests, and begins again from 0", 1))
+            self._problems.append(
+                ("DEVICE_REFUSED", f"{_reason(error)}: the exciter rests, and begins again from 0", 1)
+            )
 
     def _whole(self, block: DeviceBlock | None) -> DeviceBlock | None:
         """A block for the kernels; None for a block of another shape, or with a vibration that is not finite."""
@@ -283,21 +287,25 @@ class DeviceNode(GuardedNode):
             self._problems.append(("DEVICE_DATA", f"{block.dropped}: dropped", 1))
         if block.waiting * self._device.block_s > _BEHIND_S:
             self._problems.append(("BEHIND", f"{block.waiting} blocks waited to be read", 1))
-        if self.paced_by_rig and (text := self._clock.add(1 + block.lost, time.monotonic())):
-            self._problems.append(("DEVICE_RATE", text, 1))
+        if self.paced_by_rig and (measured := self._clock.add(1 + block.lost, time.monotonic())):
+            self._problems.append((*measured, 1))
 
     def _rest(self) -> None:
-        self._device.safe()
         self._guard_state["amplitude_m"] = 0.0
+        try:
+            self._device.safe()
+        except Exception as error:
+            self._problems.append(("DEVICE_REFUSED", f"{_reason(error)}: the exciter may still vibrate", 1))
 
     def _read(self) -> DeviceBlock | None:
         try:
             if not self._is_open:
                 self._open_again()
             block = self._whole(self._device.read()) if self._is_open else None
-        except DeviceError as error:
-            self._fall_silent(str(error))
-            self._device.close()
+        except Exception as error:
+            self._fall_silent(_reason(error))
+            with contextlib.suppress(Exception):  # it is lost already
+                self._device.close()
             self._is_open, self._open_again_s = False, time.monotonic() + _OPEN_AGAIN_S
             return None
         now_s = time.monotonic()
@@ -309,7 +317,7 @@ class DeviceNode(GuardedNode):
         if self._silent_since_s is not None:
             self._problems.append(("DEVICE_BACK", f"blocks again after {now_s - self._silent_since_s:.2f} s", 1))
             self._silent_since_s = None
-            self._clock = RateWatch(self._device.block_s)
+            self._clock = RateWatch(self._device.setup.sample_rate_Hz, self._samples)
         return block
 
     def _fall_silent(self, why: str) -> None:
@@ -350,11 +358,19 @@ class DeviceNode(GuardedNode):
         )
 
     def problems(self) -> list[tuple[str, str, int]]:
-        """Codes, texts and numbers of new problems with the device."""
+        """Codes, texts and numbers of new problems with the device, and its measured rate."""
         problems, self._problems = self._problems, []
         return problems
 
     def close(self) -> None:
         """Bring the exciter to rest and disconnect."""
-        self._device.safe()
+        self._rest()
         self._device.close()
+
+
+def _reason(error: Exception) -> str:
+    """The reason of a failed call. An adapter may be foreign code: its error must not end the loop of the guard."""
+    if isinstance(error, DeviceError):
+        return str(error)
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{Path(place.filename).name}, line {place.lineno}: {type(error).__name__}: {error}"

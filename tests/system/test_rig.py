@@ -6,6 +6,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -92,16 +94,12 @@ def rows(record: Path) -> list[list[float]]:
     return [[float(value) for value in line.split(",")] for line in lines]
 
 
-@pytest.mark.realtime
-@pytest.mark.parametrize("signal_name", ["SIGKILL", "SIGSTOP", "SIGTERM", "SIGINT"])
-def test_however_the_rigs_process_ends_the_vibration_ends(
-    signal_name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """By the device's own record: within its dead man, or as fast as the ramp."""
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    record, endpoint = tmp_path / "truth.csv", free_endpoint()
-    with boxed(tmp_path, waits=False, record=str(record), dead_man_s=DEAD_MAN_S) as port:
-        rig = written(tmp_path, port, device={"address": f"127.0.0.1:{port}"})
+@contextmanager
+def driven(folder: Path, **box: Any) -> Generator[tuple[subprocess.Popen[bytes], Path, str]]:
+    """A box, its rig and a controller in real time, once the rig vibrates: the rig's process, the record, the endpoint."""
+    record, endpoint = folder / "truth.csv", free_endpoint()
+    with boxed(folder, waits=False, record=str(record), dead_man_s=DEAD_MAN_S, **box) as port:
+        rig = written(folder, port, device={"address": f"127.0.0.1:{port}"})
         named = ["--rig", str(rig), "--endpoint", endpoint]
         plant = subprocess.Popen([*SEEN, "plant", *named], stderr=subprocess.DEVNULL)
         controller = subprocess.Popen([*SEEN, "controller", *named], stderr=subprocess.DEVNULL)
@@ -110,17 +108,47 @@ def test_however_the_rigs_process_ends_the_vibration_ends(
             arm = [*SEEN, "arm", "--endpoint", endpoint]
             while subprocess.run(arm, capture_output=True, check=False).returncode and time.monotonic() < until_s:
                 time.sleep(0.2)
-            while rows(record)[-1][5] < 1e-8 and time.monotonic() < until_s:
+            while rows(record)[-1][5] <= 1e-8 and time.monotonic() < until_s:
                 time.sleep(0.1)
-            os.kill(plant.pid, getattr(signal, signal_name))
-            before = record.read_bytes().count(b"\n") - 1
-            time.sleep(1.0)
-            after = [row[1] for row in rows(record)[before:]]
+            yield plant, record, endpoint
         finally:
             for process in (plant, controller):
                 process.send_signal(signal.SIGCONT)
                 process.kill()
                 process.wait(PATIENCE_S)
+
+
+@pytest.fixture
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    return tmp_path
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("signal_name", ["SIGKILL", "SIGSTOP", "SIGTERM", "SIGINT"])
+def test_however_the_rigs_process_ends_the_vibration_ends(signal_name: str, home: Path) -> None:
+    """By the device's own record: within its dead man, or as fast as the ramp."""
+    with driven(home) as (plant, record, _):
+        os.kill(plant.pid, getattr(signal, signal_name))
+        before = record.read_bytes().count(b"\n") - 1
+        time.sleep(1.0)
+        after = [row[1] for row in rows(record)[before:]]
     assert after[0] > 0.0
     assert 1e-3 * after.index(0.0) <= DEAD_MAN_S + SLACK_S
     assert max(after[after.index(0.0) :]) == 0.0
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("clock_ppm", [-5000.0, 5000.0])
+def test_a_converter_with_a_wrong_clock_is_followed(clock_ppm: float, home: Path) -> None:
+    """Paced by the computer's clock the loop was 100 ms behind after 20 s, and the accelerometer was accused."""
+    with driven(home, clock_ppm=clock_ppm) as (_, record, endpoint):
+        time.sleep(2.0)
+        begun = len(rows(record))
+        time.sleep(12.0)
+        held = np.array(rows(record)[begun:])
+        seen = subprocess.run([*SEEN, "status", "--endpoint", endpoint, "--json"], capture_output=True, check=True)
+    ratio = held[:, 1] / held[:, 2]
+    assert np.abs(held[:, 3]).max() < 0.01  # a slip reaches 0.022 m/s
+    assert np.mean((ratio > 1.02) & (ratio < 1.5)) > 0.99
+    assert json.loads(seen.stdout)["state"] == "ACTIVE"

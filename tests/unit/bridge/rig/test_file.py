@@ -1,11 +1,14 @@
 """A rig file of a real rig: its necessary keys, its refusals, and the adapter that it names."""
 
+import tomllib
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from bridge.config import read_toml, validate
 from bridge.faults import Fault
+from bridge.rig.file import DeviceRig
 from bridge.rig.load import device_of
 from bridge.rig.real import notes, open_node
 from tests.unit.bridge.rig.boxes import GUARD, rig_file, table, toml
@@ -105,12 +108,19 @@ def test_the_header_holds_blocks_calibration_and_limits() -> None:
     assert header["solver"] == {"block_s": 1e-3, "samples_per_block": 20}
     assert header["channels"]["drive_force_N"]["scale"] == 1.0
     assert "device" not in header
+    other = table()["channels"] | {"drive_force_N": {"source": 0, "scale": 2.0}}
+    assert header["checksum"] == rig_file(device={"address": "127.0.0.1:2"}).header()["checksum"]
+    assert header["checksum"] != rig_file(channels=other).header()["checksum"]
 
 
 def test_a_rig_file_is_plain_toml(tmp_path: Path) -> None:
-    from bridge.config import read_toml, validate
-    from bridge.rig.file import DeviceRig
-
     path = tmp_path / "mine.toml"
     path.write_text(toml(table(device={"command": ["./rig"]})))
     assert validate(DeviceRig, read_toml(path), path.name).device == {"command": ["./rig"]}
+
+
+def test_the_rig_file_of_the_guide_is_valid() -> None:
+    guide = (Path(__file__).parents[4] / "docs/guides/connect-a-rig.md").read_text(encoding="utf-8")
+    rig = validate(DeviceRig, tomllib.loads(guide.partition("```toml\n")[2].partition("```")[0]), "guide")
+    assert rig.channels["drive_position_m"].sign == -1
+    assert device_of(rig, Path()).setup.channels == 4

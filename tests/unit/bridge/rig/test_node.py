@@ -145,6 +145,26 @@ def test_a_refusal_lets_the_exciter_rest_and_begin_again_from_zero(device: Bench
     assert rig.applied_m[61:] == pytest.approx([1e-9, 2e-9, 3e-9, 4e-9, 5e-9])
 
 
+def test_an_error_of_an_adapter_ends_no_loop_and_names_its_place(device: Bench) -> None:
+    rig = Rig(device)
+    rig.run(60)
+    read, write, safe = device.read, device.write, device.safe
+    device.write = lambda *_: {}["amplitude"]  # type: ignore[method-assign]
+    rig.node.advance([])
+    ((code, text, _),) = rig.node.problems()
+    assert code == "DEVICE_REFUSED"
+    assert text.startswith("test_node.py, line ")
+    assert "KeyError: 'amplitude'" in text
+    device.write, device.read = write, lambda: 1 / 0
+    rig.run(3)
+    assert rig.problems == ["DEVICE_SILENT"]
+    device.read, device.safe = read, lambda: 1 / 0
+    rig.run(1200)
+    rig.node.close()
+    assert [code for code, _, _ in rig.node.problems()] == ["DEVICE_REFUSED"]
+    device.safe = safe
+
+
 def test_a_device_that_is_gone_is_opened_again_each_second(device: Bench) -> None:
     rig = Rig(device)
     rig.run(60)
@@ -243,10 +263,15 @@ def test_the_end_lets_the_exciter_rest(device: Bench) -> None:
     assert device.safes == 1
 
 
-@pytest.mark.slow
-def test_a_rate_that_is_far_off_is_reported_once(device: Bench) -> None:
-    rig = Rig(device)
-    rig.run(5000)
-    device.now_s += 6.0  # 11 s for 5 s of blocks
-    rig.run(10)
-    assert rig.problems == ["DEVICE_RATE"]
+@pytest.mark.parametrize(
+    ("late_s", "code", "text"),
+    [(10.0, "DEVICE_CLOCK", "20000.0 samples a second"), (10.1, "DEVICE_RATE", "wrong by this factor")],
+)
+def test_the_rate_of_a_device_is_measured_once(device: Bench, late_s: float, code: str, text: str) -> None:
+    node = Rig(device).node
+    for blocks, now_s in ((1, 0.0), (9_000, 9.0), (1_000, late_s), (1_000, late_s + 1.0)):
+        device.now_s = now_s
+        node._note_block(DeviceBlock(np.zeros((5, 20)), 0.0, 0.0, lost=blocks - 1))
+    measured = [problem for problem in node.problems() if problem[0] != "SAMPLES_LOST"]
+    assert [problem[0] for problem in measured] == [code]
+    assert text in measured[0][1]
