@@ -150,14 +150,14 @@ def _of_device(device: Device, heard: _Heard, rate_Hz: float, gap_s: float) -> l
 
 
 def _channel(rig: DeviceRig, name: str, raw: Floats) -> ChannelCheck:
-    channel = rig.channels[name]
+    channel, nan = rig.channels[name], math.nan
     if channel.source is None:
-        return ChannelCheck(name, True, *[math.nan] * 5, 0.0)
+        return ChannelCheck(name, True, nan, nan, nan, nan, nan, 0.0)
     values = channel.sign * channel.scale * raw[channel.source] + channel.offset
     finite = values[np.isfinite(values)]
     missing = 1.0 - finite.size / max(values.size, 1)
     if finite.size < 2:
-        return ChannelCheck(name, False, *[math.nan] * 5, missing)
+        return ChannelCheck(name, False, nan, nan, nan, nan, nan, missing)
     noise = float(np.sqrt(np.mean(np.diff(finite) ** 2) / 2.0))
     t_s = np.arange(finite.size) / rig.converter.sample_rate_Hz
     waves = [np.exp(-2j * math.pi * mains_Hz * t_s) for mains_Hz in _MAINS_HZ]

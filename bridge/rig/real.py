@@ -19,7 +19,11 @@ from bridge.wire.channels import CHANNELS
 
 def served(rig: DeviceRig, folder: Path) -> Served:
     """A real rig for `bridge.rig.process.serve`; it never starts ARMED."""
-    return Served(rig.name, rig.guard, notes(rig), lambda run, _may_arm: open_node(rig, folder, run))
+
+    def make(run: int, _may_arm: bool) -> DeviceNode:
+        return open_node(rig, folder, run)
+
+    return Served(rig.name, rig.guard, notes(rig), make)
 
 
 def open_node(rig: DeviceRig, folder: Path, run: int) -> DeviceNode:
