@@ -89,8 +89,8 @@ def serve_rig(shared: SharedOptions, rig: str | None, wait_for: str, as_json: Js
             described = device_header(made, "plant", shared.lockstep)
             real = served(made.rig, folder)
             blocks = serve(real, made.duration_s, made.bus, described, roles, shared.lockstep, stop, kept, report)
-    served = Served("plant", made.bus.endpoint, shared.lockstep, blocks)
-    print_result(as_json, served, [served.in_words()])
+    done = Served("plant", made.bus.endpoint, shared.lockstep, blocks)
+    print_result(as_json, done, [done.in_words()])
 
 
 def _simulated(

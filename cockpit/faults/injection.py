@@ -93,8 +93,8 @@ def _order_rig(bus: Bus, where: str, tables: Sequence[FaultTable], clear: bool) 
             waiting -= begun
             begun_texts += [event.text] if begun else []
     if waiting:
-        line = f"{where}: no rig confirmed the fault: must be a simulated rig in real time"
-        raise Fault("NO_PEER", f"{line}; a real rig accepts no faults")
+        line = f"{where}: no rig confirmed the fault: must be a rig with our guard in real time"
+        raise Fault("NO_PEER", f"{line}; the exciter of a real rig accepts no faults")
     later = [f"{table.in_words()}, in {table.from_s:g} s" for table in tables if table.from_s > 0.0]
     return [*(["all faults are over"] if clear else []), *begun_texts, *later]
 

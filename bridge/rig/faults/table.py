@@ -16,7 +16,7 @@ _Time = Annotated[float, Field(ge=0, le=1e9)]  # 30 years; a far longer time ove
 
 
 class FaultTable(Strict):
-    """A fault injected into a run. The rig must be simulated."""
+    """A fault injected into a run. Faults of the exciter and of processes need a simulated rig."""
 
     name: str = Field(
         default="", pattern=r"^[^\x00-\x1f\x7f]*$", description="Name in events and verdicts; not given: TARGET KIND."

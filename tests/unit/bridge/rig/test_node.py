@@ -149,7 +149,7 @@ def test_an_error_of_an_adapter_ends_no_loop_and_names_its_place(device: Bench) 
     rig = Rig(device)
     rig.run(60)
     read, write, safe = device.read, device.write, device.safe
-    device.write = lambda *_: {}["amplitude"]  # type: ignore[method-assign]
+    device.write = lambda *_: {}["amplitude"]
     rig.node.advance([])
     ((code, text, _),) = rig.node.problems()
     assert code == "DEVICE_REFUSED"
