@@ -41,11 +41,11 @@ class ControllerMemory:
     wanted_speed_mps:float; wanted_velocity_mps:float; weak_s:float; why:int; window_s:float
 
 class GuardParams:
-    abort:npt.NDArray[Any]; alarm:npt.NDArray[Any]; announced_keep:float; band_Hz:npt.NDArray[Any]; bands:int;
-    block_s:float; check_m:float; duty_share:float; exciter_gain:float; frequency_max_Hz:float; frequency_min_Hz:float;
-    gain_change:float; heat_per_Hz_m2:float; heat_share:float; hold_blocks:npt.NDArray[Any]; lost_blocks:int;
-    loud_share:float; memory_keep:float; run:int; sample_s:float; slew_m_per_block:float; timeout_blocks:int;
-    tone_Hz:npt.NDArray[Any]; tones:int; window_blocks:int
+    abort:npt.NDArray[Any]; absent:npt.NDArray[Any]; alarm:npt.NDArray[Any]; announced_keep:float;
+    band_Hz:npt.NDArray[Any]; bands:int; block_s:float; check_m:float; duty_share:float; exciter_gain:float;
+    frequency_max_Hz:float; frequency_min_Hz:float; gain_change:float; heat_per_Hz_m2:float; heat_share:float;
+    hold_blocks:npt.NDArray[Any]; lost_blocks:int; loud_share:float; memory_keep:float; run:int; sample_s:float;
+    slew_m_per_block:float; timeout_blocks:int; tone_Hz:npt.NDArray[Any]; tones:int; window_blocks:int
 
 class GuardMemory:
     accepted:npt.NDArray[Any]; amplitude_m:float; announced_mps:float; block:int; cause:int; check_blocks:int;
@@ -55,6 +55,10 @@ class GuardMemory:
     over_blocks:npt.NDArray[Any]; quiet_mps2:float; ratio_blocks:int; refused:int; seen_blocks:int;
     slide_m:npt.NDArray[Any]; square_mps2:float; state:int; toggle:int; tone_mps2:float; verified:int;
     vibration_mps:float
+
+class DeviceMemory:
+    command_block:int; commanded_Hz:float; commanded_m:float; offset:npt.NDArray[Any]; scale:npt.NDArray[Any];
+    source:npt.NDArray[Any]
 
 class PlantParams:
     F_c:float; F_s:float; accel_bandwidth_Hz:float; accel_highpass_keep:float; accel_highpass_keep_stick:float;

@@ -48,6 +48,12 @@ _PANELS: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "Rig": {
         "plant": ("processes.plant",),
+        "rig": (
+            "rig.rig_app",
+            "stickslip rig check mine.toml",
+            "stickslip rig serve mine.toml",
+            "stickslip rig box box.toml",
+        ),
         "controller": ("processes.controller",),
         "record": ("processes.record",),
         "arm": ("operator_commands.arm",),

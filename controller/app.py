@@ -29,7 +29,7 @@ from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
 from controller.config import ControllerConfig
 from controller.freshness import Events, Freshness
 from controller.node import ControllerNode
-from controller.rig_header import for_rig, refuse_another_rig
+from controller.rig_header import clock_drift, for_rig, refuse_another_rig
 
 # Longest wait for another process: for the token and the header of a rig, each of which a rig without it delays by all of it; for
 # blocks of a rig that has left the bus, until it counts as lost; and for the recorder after a cut of the link. The recorder was
@@ -63,6 +63,7 @@ def run(
         _refuse_a_second(bus, bus_config.endpoint)
         of_rig = bus.headers(["plant"], _WAIT_S, stop).get("plant")
         config = for_rig(of_rig, config)
+        node.age.drift = clock_drift(of_rig)
         node.reconfigure(config)
         header.configuration = json.dumps(config.model_dump(mode="json"), sort_keys=True)  # a replay needs them
         bus.serve_header(header)

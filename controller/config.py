@@ -1,6 +1,7 @@
 """The controller file, checked; numbers are in practical units."""
 
 import math
+from collections.abc import Collection
 from typing import Annotated, Literal, get_args
 
 from pydantic import Field, model_validator
@@ -138,6 +139,7 @@ class ControllerConfig(Strict):
         return self
 
 
+_CHANNEL_OF = {"use_force": "drive_force_N", "use_slide_position": "mass_position_m"}
 _STEP_HZ = 100.0  # between two candidates of the vibration's frequency
 # Lowest candidate over the contact resonance. Smaller: the v_a / v_d that stops stick-slip depends on the damping. Larger: fewer
 # frequencies are left. From about 2 up, v_a / v_d = 1.05 stops stick-slip for any damping.
@@ -172,6 +174,11 @@ def _refuse_unfit(config: ControllerConfig, most_Hz: float) -> None:
             f"limits.forbidden_Hz: no frequency is left: every multiple of {_STEP_HZ:g} Hz between {from_where} and "
             f"limits.frequency_max_Hz = {limits.frequency_max_Hz:g} is forbidden; narrow the bands"
         )
+    _refuse_blind(config)
+
+
+def _refuse_blind(config: ControllerConfig) -> None:
+    """Raise ValueError if the used channels show no stick."""
     if not (config.estimator.use_force or config.estimator.use_slide_position):
         raise ValueError(
             "estimator.use_force = false: use_slide_position is false as well, so no channel shows a stick; set one to true"
@@ -181,6 +188,16 @@ def _refuse_unfit(config: ControllerConfig, most_Hz: float) -> None:
             "drive_stiffness_N_per_m: not given, and use_slide_position = false: the force alone shows sticks only by k_d; "
             "give drive_stiffness_N_per_m"
         )
+
+
+def seeing(config: ControllerConfig, absent: Collection[str]) -> ControllerConfig:
+    """The configuration without the channels that a rig does not have. Raises ValueError if the others show no stick."""
+    unused = {key: False for key, name in _CHANNEL_OF.items() if name in absent}
+    if not unused:
+        return config
+    made = config.model_copy(update={"estimator": config.estimator.model_copy(update=unused)})
+    _refuse_blind(made)
+    return made
 
 
 def looser_limits(limits: LimitsConfig, rig: guard.VibrationLimits) -> dict[str, float]:

@@ -5,7 +5,7 @@ import math
 Events = list[tuple[str, str]]  # codes and texts
 MARGIN_NS = 15_000_000  # largest additional delay of the loop: v_a then stays within 4 %
 HOLD_NS = 200_000_000  # time for which blocks are older until LATE is published; a single stall is shorter
-_DRIFT = 2e-4  # largest relative drift of two clocks
+COMPUTERS = 2e-4  # largest relative drift of the clocks of two computers
 
 
 class Freshness:
@@ -64,9 +64,14 @@ class Age:
     """Age of the blocks when they are answered, over the least age: it grows if the computer, the link or the rig became slow.
 
     Rig and controller have two clocks. Their drift is removed, and with it a delay that lasts for minutes.
+
+    Args:
+        drift: largest relative drift of the two clocks.
+
     """
 
-    def __init__(self) -> None:
+    def __init__(self, drift: float = COMPUTERS) -> None:
+        self.drift = drift
         self.late_ns = 0  # age of the last block minus the least age
         self.forget()
 
@@ -77,7 +82,7 @@ class Age:
 
     def note(self, answered_ns: int, t_ns: int) -> None:
         """Process a block: the time of the answer by the controller's clock, and the block's time by the rig's clock."""
-        drifted_ns = self._youngest_ns + _DRIFT * (answered_ns - self._last_ns)
+        drifted_ns = self._youngest_ns + self.drift * (answered_ns - self._last_ns)
         self._youngest_ns = min(float(answered_ns - t_ns), drifted_ns)
         self._last_ns, self.late_ns = answered_ns, round(answered_ns - t_ns - self._youngest_ns)
         if self.late_ns <= MARGIN_NS:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from bridge.guard import records as guard
+from bridge.rig.step import DEVICE
 from bridge.wire.messages import ANNOUNCE, APPLIED, COMMAND, TRACE, sensor_block
 from controller import records as controller
 from plant import records as plant
@@ -23,6 +24,7 @@ _RECORDS: dict[str, np.dtype[Any]] = {
     "ControllerMemory": controller.STATE,
     "GuardParams": guard.PARAMS,
     "GuardMemory": guard.STATE,
+    "DeviceMemory": DEVICE,
     "PlantParams": plant.PARAMS,
     "PlantMemory": plant.STATE,
     "SensorRow": sensor_block(1).dtype,

@@ -6,7 +6,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from bridge.config import Strict, in_short
-from bridge.guard.config import GuardConfig, VibrationLimits
+from bridge.guard.absent import ChannelName, PresentOrAbsent
+from bridge.guard.config import ExciterConfig, GuardConfig, VibrationLimits
 from plant.drive_config import DriveConfig, NotNegative, Positive
 from plant.effects.library import checked
 from plant.effects.sensors import LONGEST_DELAY
@@ -76,18 +77,9 @@ class SlideConfig(Strict):
     mass_kg: Positive = 1.5
 
 
-class PiezoConfig(Strict):
-    """The exciter: its limits, the rate at which its amplitude may change, and its mount."""
+class PiezoConfig(ExciterConfig):
+    """The simulated exciter: its limits, and its mount."""
 
-    # longest stroke of an exciter of a machine; longer commands are dropped
-    amplitude_max_m: Annotated[float, Field(gt=0, le=1e-3)] = 1e-7
-    frequency_min_Hz: Positive = 500.0
-    frequency_max_Hz: Positive = 5000.0
-    # 1 um/s reaches the paper's 0.02 um in 20 ms
-    amplitude_slew_m_per_s: NotNegative = Field(
-        default=1e-6, description="Rate of the amplitude; 0: at once, as in the paper."
-    )
-    command_timeout_s: Annotated[float, Field(gt=0, le=5.0)] = 0.05
     delivered_ratio: Positive = 1.0
     mount_resonance_Hz: NotNegative = Field(default=0.0, description="Resonance of the mount; 0: rigid.")
     mount_damping_ratio: Positive = 0.05
@@ -152,6 +144,9 @@ class RigConfig(Strict):
     """One rig file."""
 
     name: str = "unnamed"
+    adapter: Literal["sim"] = Field(
+        "sim", description="A rig of this file is simulated; any other adapter is a real rig."
+    )
     contact: ContactConfig
     slide: SlideConfig = SlideConfig()
     drive: DriveConfig = DriveConfig()
@@ -160,20 +155,15 @@ class RigConfig(Strict):
     solver: SolverConfig = SolverConfig()
     loop: LoopConfig = LoopConfig()
     guard: GuardConfig = GuardConfig()
+    channels: dict[ChannelName, PresentOrAbsent] = Field(
+        {}, description="[channels.NAME]; without any: all are present."
+    )
     effects: dict[str, dict[str, float | str]] = Field({}, description="[effects.NAME]; without any: the ideal rig.")
 
     @property
     def vibration_limits(self) -> VibrationLimits:
         """The limits that the header states and a controller must keep."""
-        guard, piezo = self.guard, self.piezo
-        return VibrationLimits(
-            guard.stroke_m.alarm if guard.stroke_m else piezo.amplitude_max_m,
-            guard.velocity_mps.alarm if guard.velocity_mps else None,
-            piezo.amplitude_slew_m_per_s or None,
-            piezo.frequency_min_Hz,
-            piezo.frequency_max_Hz,
-            guard.forbidden_Hz,
-        )
+        return self.guard.vibration_limits(self.piezo)
 
     # checked before pydantic, which gives two errors for a value that is neither a number nor a string
     @model_validator(mode="before")

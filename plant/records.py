@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 
 from bridge.arrays import Records
+from bridge.guard.absent import absent
 from bridge.guard.config import GuardConfig, Level
 from bridge.guard.core import NO_COMMAND
 from bridge.guard.records import DRIVE_WINDOW_S, ExciterLimits
 from bridge.guard.records import build as build_guard
-from bridge.guard.wide import wider
+from bridge.guard.wide import protection
 from bridge.kernel import record
 from plant.config import PiezoConfig, RigConfig, SensorsConfig
 from plant.effects.library import EFFECTS
@@ -146,25 +147,18 @@ def simulated_guard(config: RigConfig) -> GuardConfig:
 
 def guard_records(config: RigConfig, run: int, arm: bool) -> tuple[Records, Records]:
     """Parameters and memory of the rig's guard; the other arguments are passed to `bridge.guard.records.build`."""
-    return build_guard(simulated_guard(config), _exciter(config), run, arm)
+    return build_guard(simulated_guard(config), _exciter(config), run, arm, absent(config.channels))
 
 
-def wide_limits(config: RigConfig) -> str:
-    """The limits of a rig that protect less than usual, as text; empty without such a limit."""
-    return wider(config.guard, _exciter(config), simulated_guard(config).fastest_drive_mps or 0.0)
+def notes(config: RigConfig) -> list[tuple[str, str]]:
+    """Codes and texts of the events at the start of a run: the limits and channels of a rig that protect less than usual."""
+    return protection(
+        config.guard, _exciter(config), simulated_guard(config).fastest_drive_mps or 0.0, absent(config.channels)
+    )
 
 
 def _exciter(config: RigConfig) -> ExciterLimits:
-    piezo, solver = config.piezo, config.solver
-    return ExciterLimits(
-        piezo.amplitude_max_m,
-        piezo.frequency_min_Hz,
-        piezo.frequency_max_Hz,
-        piezo.amplitude_slew_m_per_s,
-        solver.block_s,
-        solver.samples_per_block,
-        piezo.command_timeout_s,
-    )
+    return ExciterLimits.of(config.piezo, config.solver.block_s, config.solver.samples_per_block)
 
 
 def _add_effects(p: Any, config: RigConfig) -> None:

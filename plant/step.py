@@ -1,11 +1,11 @@
 """One block of the rig at its interface: a command in, a sensor block and a message of the applied vibration out."""
 
 from bridge.arrays import Floats, Records
-from bridge.guard.check import write_gain
-from bridge.guard.core import accept, allow, look, write_in_force
-from bridge.guard.estimates import expect_drive
+from bridge.guard.core import allow
 from bridge.kernel import shared_kernel
-from bridge.layouts import AppliedRow, GuardMemory, GuardParams, PlantMemory, PlantParams, SensorRow
+from bridge.layouts import GuardMemory, GuardParams, PlantMemory, PlantParams, SensorRow
+from bridge.rig.step import hear
+from bridge.rig.step import report as report_block
 from plant.core import advance, advance_disturbed
 from plant.loop_delay import receive, send
 from plant.sensors import digitise
@@ -44,31 +44,43 @@ def act(
     s: PlantMemory = state[0]
     gp: GuardParams = guard_params[0]
     g: GuardMemory = guard_state[0]
-    accepted, newest = 0, 0
-    for i in range(commands.shape[0]):
-        if accept(gp, g, commands[i]):
-            accepted, newest = accepted + 1, i
-    for i in range(announce.shape[0]):
-        expect_drive(g, announce[i].drive_velocity_mps)
+    accepted, newest = hear(gp, g, commands, announce)
     if accepted > 0:
         send(s, commands[newest], delay_blocks)
     receive(s)
     allow(gp, g, s.command_block, s.commanded_Hz, s.commanded_m)
     amplitude_m = g.amplitude_m if g.enable == 1 or p.always_on != 0.0 else 0.0
-    if p.disturbed:
-        advance_disturbed(params, state, drive_velocity_mps, g.frequency_Hz, amplitude_m, analogue, truth)
-    else:
-        advance(params, state, drive_velocity_mps, g.frequency_Hz, amplitude_m, analogue, truth)
-    block: SensorRow = sensors[0]
-    block.sequence = s.block
-    block.t_ns = (s.block + 1) * p.block_ns
-    digitise(p, analogue, noise, block)
+    vibrate(params, state, drive_velocity_mps, g.frequency_Hz, amplitude_m, noise, analogue, truth, sensors)
     return accepted
 
 
 @shared_kernel
-def report(
+def vibrate(
     params: Records,
+    state: Records,
+    drive_velocity_mps: float,
+    frequency_Hz: float,
+    amplitude_m: float,
+    noise: Floats,
+    analogue: Floats,
+    truth: Floats,
+    sensors: Records,
+) -> None:
+    """Advance the physics by one block under a vibration; fill number, time and samples of `sensors`. Arguments as in `act`."""
+    p: PlantParams = params[0]
+    s: PlantMemory = state[0]
+    if p.disturbed:
+        advance_disturbed(params, state, drive_velocity_mps, frequency_Hz, amplitude_m, analogue, truth)
+    else:
+        advance(params, state, drive_velocity_mps, frequency_Hz, amplitude_m, analogue, truth)
+    block: SensorRow = sensors[0]
+    block.sequence = s.block
+    block.t_ns = (s.block + 1) * p.block_ns
+    digitise(p, analogue, noise, block)
+
+
+@shared_kernel
+def report(
     state: Records,
     guard_params: Records,
     guard_state: Records,
@@ -82,38 +94,15 @@ def report(
     """Pass the samples to the guard, and end the block that `act` began: fill in the applied vibration.
 
     Args:
-        params, state, guard_params, guard_state, sensors: as in `act`.
+        state, guard_params, guard_state, sensors: as in `act`.
         commands: number of accepted commands.
         commands_late, round_trip_ns, late_ns: copied to `applied`.
         applied: one message record, filled.
 
     """
-    p: PlantParams = params[0]
     s: PlantMemory = state[0]
-    gp: GuardParams = guard_params[0]
-    g: GuardMemory = guard_state[0]
-    block: SensorRow = sensors[0]
-    look(gp, g, block)
-    block.run = gp.run
-    block.guard_state = g.state
-    write_gain(gp, g, block)
-    write_in_force(g, s.command_block, block)
-    a: AppliedRow = applied[0]
-    a.sequence = s.block
-    a.t_ns = (s.block + 1) * p.block_ns
-    a.frequency_Hz = s.frequency_Hz
-    a.amplitude_m = s.amplitude_m
-    a.command_block = s.command_block
-    a.commands = commands
-    a.fallback = 1 - g.fresh
-    a.round_trip_ns = round_trip_ns
-    a.late_ns = late_ns
-    a.commands_late = commands_late
-    a.guard_state = g.state
-    a.cause = g.cause
-    a.guard_limit = g.limit
-    a.commands_refused = g.refused
-    g.refused = 0
-    a.heat_share = g.heat
-    a.toggle = g.toggle
+    report_block(
+        guard_params[0], guard_state[0], s.frequency_Hz, s.amplitude_m, s.command_block, commands, commands_late,
+        round_trip_ns, late_ns, sensors[0], applied[0],
+    )  # fmt: skip
     s.block += 1

@@ -14,18 +14,25 @@ DONE = usable_folder() / mark_of("tests", Path(__file__))
 
 
 def control(folder: Path) -> None:
-    """Plant, controller, log and replay."""
+    """Plant, device, controller, log and replay."""
     from bridge.log.logfile import read_run
+    from bridge.rig.faults.schedule import Faults
+    from bridge.rig.node import DeviceNode
     from cockpit.run.in_process import run_onboard
     from cockpit.run.replay import changes_of
     from cockpit.run.scenario import load_scenario
     from controller.node import ControllerNode
     from controller.replay import replay
+    from plant.device import PlantDevice
     from plant.node import PlantNode
+    from plant.records import guard_records
 
     scenario = load_scenario("paper-c45-c45", ["duration_s=0.4"])
     PlantNode(scenario.rig, scenario.seed).warm_up()
     ControllerNode(scenario.controller).warm_up()
+    rig = scenario.rig
+    faults = Faults((), 1, rig.solver.block_s, rig.solver.samples_per_block)
+    DeviceNode(PlantDevice(rig, 1), guard_records(rig, 1, arm=False), faults).advance([])
     run_onboard(scenario, folder / "run.mcap", {})
     run = read_run(folder / "run.mcap")
     replay(run, changes_of(run, []))

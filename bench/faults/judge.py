@@ -15,6 +15,7 @@ import numpy.typing as npt
 from bench.faults.truth import Truth, TruthRun
 from bridge.faults import Fault
 from bridge.log.in_charge import WEAK_S
+from bridge.rig.faults.schedule import BEGAN, ENDED
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.event_codes import WEAK_REASONS
 from bridge.wire.inbox import Received
@@ -24,7 +25,6 @@ from bridge.wire.topics import SENSORS, TRACE
 from cockpit.faults.catalogue import CatalogueEntry
 from cockpit.run.in_process import TimedAction
 from cockpit.run.scenario import Scenario, load_scenario
-from plant.faults.schedule import BEGAN, ENDED
 
 SAFE, SILENT, UNSAFE = "safe", "SILENT", "UNSAFE"
 MOST_RATIO, MOST_S = 1.5, 0.2  # largest v_a over its set point, and longest total time above it

@@ -42,7 +42,7 @@ class _TruthNode(PlantNode):
 
     def advance(
         self, commands: list[bytes], commands_late: int = 0, round_trip_ns: int = 0, late_ns: int = 0
-    ) -> tuple[Outgoing, Outgoing]:
+    ) -> tuple[Outgoing, ...]:
         """Advance one block."""
         sent = PlantNode.advance(self, commands, commands_late, round_trip_ns, late_ns)
         drive_m, speeds = float(self.truth[_POSITION, -1]), self.truth[_VELOCITY]

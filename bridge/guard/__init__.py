@@ -12,6 +12,7 @@ It is a process stop and no safety function: an emergency stop belongs in the su
     kept     the operator's stop, the accepted exciter gain and the exciter's warmth, kept over restarts
     keeper   the thread that writes and watches these files
     stop_file  a stop without the bus: set, found and confirmed as a file
+    absent   channels that a rig lacks: refused, or the lost protection
     wide     limits of a rig file that protect less than usual
     events   events of a rig's guard
     received valid commands of the bus, in order

@@ -71,11 +71,11 @@ def follow_check(p: GuardParams, s: GuardMemory, block: SensorRow, square_mps2: 
         s.quiet_mps2, s.tone_mps2 = 0.0, 0.0
         s.lowest[:], s.highest[:] = math.inf, -math.inf
     if (
-        not _note(s, 0, block.drive_force_N)
-        or not _note(s, 1, block.mass_accel_mps2)
-        or not _note(s, 2, block.base_accel_mps2)
-        or not _note(s, 3, block.mass_position_m)
-        or not _note(s, 4, block.drive_position_m)
+        not _note(p, s, 0, block.drive_force_N)
+        or not _note(p, s, 1, block.mass_accel_mps2)
+        or not _note(p, s, 2, block.base_accel_mps2)
+        or not _note(p, s, 3, block.mass_position_m)
+        or not _note(p, s, 4, block.drive_position_m)
     ):
         trip(s, wire.SENSOR_NOT_FINITE)
     at = _part(p, s.check_blocks)
@@ -168,7 +168,10 @@ def write_gain(p: GuardParams, s: GuardMemory, block: SensorRow) -> None:
 
 
 @kernel
-def _note(s: GuardMemory, channel: int, samples: Record) -> bool:
+def _note(p: GuardParams, s: GuardMemory, channel: int, samples: Record) -> bool:
+    """Note the range of a channel; returns whether its samples are finite. An absent channel has no range, and never froze."""
+    if p.absent[channel] == 1:
+        return True
     for i in range(samples.shape[0]):
         value = float(samples[i])
         if not math.isfinite(value):

@@ -37,6 +37,20 @@ class VibrationLimits(NamedTuple):
     forbidden_Hz: Bands
 
 
+class ExciterConfig(Strict):
+    """The limits of an exciter, and the rate at which its amplitude may change."""
+
+    # longest stroke of an exciter of a machine; longer commands are dropped
+    amplitude_max_m: Annotated[float, Field(gt=0, le=1e-3)] = 1e-7
+    frequency_min_Hz: Positive = 500.0
+    frequency_max_Hz: Positive = 5000.0
+    # 1 um/s reaches the paper's 0.02 um in 20 ms
+    amplitude_slew_m_per_s: Annotated[float, Field(ge=0)] = Field(
+        default=1e-6, description="Rate of the amplitude; 0: at once, as in the paper."
+    )
+    command_timeout_s: Annotated[float, Field(gt=0, le=5.0)] = 0.05
+
+
 def merged_bands_Hz(bands: Sequence[Two]) -> list[tuple[float, float]]:
     """Forbidden bands from low to high; bands that overlap, or are less than 2 Hz apart, are merged."""
     merged: list[tuple[float, float]] = []
@@ -159,6 +173,17 @@ class GuardConfig(Strict):
                 "set guard.check_Hz"
             )
         return tones
+
+    def vibration_limits(self, exciter: ExciterConfig) -> VibrationLimits:
+        """The limits that the header states and a controller must keep."""
+        return VibrationLimits(
+            self.stroke_m.alarm if self.stroke_m else exciter.amplitude_max_m,
+            self.velocity_mps.alarm if self.velocity_mps else None,
+            exciter.amplitude_slew_m_per_s or None,
+            exciter.frequency_min_Hz,
+            exciter.frequency_max_Hz,
+            self.forbidden_Hz,
+        )
 
     def _forbids(self, frequency_Hz: float) -> bool:
         return any(low <= frequency_Hz <= high for low, high in self.forbidden_Hz)

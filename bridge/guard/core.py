@@ -6,7 +6,7 @@ from bridge.guard.check import check_tone, enable_off, follow_check
 from bridge.guard.estimates import see_drive, see_vibration
 from bridge.guard.limits import held, held_by_drive, slewed_m, watch
 from bridge.guard.states import enter, note_vibration
-from bridge.kernel import kernel
+from bridge.kernel import Record, kernel
 from bridge.layouts import CommandRow, GuardMemory, GuardParams, SensorRow
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import NO_BLOCK
@@ -78,8 +78,17 @@ def allow(p: GuardParams, s: GuardMemory, command_block: int, frequency_Hz: floa
 
 
 @kernel
+def _blank(p: GuardParams, channel: int, samples: Record) -> None:
+    if p.absent[channel] == 1:
+        samples[:] = 0.0
+
+
+@kernel
 def look(p: GuardParams, s: GuardMemory, block: SensorRow) -> None:
-    """Process the samples of the block that vibrated as `allow` set; the next block begins."""
+    """Process the samples of the block that vibrated as `allow` set; the next block begins. Absent channels become zeros."""
+    _blank(p, 0, block.drive_force_N)
+    _blank(p, 1, block.mass_accel_mps2)
+    _blank(p, 3, block.mass_position_m)
     see_drive(p, s, block)
     see_vibration(p, s, block)
     if s.state == wire.CHECKING:

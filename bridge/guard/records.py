@@ -1,13 +1,15 @@
 """The records of a guard: parameters derived once from the rig file, and the changing state."""
 
 import math
+from collections.abc import Collection
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from bridge.arrays import Records
 from bridge.faults import Fault
-from bridge.guard.config import MOST_BANDS, GuardConfig, Level, merged_bands_Hz
+from bridge.guard.absent import refusal
+from bridge.guard.config import MOST_BANDS, ExciterConfig, GuardConfig, Level, merged_bands_Hz
 from bridge.kernel import record
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.channels import CHANNELS
@@ -42,7 +44,8 @@ PARAMS = np.dtype(
         )
     ]
     + [(name, "i8") for name in ("timeout_blocks", "lost_blocks", "window_blocks", "bands", "tones")]
-    + [("band_Hz", "f8", (MOST_BANDS, 2)), ("tone_Hz", "f8", (MOST_TONES,))],
+    + [("band_Hz", "f8", (MOST_BANDS, 2)), ("tone_Hz", "f8", (MOST_TONES,))]
+    + [("absent", "i8", (len(CHANNELS),))],  # 1: the rig has no such channel
     align=True,
 )
 
@@ -82,16 +85,33 @@ class ExciterLimits(NamedTuple):
     samples_per_block: int
     command_timeout_s: float
 
+    @classmethod
+    def of(cls, exciter: ExciterConfig, block_s: float, samples_per_block: int) -> "ExciterLimits":
+        """The limits of an exciter of a rig file, for blocks of this length."""
+        return cls(
+            exciter.amplitude_max_m,
+            exciter.frequency_min_Hz,
+            exciter.frequency_max_Hz,
+            exciter.amplitude_slew_m_per_s,
+            block_s,
+            samples_per_block,
+            exciter.command_timeout_s,
+        )
 
-def build(config: GuardConfig, exciter: ExciterLimits, run: int, arm: bool = False) -> tuple[Records, Records]:
+
+def build(
+    config: GuardConfig, exciter: ExciterLimits, run: int, arm: bool = False, absent: Collection[str] = ()
+) -> tuple[Records, Records]:
     """Parameters and state of a guard at power-up.
 
-    Raises Fault CONFIG if the limits lack the fastest drive or v_a, or the loop check lacks an allowed tone.
+    Raises Fault CONFIG if the limits lack the fastest drive or v_a, the loop check lacks an allowed tone, or the rig lacks a
+    channel that the guard needs.
 
     Args:
         config, exciter: limits and exciter of the rig file.
         run: the number that each command must carry.
         arm: the rig is simulated, and its scenario arms it.
+        absent: channels that the rig does not have.
 
     """
     params = record(PARAMS)
@@ -138,6 +158,9 @@ def build(config: GuardConfig, exciter: ExciterLimits, run: int, arm: bool = Fal
         raise Fault("CONFIG", str(error)) from None
     p.tones = len(tones)
     p.tone_Hz[: len(tones)] = tones
+    if reason := refusal(absent):
+        raise Fault("CONFIG", reason)
+    p.absent[:] = [name in absent for name in CHANNELS]
 
     state = record(STATE)
     s: Any = state[0]

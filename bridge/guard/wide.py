@@ -1,7 +1,9 @@
 """Limits of a rig file that protect less than usual: a report at the start of each run, for every key that protects."""
 
 import math
+from collections.abc import Collection
 
+from bridge.guard.absent import lost_protection
 from bridge.guard.config import GuardConfig, HeatConfig, Level
 from bridge.guard.records import ExciterLimits
 
@@ -14,6 +16,14 @@ _LEVELS = ("velocity_ratio", "loud_ratio", "duty")
 _WEAKER_IF_LARGER = ("band_hold_s", "duty_window_s", "drive_memory_s", "command_lost_s", "gain_change", "check_share")
 _HEAT_IF_LARGER = ("stroke_m_per_V", "time_s", "rise_max_K", "alarm_share")
 _HEAT_IF_SMALLER = ("capacitance_F", "loss_tangent", "resistance_K_per_W")
+
+
+def protection(
+    config: GuardConfig, exciter: ExciterLimits, fastest_drive_mps: float, absent: Collection[str]
+) -> list[tuple[str, str]]:
+    """Codes and texts of the events at the start of a run; arguments as in `wider`, and the channels that the rig lacks."""
+    wide = wider(config, exciter, fastest_drive_mps)
+    return ([("WIDE_LIMITS", wide)] if wide else []) + [("UNPROTECTED", text) for text in lost_protection(absent)]
 
 
 def wider(config: GuardConfig, exciter: ExciterLimits, fastest_drive_mps: float) -> str:

@@ -1,6 +1,9 @@
 """`stickslip run`: plant, controller and recorder to the end of a scenario; `plant`, `controller`, `record`: one of them."""
 
-from typing import Annotated, NamedTuple
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -10,6 +13,21 @@ from cockpit.commands.options import SharedOptions, Strict, Verbose, command
 from cockpit.run.child_process import step_reports, stop_event, stopped_once, warn_without_priority
 from cockpit.run.writable import LOG, check_output
 
+if TYPE_CHECKING:
+    from bridge.guard.kept import StopLatch
+
+Rig = Annotated[
+    str | None,
+    typer.Option(
+        "--rig", metavar="NAME", help="Rig in place of the scenario's: a name in deploy/rigs, or a .toml file."
+    ),
+]
+WaitFor = Annotated[
+    str,
+    typer.Option(
+        help="Roles that must be on the bus before the first block: controller, recorder, or controller,recorder."
+    ),
+]
 _OF_A_PROCESS = ("scenario", "settings", "seed", "endpoint", "prefix", "certs", "lockstep", "wait", "child")
 
 
@@ -35,65 +53,109 @@ class Recorded(NamedTuple):
 @command(*_OF_A_PROCESS, "insecure")
 def plant(
     shared: SharedOptions,
-    wait_for: Annotated[
-        str,
-        typer.Option(
-            help="Roles that must be on the bus before the first block: controller, recorder, or controller,recorder."
-        ),
-    ] = "controller",
+    rig: Rig = None,
+    wait_for: WaitFor = "controller",
     as_json: Json = None,
 ) -> None:
-    """Simulate the rig of a scenario and serve it on the bus."""
-    from bridge.guard.kept import StopLatch
-    from cockpit.run.scenario import header, load_scenario, refuse_faults, refuse_short_blocks
-    from plant.app import run as serve
+    """Serve the rig of a scenario on the bus: simulate it, or open its device."""
+    serve_rig(shared, rig, wait_for, as_json)
 
-    made = load_scenario(shared.scenario, shared.as_settings())
+
+def serve_rig(shared: SharedOptions, rig: str | None, wait_for: str, as_json: Json) -> None:
+    """Serve a rig on the bus until its end. Raises Fault."""
+    from bridge.guard.kept import StopLatch
+
+    made, folder = _loaded(shared, rig)
     roles = [role for role in wait_for.split(",") if role]
     if unknown := set(roles) - {"controller", "recorder"}:
         raise Fault(
             "CONFIG",
             f"--wait-for {wait_for}: {min(unknown)}: must be controller, recorder, or controller,recorder",
         )
-    if not shared.lockstep:
-        refuse_short_blocks(made)
-    refuse_faults(made, shared.lockstep)
     if not (shared.lockstep or shared.child):
         warn_without_priority()
-    described = header(made, "plant", shared.lockstep)
     # a stop inside `stickslip run` ends with that run; only a plant started alone keeps it over a restart
     latch = StopLatch(f"{made.rig.name} at {made.bus.endpoint}", False) if shared.child else StopLatch(made.rig.name)
+    kept = None if shared.lockstep else latch
     with step_reports(quiet=bool(shared.child)) as report:
-        blocks = serve(
-            made.rig,
-            made.seed,
-            made.duration_s,
-            made.bus,
-            described,
-            roles,
-            shared.lockstep,
-            stop_event(shared.child),
-            made.arm,
-            None if shared.lockstep else latch,
-            made.fault,
-            report,
-        )
-    served = Served("plant", made.bus.endpoint, shared.lockstep, blocks)
-    print_result(as_json, served, [served.in_words()])
+        stop = stop_event(shared.child)
+        if folder is None:
+            blocks = _simulated(made, roles, shared.lockstep, stop, kept, report)
+        else:
+            from bridge.rig.process import serve
+            from bridge.rig.real import served
+            from cockpit.run.device_run import device_header
+
+            described = device_header(made, "plant", shared.lockstep)
+            real = served(made.rig, folder)
+            blocks = serve(real, made.duration_s, made.bus, described, roles, shared.lockstep, stop, kept, report)
+    done = Served("plant", made.bus.endpoint, shared.lockstep, blocks)
+    print_result(as_json, done, [done.in_words()])
+
+
+def _simulated(
+    made: Any,
+    roles: list[str],
+    lockstep: bool,
+    stop: threading.Event,
+    latch: "StopLatch | None",
+    report: Callable[[str, str], None],
+) -> int:
+    """Serve a simulated rig; returns the number of blocks. Raises Fault."""
+    from cockpit.run.scenario import header, refuse_faults, refuse_short_blocks
+    from plant.app import run as simulate
+
+    if not lockstep:
+        refuse_short_blocks(made)
+    refuse_faults(made, lockstep)
+    described = header(made, "plant", lockstep)
+    return simulate(
+        made.rig,
+        made.seed,
+        made.duration_s,
+        made.bus,
+        described,
+        roles,
+        lockstep,
+        stop,
+        made.arm,
+        latch,
+        made.fault,
+        report,
+    )
+
+
+def _loaded(shared: SharedOptions, rig: str | None) -> "tuple[Any, Path | None]":
+    """The scenario of a simulated rig and None, or the run of a real rig and the folder of its file. Raises Fault CONFIG."""
+    from cockpit.run.device_run import is_real, load_device_run
+    from cockpit.run.scenario_file import rig_setting
+
+    settings = [*([rig_setting(rig)] if rig is not None else []), *shared.as_settings()]
+    if is_real(shared.scenario, settings):
+        return load_device_run(shared.scenario, settings)
+    from cockpit.run.scenario import load_scenario
+
+    return load_scenario(shared.scenario, settings), None
 
 
 @command(*_OF_A_PROCESS)
-def controller(shared: SharedOptions, as_json: Json = None) -> None:
+def controller(shared: SharedOptions, rig: Rig = None, as_json: Json = None) -> None:
     """Run the controller of a scenario for the rig on the bus."""
-    from cockpit.run.scenario import header, load_scenario, refuse_short_blocks
     from controller.app import run as control
 
-    made = load_scenario(shared.scenario, shared.as_settings())
-    if not shared.lockstep:
-        refuse_short_blocks(made)
+    made, folder = _loaded(shared, rig)
+    if folder is None:
+        from cockpit.run.scenario import header, refuse_short_blocks
+
+        if not shared.lockstep:
+            refuse_short_blocks(made)
+        described = header(made, "controller", shared.lockstep)
+    else:
+        from cockpit.run.device_run import device_header
+
+        described = device_header(made, "controller", shared.lockstep)
     if not (shared.lockstep or shared.child):
         warn_without_priority()
-    described = header(made, "controller", shared.lockstep)
     with step_reports(quiet=bool(shared.child)) as report:
         steps = control(made.controller, made.bus, described, shared.lockstep, stop_event(shared.child), report)
     served = Served("controller", made.bus.endpoint, shared.lockstep, steps)
@@ -101,13 +163,12 @@ def controller(shared: SharedOptions, as_json: Json = None) -> None:
 
 
 @command(*_OF_A_PROCESS, "log")
-def record(shared: SharedOptions, as_json: Json = None) -> None:
+def record(shared: SharedOptions, rig: Rig = None, as_json: Json = None) -> None:
     """Record all messages on the bus until the plant ends its run. An existing log is renamed, not overwritten."""
     from bridge.log.recorder import run as record_all
     from cockpit.run.run import about_run, keep_aside, log_path
-    from cockpit.run.scenario import load_scenario
 
-    made = load_scenario(shared.scenario, shared.as_settings())
+    made, _ = _loaded(shared, rig)
     path = log_path(shared.log, made.name)
     check_output("--log", path, LOG)
 
@@ -127,12 +188,7 @@ def record(shared: SharedOptions, as_json: Json = None) -> None:
 @command("scenario", "settings", "seed", "endpoint", "prefix", "certs", "insecure", "lockstep", "log", "wait")
 def run(
     shared: SharedOptions,
-    rig: Annotated[
-        str | None,
-        typer.Option(
-            "--rig", metavar="NAME", help="Rig in place of the scenario's: a name in deploy/rigs, or a .toml file."
-        ),
-    ] = None,
+    rig: Rig = None,
     in_process: Annotated[
         bool,
         typer.Option(

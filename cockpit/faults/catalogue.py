@@ -7,9 +7,9 @@ from pydantic import Field
 
 from bridge.config import Strict, read_toml, validate
 from bridge.faults import Fault
+from bridge.rig.faults.kinds import KINDS, TARGETS, InjectionKind
+from bridge.rig.faults.table import FaultTable
 from cockpit.run.scenario_file import deploy_folder
-from plant.faults.kinds import KINDS, TARGETS, InjectionKind
-from plant.faults.table import FaultTable
 
 NotNegative = Annotated[float, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0)]

@@ -13,13 +13,13 @@ from typing import NamedTuple
 
 from bridge.faults import Fault
 from bridge.processes import pid_here
+from bridge.rig.faults.kinds import PROCESS
+from bridge.rig.faults.schedule import BEGAN
+from bridge.rig.faults.table import FaultTable
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import FAULT, PLANT_EVENT
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
-from plant.faults.kinds import PROCESS
-from plant.faults.schedule import BEGAN
-from plant.faults.table import FaultTable
 
 _DIAL_S = 2.0  # timeout of the connection
 _HEADERS_S = 2.0  # timeout for the headers of the processes
@@ -93,8 +93,8 @@ def _order_rig(bus: Bus, where: str, tables: Sequence[FaultTable], clear: bool) 
             waiting -= begun
             begun_texts += [event.text] if begun else []
     if waiting:
-        line = f"{where}: no rig confirmed the fault: must be a simulated rig in real time"
-        raise Fault("NO_PEER", f"{line}; a real rig accepts no faults")
+        line = f"{where}: no rig confirmed the fault: must be a rig with our guard in real time"
+        raise Fault("NO_PEER", f"{line}; the exciter of a real rig accepts no faults")
     later = [f"{table.in_words()}, in {table.from_s:g} s" for table in tables if table.from_s > 0.0]
     return [*(["all faults are over"] if clear else []), *begun_texts, *later]
 

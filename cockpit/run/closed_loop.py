@@ -84,7 +84,7 @@ def advancing(answer: Callable[..., None]) -> Callable[..., int]:
                 plant[0], plant[1], guard[0], guard[1], inputs.velocity_mps[i], command, inputs.delay_blocks[i], announce,
                 inputs.noise[i], analogue, truth, sensors,
             )  # fmt: skip
-            report(plant[0], plant[1], guard[0], guard[1], accepted, 0, 0, 0, sensors, applied)
+            report(plant[1], guard[0], guard[1], accepted, 0, 0, 0, sensors, applied)
             if not math.isfinite(truth[_VELOCITY, -1]):
                 return i
             made.v_a_mps[i] = base_velocity_mps(p, s)

@@ -29,7 +29,7 @@ from controller.replay import Change
 from controller.telemetry import SNAPSHOT_EVERY, STATE_EVERY, plotted, snapshot
 from controller.trips.trip_events import TripEvents
 from plant.node import no_number
-from plant.records import wide_limits
+from plant.records import notes
 
 if TYPE_CHECKING:
     from cockpit.judge.run_judge import RunJudge
@@ -75,8 +75,8 @@ def run_onboard(
         judge.begin(log.tables)
     publish = _Events(log, judge)
     publish("plant", 0, "START", "lockstep")
-    if wide := wide_limits(scenario.rig):
-        publish("plant", 0, "WIDE_LIMITS", wide)
+    for code, text in notes(scenario.rig):
+        publish("plant", 0, code, text)
     ahead, due = list(changes), list(words)
     try:
         # the log is compressed and written while the next stretch is computed

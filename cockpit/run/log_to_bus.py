@@ -7,10 +7,10 @@ from typing import Any
 
 from bridge.faults import Fault
 from bridge.log.logfile import RunData, read_run
+from bridge.rig.process import wait_for_peers
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, PLANT_EVENT, SENSORS, STATE, TRACE, Topic
 from bridge.wire.zenoh_link import Bus, BusConfig
-from plant.app import wait_for_peers
 
 _GOODBYE_S = 1.0  # longest wait at the end until the other processes have left the bus
 

@@ -18,6 +18,7 @@ from bridge.log.metadata import configuration_of, table_of, texts_of
 from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import RESET, STOP
+from cockpit.run.scenario_file import is_real_rig
 from controller.config import ControllerConfig, looser_limits
 from controller.replay import Change, OutOfOrder, Replay, ReplayDifference, Replayer, replay
 from plant.config import RigConfig
@@ -216,7 +217,7 @@ def _add(replayer: Replayer, piece: Piece) -> None:
 
 def likely_reason(headers: Headers, path: Path, settings: list[str]) -> str:
     """Likely reason for which a replay differs from its log, in words: settings, versions, or changed code."""
-    from cockpit.run.scenario import versions
+    from cockpit.run.run_tables import versions
 
     if settings:
         return f"the configuration was changed: {', '.join(settings)}"
@@ -292,6 +293,8 @@ def closed_loop(path: Path, settings: list[str], log: Path) -> Compared:
     if missing:
         line = f"{path}: the header of its plant lacks {', '.join(missing)}: must be a log of the simulated rig; choose another"
         raise Fault("BAD_LOG", line)
+    if is_real_rig(plant["rig"]):
+        raise Fault("BAD_LOG", f"{path}: is the log of a real rig: must be of a simulated rig; choose another")
     if not len(run.sensors) or not len(run.trace):
         raise Fault(
             "BAD_LOG", f"{path}: holds no block with a trace of the controller to compare with; choose another log"

@@ -16,13 +16,15 @@ from bridge.plain import print_line
 from bridge.results import strict_json
 from bridge.wire.session import rig_security
 from cockpit.run.child_process import left_on_ctrl_c, stop_event, warn_without_priority
-from cockpit.run.scenario import LogTable, Scenario, load_scenario, refuse_faults, refuse_short_blocks
+from cockpit.run.run_tables import LogTable
+from cockpit.run.scenario import Scenario, load_scenario, refuse_faults, refuse_short_blocks
 from cockpit.run.writable import LOG, check_output, stamp_of
 
 if TYPE_CHECKING:
     from cockpit.judge.judged import RunOutcome
     from cockpit.judge.phases import Phase
     from cockpit.judge.run_judge import RunJudge
+    from cockpit.run.device_run import DeviceRun
 
 
 # A run without an end in one process writes some 2 GB per minute. It ends when less disk space than this is free. Larger: it ends
@@ -53,7 +55,7 @@ def keep_aside(path: Path) -> None:
     print_line(f"kept     {aside} (the earlier {path.name})")
 
 
-def about_run(scenario: Scenario, lockstep: bool) -> dict[str, object]:
+def about_run(scenario: "Scenario | DeviceRun", lockstep: bool) -> dict[str, object]:
     """Metadata that a log holds about its run, in addition to the configurations: names, seed and clock."""
     return {
         "scenario": scenario.name,
@@ -82,16 +84,18 @@ def run_scenario(
     In both cases the verdict on the recorded part is printed on stderr first.
 
     """
-    scenario = load_scenario(name, settings)
+    scenario = _loaded(name, settings, in_process or without)
     path = log_path(log, scenario.name)
     check_output("--log", path, LOG)
     before = stamp_of(path)
     endless = scenario.duration_s == 0.0
+    if isinstance(scenario, Scenario):
+        if not (lockstep or in_process):
+            refuse_short_blocks(scenario)
+        if lockstep or not in_process:
+            refuse_faults(scenario, lockstep)
     if not (lockstep or in_process):
-        refuse_short_blocks(scenario)
         warn_without_priority()
-    if lockstep or not in_process:
-        refuse_faults(scenario, lockstep)
     if not in_process:
         rig_security(scenario.bus)  # called here so that its warning is visible and its fault precedes every start
     if endless and in_process:
@@ -100,7 +104,7 @@ def run_scenario(
         print_line(f"{'simulating' if in_process else 'running'} until Ctrl-C; log {path}")
     interrupted, by, made = False, "Ctrl-C", _InProcessRun(None, [], stopped=False)
     try:
-        if in_process:
+        if in_process and isinstance(scenario, Scenario):
             made = _in_process(scenario, path)
             interrupted = made.stopped
         else:
@@ -124,6 +128,17 @@ def run_scenario(
         return _judged(scenario, path, closed if interrupted else "", without, made)
 
 
+def _loaded(name: str, settings: list[str], simulates: bool) -> "Scenario | DeviceRun":
+    """The run; a real rig is refused for a run that `simulates`. Raises Fault CONFIG."""
+    from cockpit.run.device_run import is_real, load_device_run
+
+    return (
+        load_device_run(name, settings)[0]
+        if is_real(name, settings) and not simulates
+        else load_scenario(name, settings)
+    )
+
+
 class _InProcessRun(NamedTuple):
     """Results of a run in one process, in addition to its log."""
 
@@ -143,7 +158,9 @@ def _print_verdict(path: Path) -> None:
             print_line("\n".join(in_words(verdict, verbose=False)))
 
 
-def _judged(scenario: Scenario, path: Path, interrupted: str, without: bool, made: _InProcessRun) -> "RunOutcome":
+def _judged(
+    scenario: "Scenario | DeviceRun", path: Path, interrupted: str, without: bool, made: _InProcessRun
+) -> "RunOutcome":
     """Judge a run.
 
     Raises Fault INTERRUPTED with the line `interrupted`, if any, for a run that did not reach its end.
@@ -164,7 +181,7 @@ def _judged(scenario: Scenario, path: Path, interrupted: str, without: bool, mad
         raise Fault("INTERRUPTED", f"{interrupted} and holds no block")
     verdict = verdict._replace(told=[*verdict.told, *made.events])
     alone = None
-    if without and verdict.after is not None:
+    if without and isinstance(scenario, Scenario) and verdict.after is not None:
         alone = _without_controller(scenario, settled_from_s(verdict.enabled_from_s), verdict.seconds)
     fields = noted(verdict) | ({"without": strict_json(alone)} if alone is not None else {})
     try:
@@ -172,8 +189,9 @@ def _judged(scenario: Scenario, path: Path, interrupted: str, without: bool, mad
     except Fault:
         print_line("\n".join(in_words(verdict, verbose=False, without=alone)))
         raise
+    effects = scenario.rig.effects if isinstance(scenario, Scenario) else []
     verdict = verdict._replace(checksums=verdict.checksums._replace(verdict="fits"))
-    return RunOutcome(verdict, scenario.rig.name, list(scenario.rig.effects), alone)
+    return RunOutcome(verdict, scenario.rig.name, list(effects), alone)
 
 
 def _without_controller(scenario: Scenario, from_s: float, seconds: float) -> "Phase | None":

@@ -1,66 +1,31 @@
 """A scenario: one rig, one controller, one duration."""
 
-import json
-import platform
 from collections.abc import Sequence
-from importlib.metadata import version
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
-from bridge.config import Strict, made_with, read_toml, validate, with_overrides
+from bridge.config import made_with, read_toml, validate, with_overrides
 from bridge.faults import Fault
-from bridge.log.storage.log_files import Rotation
+from bridge.guard.absent import absent
+from bridge.rig.faults.kinds import PROCESS
+from bridge.rig.faults.table import FaultTable
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.payloads import SCHEMA_VERSION
-from bridge.wire.zenoh_link import BusConfig
-from cockpit.run.scenario_file import RIG_FILE, find, rig_table, with_rig
+from cockpit.run.run_tables import RunTables, header_of
+from cockpit.run.scenario_file import RIG_FILE, find, is_real_rig, rig_table, with_rig
 from cockpit.run.sensor_needs import refuse_blind_sensors, refuse_out_of_travel
-from controller.config import ControllerConfig, within
+from controller.config import seeing, within
 from plant.config import RigConfig
 from plant.config_limits import refuse_a_spring_of_another_rig, refuse_what_no_rig_does
-from plant.faults.kinds import PROCESS
-from plant.faults.table import FaultTable
 
 # Shortest allowed block in real time. With a shorter one the command for a block would arrive after the next block is due.
 _SHORTEST_IN_REAL_TIME_S = 1e-3
 
 
-def _plain(name: str) -> str:
-    if name in {"", ".", ".."} or "/" in name or not name.isprintable():
-        rule = "must be a plain file name, as the log is runs/NAME.mcap"
-        raise ValueError(f"{name!r}: {rule}; leave out every / and control character")
-    return name
+class Scenario(RunTables):
+    """Configuration of one run of a simulated rig. Its validation checks that rig, controller and faults fit together."""
 
-
-class LogTable(Strict):
-    """Limits of a file of the log; the log continues in `NAME-0001.mcap` and so on."""
-
-    file_MB: Annotated[float, Field(ge=0)] = Field(default=1000.0, description="Largest size of a file; 0: no limit.")
-    file_s: Annotated[float, Field(ge=0)] = Field(default=3600.0, description="Longest time in a file; 0: no limit.")
-
-    @property
-    def rotation(self) -> Rotation:
-        """The limits in the units of the log writer."""
-        return Rotation(round(self.file_MB * 1e6), self.file_s)
-
-
-class Scenario(Strict):
-    """Configuration of one run: rig, controller, duration, bus, log and faults. Its validation checks that they fit together."""
-
-    name: Annotated[str, AfterValidator(_plain)] = "unnamed"
-    description: str = ""
-    duration_s: Annotated[float, Field(ge=0)] = Field(default=16.0, description="Length; 0: until Ctrl-C or SIGTERM.")
-    seed: Annotated[int, Field(ge=0)] = 1
-    arm: bool = Field(
-        default=False,
-        description="true: the simulated rig starts ARMED, without the loop check; false: `stickslip arm`.",
-    )
     rig: RigConfig
-    controller: ControllerConfig = ControllerConfig()
-    bus: BusConfig = BusConfig()
-    log: LogTable = LogTable()
     fault: list[FaultTable] = Field(default=[], description="Injected faults, a table `[[fault]]` each.")
 
     @model_validator(mode="after")
@@ -77,7 +42,8 @@ class Scenario(Strict):
                 line = f"fault: {table.in_words()}: from_s = {table.from_s:g}: must be before the end of the run"
                 raise ValueError(f"{line}, duration_s = {self.duration_s:g}; begin it earlier, or run longer")
         try:
-            return self.model_copy(update={"controller": within(controller, self.rig.vibration_limits)})
+            controller = within(seeing(controller, absent(self.rig.channels)), self.rig.vibration_limits)
+            return self.model_copy(update={"controller": controller})
         except ValueError as error:
             raise ValueError(f"controller.{error}") from None
 
@@ -138,48 +104,15 @@ def load_scenario(name: str, settings: list[str]) -> Scenario:
     def table(settings: Sequence[str]) -> tuple[dict[str, Any], str]:
         return with_rig(path, with_overrides({"name": path.stem} | given, settings))
 
+    if is_real_rig(table(settings)[0].get("rig")):
+        raise Fault("CONFIG", f"{name}: names a real rig: this command needs a simulated rig; give another --rig")
     of_rig = [setting for setting in settings if setting.startswith(RIG_FILE)]
     _, source = table(settings)
     return made_with(lambda given: validate(_Runnable, *table(given)), source, settings, of_rig)
 
 
-def processor() -> str:
-    """Name of this processor: the last bit of a sine or an exponential depends on it."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        return platform.processor() or platform.machine()
-    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), platform.machine())
-
-
-def versions() -> dict[str, str]:
-    """Versions of packages, Python, libc and processor: with equal ones a run in simulated time repeats bit for bit."""
-    packages = {name: version(name) for name in ("stickslip", "numpy", "numba", "protobuf", "eclipse-zenoh", "mcap")}
-    return packages | {
-        "python": platform.python_version(),
-        "libc": "-".join(platform.libc_ver()),
-        "processor": processor(),
-    }
-
-
 def header(scenario: Scenario, role: str, lockstep: bool) -> wire.Header:
     """The header of a process of this scenario: role, configuration and versions."""
-    if role == "plant":
-        configuration: dict[str, Any] = {
-            "rig": scenario.rig.model_dump(mode="json"),
-            "seed": scenario.seed,
-            "duration_s": scenario.duration_s,
-            "lockstep": lockstep,
-            "limits": scenario.rig.vibration_limits._asdict(),
-        }
-        if scenario.fault:
-            configuration["fault"] = [table.model_dump(mode="json") for table in scenario.fault]
-    else:
-        configuration = scenario.controller.model_dump(mode="json")
-    return wire.Header(
-        role=role,
-        schema_version=SCHEMA_VERSION,
-        configuration=json.dumps(configuration, sort_keys=True),
-        versions=json.dumps(versions(), sort_keys=True),
-        rig=scenario.rig.name,
-    )
+    faults = {"fault": [table.model_dump(mode="json") for table in scenario.fault]} if scenario.fault else {}
+    rig = scenario.rig
+    return header_of(scenario, rig.model_dump(mode="json"), rig.vibration_limits, rig.name, role, lockstep, faults)

@@ -13,6 +13,7 @@ from bridge.config import Strict, made_with, read_toml, validate, with_overrides
 from bridge.faults import Fault
 from bridge.wire.zenoh_link import BusConfig
 
+SIMULATED = "sim"  # the adapter of a rig file that describes a simulated rig
 RIG_FILE = "rig={file="  # prefix of a `--set` setting that replaces the scenario's rig file
 
 
@@ -64,16 +65,29 @@ def rig_setting(name: str) -> str:
     return f"{RIG_FILE}{json.dumps(str(find(name, 'rigs').resolve()), ensure_ascii=False)}}}"
 
 
+def is_real_rig(rig: Any) -> bool:
+    """Whether a table of a rig describes a real rig: it names an adapter."""
+    return isinstance(rig, dict) and rig.get("adapter", SIMULATED) != SIMULATED
+
+
+def path_of_rig(path: Path, table: dict[str, Any]) -> Path | None:
+    """Path of the rig file that a scenario names; None without one. Raises Fault CONFIG for an unknown name."""
+    rig = table.get("rig")
+    if not isinstance(rig, dict) or "file" not in rig:
+        return None
+    name = str(rig["file"])
+    relative = path.parent / name
+    is_file = relative.suffix == ".toml" and relative.is_file()
+    return relative if is_file else find(name, "rigs", f"{path.name}: rig.file: ")
+
+
 def with_rig(path: Path, table: dict[str, Any]) -> tuple[dict[str, Any], str]:
     """The table of a scenario with the table of its rig file inside, and the names of both files."""
     rig = table.get("rig")
-    if not isinstance(rig, dict) or "file" not in rig:
+    rig_path = path_of_rig(path, table)
+    if rig_path is None or not isinstance(rig, dict):
         return table, path.name
     overrides = {key: value for key, value in rig.items() if key != "file"}
-    rig_name = str(rig["file"])
-    relative = path.parent / rig_name
-    is_file = relative.suffix == ".toml" and relative.is_file()
-    rig_path = relative if is_file else find(rig_name, "rigs", f"{path.name}: rig.file: ")
     return table | {"rig": merged(rig_table(rig_path), overrides)}, f"{path.name} with {rig_path.name}"
 
 

@@ -8,13 +8,13 @@ import pytest
 
 from bench.faults.truth import TruthRun
 from bridge.log.logfile import STREAMING, RunData, read_run
+from bridge.rig.faults.table import FaultTable
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.clock import time
 from cockpit.run.in_process import TimedAction, run_onboard
 from cockpit.run.scenario import Scenario, load_scenario
 from cockpit.run.simulated.run import SimulatedRun, run_with_faults
 from controller.replay import Change, replay
-from plant.faults.table import FaultTable
 
 
 def scenario(seconds: float, *tables: dict[str, Any]) -> Scenario:

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from bridge.log.logfile import RunData, read_run
+from bridge.rig.faults.table import FaultTable
 from bridge.wire.event_codes import TRIPS, WEAK_REASONS
 from cockpit.run.scenario import load_scenario
 from cockpit.run.simulated.run import run_with_faults
-from plant.faults.table import FaultTable
 
 FROM_S = 1.0
 

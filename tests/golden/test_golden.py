@@ -13,7 +13,7 @@ from bridge.arrays import Records
 from bridge.log.logfile import RunData, read_run
 from bridge.wire.messages import COMMAND, TRACE
 from cockpit.run.replay import changes_of, outcome
-from cockpit.run.scenario import processor
+from cockpit.run.run_tables import processor
 from controller.core import step
 from controller.records import build
 from controller.replay import replay, writable

@@ -9,6 +9,7 @@ from bench.control.run import wrong_from
 from bench.control.watch import watch
 from bench.faults.judge import happened
 from bench.faults.truth import TruthRun
+from bridge.rig.faults.table import FaultTable
 from bridge.wire.messages import BLOCK
 from bridge.wire.messages import TRACE as TRACE_LAYOUT
 from bridge.wire.topics import COMMAND, Outgoing
@@ -18,7 +19,6 @@ from cockpit.run.scenario import Scenario
 from controller.config import ControllerConfig
 from controller.node import ControllerNode
 from plant.config import RigConfig
-from plant.faults.table import FaultTable
 from plant.node import PlantNode
 
 _WATCH_S = 10.0  # time from the begin of the disturbance that is judged

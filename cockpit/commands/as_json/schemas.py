@@ -159,6 +159,9 @@ _RESULTS = {
     "plant": "cockpit.commands.processes:Served",
     "controller": "cockpit.commands.processes:Served",
     "record": "cockpit.commands.processes:Recorded",
+    "rig serve": "cockpit.commands.processes:Served",
+    "rig check": "bridge.rig.check:RigCheck",
+    "rig box": "cockpit.commands.rig:Boxed",
     "status": "cockpit.live.status:Status",
     "fault": "cockpit.faults.injection:Injected",
     "soak": "cockpit.run.soak:Soaked",
@@ -179,8 +182,12 @@ _RESULTS = {
     "schema": "cockpit.commands.proof:SchemaNames",
 }
 TOML = (
-    Format("rig", "A rig file, as in deploy/rigs: `--rig FILE.toml`.", _rig),
+    Format("rig", "A rig file of a simulated rig, as in deploy/rigs: `--rig FILE.toml`.", _rig),
     Format("scenario", "A scenario file, as in deploy/scenarios: `--scenario FILE.toml`.", scenario),
+    Format(
+        "real-rig", "A rig file of a real rig: `--rig FILE.toml`, `stickslip rig check`.", "bridge.rig.file:DeviceRig"
+    ),
+    Format("box", "A simulated device: `stickslip rig box FILE.toml`.", "plant.box:BoxConfig"),
     Format(
         "faults",
         "A group of the catalogue of `python -m bench faults`, as in deploy/faults.",

@@ -6,6 +6,9 @@ from pathlib import Path
 from typing import Any, cast
 
 from bridge.faults import Fault
+from bridge.rig.faults.kinds import PROCESS
+from bridge.rig.faults.table import FaultTable
+from bridge.rig.process import GuardedRig
 from bridge.wire.complaints import BAD_MESSAGE, Complaints
 from bridge.wire.inbox import WAITING, Received
 from bridge.wire.session import LEASE_S
@@ -15,9 +18,6 @@ from cockpit.run.scenario import Scenario
 from cockpit.run.simulated.stage import Hub, Player, Receive, Session, Stage, WaitingInbox
 from controller.app import ControllerProcess
 from controller.node import ControllerNode
-from plant.app import PlantProcess
-from plant.faults.kinds import PROCESS
-from plant.faults.table import FaultTable
 from plant.node import PlantNode
 
 _LINKED_S = 0.05  # time from the resumption of a frozen process to its new link
@@ -90,7 +90,7 @@ class SimulatedRun:
             arm=scenario.arm and first,
             faults=scenario.fault if first else (),
         )
-        process = PlantProcess(node, cast(Any, Session(self._hub, "plant")), None)
+        process = GuardedRig(node, cast(Any, Session(self._hub, "plant")), None)
 
         def work() -> None:
             process.event("START", _GRANTED)

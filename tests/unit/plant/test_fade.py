@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bridge.rig.process import GuardedRig
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import APPLIED, COMMAND
 from bridge.wire.topics import Outgoing, Topic
 from cockpit.run.scenario import load_rig
-from plant.app import PlantProcess
 from plant.node import PlantNode
 
 
@@ -57,7 +57,7 @@ class Commanded(PlantNode):
 def left(node: Commanded, blocks: int, stop: threading.Event, lockstep: bool) -> Any:
     """The applied amplitude of each block, to the end of the process."""
     bus: Any = Wire()
-    process = PlantProcess(node, bus, None)
+    process = GuardedRig(node, bus, None)
     process._answer = lambda _block, _stop: b""
     advance = process.lockstep if lockstep else process.realtime
     if node.fails_at < blocks:
@@ -90,7 +90,7 @@ def test_the_vibration_fades_at_its_own_rate_before_the_process_ends(way: str, l
 def test_a_stall_that_no_command_follows_is_reported_at_the_end() -> None:
     """It was published with the next command alone, which a rig without a controller never gets."""
     bus: Any = Wire()
-    process = PlantProcess(PlantNode(load_rig("paper-c45-c45", []), 1), bus, None)
+    process = GuardedRig(PlantNode(load_rig("paper-c45-c45", []), 1), bus, None)
     process._paused_ns = 300_000_000
     process.end()
     events = [wire.Event.FromString(payload) for payload in bus.sent["event/plant"]]
@@ -102,7 +102,7 @@ def test_a_controller_of_another_run_moves_nothing_and_is_reported() -> None:
     node = Commanded(load_rig("paper-c45-c45", []), 1, arm=True)
     node.run_of_controller = 2
     bus: Any = Wire()
-    PlantProcess(node, bus, None).realtime(50, threading.Event())
+    GuardedRig(node, bus, None).realtime(50, threading.Event())
     assert np.frombuffer(b"".join(bus.sent["applied"]), APPLIED.dtype)["amplitude_m"].max() == 0.0
     events = [wire.Event.FromString(payload) for payload in bus.sent["event/plant"]]
     assert any(event.code == "FOREIGN" and "of another run" in event.text for event in events)

@@ -10,15 +10,15 @@ import pytest
 
 from bridge.config import validate
 from bridge.faults import Fault
+from bridge.rig.faults.kinds import KINDS, SENSORS, group_of
+from bridge.rig.faults.line import Message
+from bridge.rig.faults.schedule import BEGAN, ENDED, Faults
+from bridge.rig.faults.table import FaultTable
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.channels import CHANNELS
 from bridge.wire.messages import sensor_block
 from plant.config import RigConfig
-from plant.faults.exciter import FIELDS
-from plant.faults.kinds import KINDS, SENSORS, group_of
-from plant.faults.line import Message
-from plant.faults.schedule import BEGAN, ENDED, Faults
-from plant.faults.table import FaultTable
+from plant.exciter_faults import FIELDS, ExciterFaults
 from plant.records import build
 
 SAMPLES, BLOCK_S = 20, 1e-3
@@ -31,7 +31,7 @@ def table(kind: str, target: str, **more: Any) -> FaultTable:
 
 def faults(*tables: FaultTable, seed: int = 1) -> Faults:
     params, _ = build(validate(RigConfig, {"contact": {"pair": "C45-C45 @ 0.063"}}, "rig"))
-    return Faults(tables, seed, BLOCK_S, SAMPLES, params)
+    return Faults(tables, seed, BLOCK_S, SAMPLES, ExciterFaults(params[0]).set)
 
 
 def blocks(made: Faults, count: int, channel: str = "drive_force_N") -> Any:
@@ -121,7 +121,7 @@ def test_a_charge_amplifier_loses_a_constant_signal() -> None:
 
 def test_an_exciter_chatters_for_80_ms_of_every_second() -> None:
     params, _ = build(validate(RigConfig, {"contact": {"pair": "C45-C45 @ 0.063"}}, "rig"))
-    made = Faults([table("chattering", "exciter", value=2.0)], 1, BLOCK_S, SAMPLES, params)
+    made = Faults([table("chattering", "exciter", value=2.0)], 1, BLOCK_S, SAMPLES, ExciterFaults(params[0]).set)
     delivered = []
     for block in range(1100):
         made.begin_block(block)
@@ -171,7 +171,7 @@ def test_begin_and_end_are_news_once_and_the_rig_is_whole_again() -> None:
 def test_the_exciter_fails_and_heals(kind: str, value: float | None, field: str, factor: float) -> None:
     params, _ = build(validate(RigConfig, {"contact": {"pair": "C45-C45 @ 0.063"}}, "rig"))
     healthy = [float(params[0][name]) for name in FIELDS]
-    made = Faults([table(kind, "exciter", value=value, for_s=0.001)], 1, BLOCK_S, SAMPLES, params)
+    made = Faults([table(kind, "exciter", value=value, for_s=0.001)], 1, BLOCK_S, SAMPLES, ExciterFaults(params[0]).set)
     made.begin_block(0)
     assert params[0][field] == pytest.approx(factor * healthy[FIELDS.index(field)])
     made.begin_block(1)
@@ -181,7 +181,7 @@ def test_the_exciter_fails_and_heals(kind: str, value: float | None, field: str,
 
 def test_a_hot_exciter_falls_to_its_share() -> None:
     params, _ = build(validate(RigConfig, {"contact": {"pair": "C45-C45 @ 0.063"}}, "rig"))
-    made = Faults([table("hot", "exciter", value=0.4)], 1, BLOCK_S, SAMPLES, params)
+    made = Faults([table("hot", "exciter", value=0.4)], 1, BLOCK_S, SAMPLES, ExciterFaults(params[0]).set)
     shares: list[float] = []
     for block in (0, 1000, 20_000):
         made.begin_block(block)

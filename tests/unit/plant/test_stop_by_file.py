@@ -12,13 +12,14 @@ from bridge.guard.keeper import Keeper
 from bridge.guard.kept import StopLatch
 from bridge.guard.states import HOLD
 from bridge.guard.stop_file import RigFile, confirmed, order
+from bridge.rig.process import GuardedRig
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.bus_config import BusConfig
 from bridge.wire.inbox import Received
 from bridge.wire.messages import APPLIED
 from bridge.wire.topics import OPERATOR, Outgoing
 from cockpit.run.scenario import load_rig
-from plant.app import PlantProcess, run
+from plant.app import run
 from plant.node import PlantNode
 from tests.unit.plant.test_fade import Commanded, Wire
 
@@ -55,7 +56,7 @@ def test_a_stop_by_file_ramps_the_vibration_down_and_is_confirmed(kept: Keeper) 
     node = Stopped(load_rig("paper-c45-c45", []), 1, arm=True)
     node.keeper = kept
     bus: Any = Wire()
-    PlantProcess(node, bus, kept).realtime(90, threading.Event())
+    GuardedRig(node, bus, kept).realtime(90, threading.Event())
     applied = np.frombuffer(b"".join(bus.sent["applied"]), APPLIED.dtype)
     assert applied["amplitude_m"][40] == pytest.approx(3e-8)
     assert (applied["guard_state"][42], applied["cause"][42]) == (wire.FAULT, wire.STOP_BY_PERSON)
@@ -69,7 +70,7 @@ def test_a_stop_file_that_exists_holds_a_rig_that_is_not_stopped(kept: Keeper) -
     order(HERE, "Ada")
     node = PlantNode(load_rig("paper-c45-c45", []), 1, arm=True)
     bus: Any = Wire()
-    process = PlantProcess(node, bus, kept)
+    process = GuardedRig(node, bus, kept)
     kept._look()
     for _ in range(2):
         process._apply_orders()
@@ -86,7 +87,7 @@ def test_a_stop_file_that_exists_holds_a_rig_that_is_not_stopped(kept: Keeper) -
 def test_a_stop_of_an_earlier_run_keeps_its_cause(kept: Keeper) -> None:
     order(HERE, "Ada")
     node, bus = PlantNode(load_rig("paper-c45-c45", []), 1, arm=True), Wire()
-    process = PlantProcess(node, cast(Any, bus), kept)
+    process = GuardedRig(node, cast(Any, bus), kept)
     node.apply_order(HOLD)
     kept._look()
     process._apply_orders()
@@ -96,7 +97,7 @@ def test_a_stop_of_an_earlier_run_keeps_its_cause(kept: Keeper) -> None:
 def test_a_flood_of_orders_is_one_event_for_each_action_and_no_thread(kept: Keeper) -> None:
     bus: Any = Wire()
     node = Stopped(load_rig("paper-c45-c45", []), 1, arm=True)
-    process = PlantProcess(node, bus, kept)
+    process = GuardedRig(node, bus, kept)
     threads = threading.active_count()
     for _ in range(200):
         for action in ("STOP", "RESET"):

@@ -27,8 +27,14 @@ def real(config: GuardConfig) -> GuardConfig:
 class Rig:
     """A rig whose drive moves evenly and whose base vibrates with `gain` times the amplitude that the guard allows."""
 
-    def __init__(self, config: GuardConfig | None = None, arm: bool = True, exciter: ExciterLimits = EXCITER) -> None:
-        self.params, self.state = build(real(config or GuardConfig()), exciter, RUN, arm)
+    def __init__(
+        self,
+        config: GuardConfig | None = None,
+        arm: bool = True,
+        exciter: ExciterLimits = EXCITER,
+        absent: tuple[str, ...] = (),
+    ) -> None:
+        self.params, self.state = build(real(config or GuardConfig()), exciter, RUN, arm, absent)
         self.p: Any = self.params[0]
         self.s: Any = self.state[0]
         self.v_d_mps = 5e-4
@@ -78,6 +84,7 @@ class Rig:
         self._position_m += self.v_d_mps * 1e-3
         self._slide_m += slide_mps * 1e-3
         look(self.p, self.s, row)
+        self.row = row
         self.t += 1
 
     def run(self, blocks: int, frequency_Hz: float = 2600.0, amplitude_m: float = 30 * NANO) -> None:

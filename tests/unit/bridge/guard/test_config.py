@@ -6,8 +6,8 @@ import pytest
 
 from bridge.config import validate
 from bridge.faults import Fault
-from bridge.guard.config import GuardConfig
-from bridge.guard.records import build
+from bridge.guard.config import ExciterConfig, GuardConfig, Level
+from bridge.guard.records import ExciterLimits, build
 from bridge.guard.wide import wider
 from tests.unit.bridge.guard.rigs import EXCITER, real
 
@@ -82,3 +82,13 @@ def test_a_check_without_an_allowed_tone_is_refused(table: dict[str, Any], messa
 def test_a_real_rig_must_give_its_absolute_limits(missing: str) -> None:
     with pytest.raises(Fault, match="must be given for a real rig"):
         build(real(GuardConfig()).model_copy(update={missing: None}), EXCITER, 1)
+
+
+def test_the_exciter_of_a_rig_file_gives_the_limits_of_guard_and_header() -> None:
+    exciter = ExciterConfig(amplitude_max_m=2e-7, frequency_max_Hz=4000.0, amplitude_slew_m_per_s=0.0)
+    assert ExciterLimits.of(exciter, 1e-3, 20) == ExciterLimits(2e-7, 500.0, 4000.0, 0.0, 1e-3, 20, 0.05)
+    bare = GuardConfig(forbidden_Hz=[(900.0, 950.0)]).vibration_limits(exciter)
+    assert bare == (2e-7, None, None, 500.0, 4000.0, [(900.0, 950.0)])
+    level = Level(alarm=1e-8, abort=2e-8)
+    tight = GuardConfig(stroke_m=level, velocity_mps=level).vibration_limits(exciter)
+    assert (tight.amplitude_max_m, tight.velocity_max_mps) == (1e-8, 1e-8)

@@ -3,17 +3,15 @@
 import json
 from typing import Any
 
-import numpy as np
 import pytest
 
 from bridge.faults import Fault
+from bridge.rig.faults.schedule import Faults
 from bridge.wire import stickslip_pb2 as wire
-from plant.faults.schedule import Faults
-from plant.records import PARAMS
 
 
 def faults() -> Faults:
-    return Faults((), 1, 1e-3, 20, np.zeros(1, np.dtype((np.record, PARAMS))))
+    return Faults((), 1, 1e-3, 20)
 
 
 def order(table: Any, **more: Any) -> bytes:

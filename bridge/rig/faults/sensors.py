@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from bridge.arrays import Floats
+from bridge.rig.faults.kinds import ALL_SENSORS, LARGEST
+from bridge.rig.faults.table import FaultTable
 from bridge.wire.channels import CHANNELS
-from plant.faults.kinds import ALL_SENSORS, LARGEST
-from plant.faults.table import FaultTable
 
 _JUMP_S = 0.1  # time with, then without the offset of the fault `jumping`
 _HUM_HZ = 50.0  # mains frequency, of the fault `hum`

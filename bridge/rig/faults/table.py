@@ -7,16 +7,16 @@ from pydantic import Field, model_validator
 
 from bridge.config import Strict, validate
 from bridge.faults import Fault
+from bridge.rig.faults.kinds import BUS, KINDS, LARGEST, PROCESS, SENSORS, TARGETS, group_of
 from bridge.wire.channels import CHANNELS
 from bridge.wire.topics import FAULT
-from plant.faults.kinds import BUS, KINDS, LARGEST, PROCESS, SENSORS, TARGETS, group_of
 
 _LONGEST = 10_000  # longest table of an operator's request [bytes]; every valid table has fewer than 500
 _Time = Annotated[float, Field(ge=0, le=1e9)]  # 30 years; a far longer time overflows the count of blocks
 
 
 class FaultTable(Strict):
-    """A fault injected into a run. The rig must be simulated."""
+    """A fault injected into a run. Faults of the exciter and of processes need a simulated rig."""
 
     name: str = Field(
         default="", pattern=r"^[^\x00-\x1f\x7f]*$", description="Name in events and verdicts; not given: TARGET KIND."

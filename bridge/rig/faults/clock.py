@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from plant.faults.table import FaultTable
+from bridge.rig.faults.table import FaultTable
 
 
 class ClockFault:

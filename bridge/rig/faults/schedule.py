@@ -1,25 +1,28 @@
 """The faults that act in a block: their effects on the rig and its bus, and events at their begin and end."""
 
 import collections
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from bridge.arrays import Records
+from bridge.faults import Fault
+from bridge.rig.faults.clock import ClockFault
+from bridge.rig.faults.kinds import BUS, CLOCK, EXCITER, LINK, SENSORS
+from bridge.rig.faults.line import Line, Message
+from bridge.rig.faults.sensors import SensorFault
+from bridge.rig.faults.table import FaultTable, ordered
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import FAULT
-from plant.faults.clock import ClockFault
-from plant.faults.exciter import ExciterFaults
-from plant.faults.kinds import BUS, CLOCK, EXCITER, LINK, SENSORS
-from plant.faults.line import Line, Message
-from plant.faults.sensors import SensorFault
-from plant.faults.table import FaultTable, ordered
 
 BEGAN, ENDED = "INJECTED", "INJECTION_ENDED"  # codes of the events
 _STREAM = 2  # random stream of the faults: noise and jitter of a rig use other streams of its seed
 _NEVER = 1 << 62
+SetExciter = Callable[
+    [list[tuple[FaultTable, float]]], None
+]  # sets the acting faults, each with the time since its begin [s]
 _REMEMBERED = 64  # orders whose ids are stored; a repeated order arrives within a second
 
 
@@ -41,15 +44,17 @@ class Faults:
         tables: faults of the scenario.
         seed: the rig's seed.
         block_s, samples: length of a block and its samples.
-        params: record of `plant.records.PARAMS`; faults of the exciter change some of its numbers.
+        exciter: sets the faults of a simulated exciter; None: a real one, which has none.
 
     """
 
-    def __init__(self, tables: Sequence[FaultTable], seed: int, block_s: float, samples: int, params: Records) -> None:
+    def __init__(
+        self, tables: Sequence[FaultTable], seed: int, block_s: float, samples: int, exciter: SetExciter | None = None
+    ) -> None:
         self.busy = False  # whether any fault is planned or acts, or a message is delayed
         self.on_the_bus = False  # whether any fault of the bus acts, or a message is delayed
         self._seed, self._block_s, self._sample_s = seed, block_s, block_s / samples
-        self._exciter = ExciterFaults(params[0])
+        self._exciter = exciter
         self._planned: list[_Planned] = []
         self._acting: list[_Planned] = []
         self._news: list[tuple[str, str]] = []
@@ -60,7 +65,10 @@ class Faults:
             self.add(table, 0)
 
     def add(self, table: FaultTable, block: int) -> None:
-        """Plan a fault; its times count from block `block`."""
+        """Plan a fault; its times count from block `block`. Raises Fault CONFIG for a fault of a real exciter."""
+        if table.group == EXCITER and self._exciter is None:
+            line = f"{FAULT.name}: target = {table.target}: must be a simulated exciter, and this one is real"
+            raise Fault("CONFIG", f"{line}; change the exciter itself")
         random = np.random.Generator(np.random.PCG64([self._seed, _STREAM, self._made]))
         self._made += 1
         begin = block + round(table.from_s / self._block_s)
@@ -97,8 +105,9 @@ class Faults:
             if fault not in self._acting:
                 self._news.append((ENDED, fault.table.in_words()))
         self._planned = [fault for fault in self._planned if block < fault.end]
-        exciter = [(fault.table, self._since_s(fault, block)) for fault in self._acting if fault.table.group == EXCITER]
-        self._exciter.set(exciter)
+        if self._exciter is not None:
+            exciter = [fault for fault in self._acting if fault.table.group == EXCITER]
+            self._exciter([(fault.table, self._since_s(fault, block)) for fault in exciter])
         self.on_the_bus = any(fault.table.group == BUS for fault in self._acting) or not self._lines_empty
         self.busy = bool(self._planned) or bool(self._acting) or not self._lines_empty
 

@@ -5,10 +5,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from bridge.rig.faults.table import FaultTable
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import sealed, sensor_block
 from bridge.wire.topics import SENSORS
-from plant.faults.table import FaultTable
 
 _CORRUPTED_BYTES = 3  # changed bytes of a corrupted message
 _FOREIGN_RUN = 666  # run number of a forged command

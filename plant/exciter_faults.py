@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from plant.faults.table import FaultTable
+from bridge.rig.faults.table import FaultTable
 
 FIELDS = (
     *("delivered_ratio", "mount_resonance_Hz", "mount_damping_ratio", "amplitude_max_m", "amplitude_slew_m_per_s"),

@@ -1,0 +1,14 @@
+"""A rig of any kind behind its guard, as a process on the bus. Nothing here knows the plant or an adapter.
+
+device   the contract of a device: converter and exciter
+node     a rig behind its guard, block by block: `GuardedNode`; around a device: `DeviceNode`
+step     a block between its messages, compiled; the plant's loop calls the same parts
+rate     the measured rate of a device
+file     the rig file of a real rig
+load     the device that it describes, by its adapter
+real     this device, opened, behind its guard
+check    the channels of a device with its exciter at rest
+adapters/  one file for each kind of device
+process  the loop on the bus: fade, latch, kept gain, missing commands, run number
+faults/  injected faults of sensors, clock and bus
+"""

@@ -1,0 +1,4 @@
+"""Adapters: each file implements `bridge.rig.device` for one kind of device, as its class `Adapter`.
+
+stream  frames of samples over TCP, or from a program that we start; a command frame each block
+"""

@@ -1,0 +1,376 @@
+"""A rig behind its guard: commands in, sensor blocks and the applied vibration out, block by block."""
+
+import contextlib
+import math
+import traceback
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bridge.arrays import Records
+from bridge.guard.check import gain_report
+from bridge.guard.core import NO_COMMAND
+from bridge.guard.states import LEAVE, apply_order
+from bridge.kernel_cache import compile_once
+from bridge.rig.device import Device, DeviceBlock, DeviceError
+from bridge.rig.faults.schedule import Faults
+from bridge.rig.rate import RateWatch
+from bridge.rig.step import begin, device_memory, end, fill
+from bridge.wire.clock import time
+from bridge.wire.messages import ANNOUNCE as ANNOUNCE_LAYOUT
+from bridge.wire.messages import APPLIED as APPLIED_LAYOUT
+from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
+from bridge.wire.messages import sealed, sensor_block
+from bridge.wire.stickslip_pb2 import FAULT, STOP_BY_PERSON, STOP_KEPT
+from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, SENSORS, Outgoing
+
+# Time of the blocks that may wait without a report. Smaller: each short stall of the computer is reported. Larger: v_a swings by
+# more than 4 % (the margin of the controller's LATE) without a report.
+_BEHIND_S = 0.015
+_OPEN_AGAIN_S = 1.0  # interval of the attempts to open a lost device
+
+
+class GuardedNode(ABC):
+    """A rig of any kind with its guard; a kind of rig adds the samples of a block.
+
+    Args:
+        guard: parameters and memory, records of `bridge.guard.records`.
+        block_ns: length of a block by the rig's clock.
+        samples: number of samples of a channel in a block.
+        faults: injected faults.
+
+    """
+
+    kernels: str  # owner of its kernels, for the operator
+
+    def __init__(self, guard: tuple[Records, Records], block_ns: int, samples: int, faults: Faults) -> None:
+        self.block_ns = block_ns
+        self._samples = samples
+        self.faults = faults
+        self.announcements: list[Outgoing] = []  # to be sent before the samples of the last block
+        self._guard_params, self._guard_state = guard
+        self._sensors = sensor_block(samples).blank()
+        self._applied = APPLIED_LAYOUT.blank()
+
+    def warm_up(self) -> None:
+        """Compile or load the kernels on copies, so that the first block is not late."""
+        compile_once(self.kernels, self._step_copies)
+
+    def advance(
+        self, commands: list[bytes], commands_late: int = 0, round_trip_ns: int = 0, late_ns: int = 0
+    ) -> tuple[Outgoing, ...]:
+        """Advance one block under the newest of `commands` accepted by the guard; return sensor block and applied vibration.
+
+        Send `announcements` before them. Without a block of the rig nothing is returned.
+
+        Raises Fault BAD_MESSAGE if a command cannot be read, CONFIG if a simulated rig cannot be stepped.
+        """
+        faults, block = self.faults, self.block
+        if faults.busy:
+            faults.begin_block(block)
+        payloads = b"".join(COMMAND_LAYOUT.canonical(payload, COMMAND.name) for payload in commands)
+        accepted = self._act(COMMAND_LAYOUT.record(payloads))
+        if accepted is None:
+            return ()
+        if faults.busy:
+            faults.spoil(self._sensors, block)
+        self._report(accepted, commands_late, round_trip_ns, late_ns)
+        if faults.busy:
+            faults.misdate((self._sensors, self._applied), block)
+        return Outgoing(SENSORS, sealed(self._sensors.tobytes())), Outgoing(APPLIED, self._applied.tobytes())
+
+    @abstractmethod
+    def _step_copies(self) -> None:
+        """Call every kernel of a block on copies."""
+
+    @abstractmethod
+    def _act(self, commands: Records) -> int | None:
+        """Apply the commands and fill the samples of a block; the number of accepted commands, None without a block."""
+
+    @abstractmethod
+    def _report(self, accepted: int, commands_late: int, round_trip_ns: int, late_ns: int) -> None:
+        """Pass the samples to the guard, and fill the guard's fields and the applied vibration."""
+
+    @abstractmethod
+    def let_go(self) -> None:
+        """Drop all commands in force or delayed and enter DISARMED: the vibration fades to zero at the exciter's rate."""
+
+    @property
+    @abstractmethod
+    def at_rest(self) -> bool:
+        """Whether the base is at rest."""
+
+    def problems(self) -> list[tuple[str, str, int]]:
+        """Codes, texts and numbers of new problems with the rig itself, which are reported once a second at most."""
+        return []
+
+    @property
+    def paced_by_rig(self) -> bool:
+        """Whether `advance` waits until the rig has a block."""
+        return False
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether more blocks of the rig wait to be read."""
+        return False
+
+    def idle(self) -> None:
+        """Discard the blocks before a run; call it at least each 0.2 s until the run begins."""
+        return
+
+    @abstractmethod
+    def close(self) -> None:
+        """Disconnect from the rig, which is at rest."""
+
+    def apply_order(self, order: int) -> bool:
+        """Apply an operator's order (`wire.Operator.Action`), HOLD or LEAVE. Returns whether it changed the state."""
+        return bool(apply_order(self._guard_state[0], order))
+
+    @property
+    def block(self) -> int:
+        """Number of the next block."""
+        return int(self._guard_state[0].block)
+
+    @property
+    def check_tones_Hz(self) -> list[float]:
+        """Frequencies of the loop check."""
+        p = self._guard_params[0]
+        return [float(tone_Hz) for tone_Hz in p.tone_Hz[: int(p.tones)]]
+
+    def accept_gain(self, gains: Sequence[float]) -> None:
+        """Set the gains that later checks are compared with, one per tone, from an earlier run; empty: no comparison."""
+        self._guard_state[0].accepted[: len(gains)] = gains
+
+    def warm(self, heat_share: float) -> None:
+        """Set the modelled warmth of the exciter from an earlier run, over the largest allowed."""
+        self._guard_state["heat"] = heat_share
+
+    @property
+    def accepted_gain(self) -> list[float]:
+        """The accepted exciter gain at each tone of the loop check; empty before the first check."""
+        gains = [float(gain) for gain in self._guard_state[0].accepted[: int(self._guard_params[0].tones)]]
+        return gains if all(gains) else []
+
+    @property
+    def gain_report(self) -> str:
+        """The measured and the expected gain at each tone of the last loop check, as text."""
+        return gain_report(self._guard_params[0], self._guard_state[0])
+
+    @property
+    def applied(self) -> Any:
+        """The applied vibration of the last block, a record of `Applied`."""
+        return self._applied[0]
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether the guard is in FAULT because of an operator's stop."""
+        s = self._guard_state[0]
+        return s.state == FAULT and s.cause in (STOP_BY_PERSON, STOP_KEPT)
+
+
+class DeviceNode(GuardedNode):
+    """A device behind its guard. While the device is silent or gone, its exciter is kept at rest.
+
+    Args:
+        device: open, with its exciter at rest.
+        guard: parameters and memory of its guard.
+        faults: injected faults.
+        memory: calibration of its channels, a record of `bridge.rig.step.DEVICE`; None: SI units in the order of CHANNELS.
+        stroke_m: stroke of the exciter for one unit of its amplitude.
+
+    """
+
+    kernels = "a device's rig"
+
+    def __init__(
+        self,
+        device: Device,
+        guard: tuple[Records, Records],
+        faults: Faults,
+        memory: Records | None = None,
+        stroke_m: float = 1.0,
+    ) -> None:
+        super().__init__(guard, round(device.block_s * 1e9), device.setup.samples_per_block, faults)
+        self._device, self._stroke_m = device, stroke_m
+        self._memory = device_memory() if memory is None else memory
+        self._block = DeviceBlock(np.zeros((1, 1)), 0.0, 0.0)
+        self._is_begun = False  # whether the vibration of the block under way is set
+        self._accepted = 0  # number of commands accepted for it
+        self._heard_s = time.monotonic()  # of the newest block
+        self._timeout_s = int(guard[0][0].timeout_blocks) * device.block_s
+        self._silent_since_s: float | None = None  # None while blocks arrive
+        self._is_open = True
+        self._open_again_s = 0.0
+        self._problems: list[tuple[str, str, int]] = []
+        self._clock = RateWatch(device.setup.sample_rate_Hz, self._samples)
+
+    @property
+    def paced_by_rig(self) -> bool:
+        """Whether `advance` waits until the device has a block."""
+        return self._device.pace == "device"
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether more blocks of the device wait to be read."""
+        return self._block.waiting > 0
+
+    def idle(self) -> None:
+        """Discard the blocks of a device that makes them by its own clock; the loop of the run reports a lost device."""
+        with contextlib.suppress(Exception):
+            while self.paced_by_rig and (block := self._device.read()) is not None and block.waiting:
+                pass
+        self._heard_s = time.monotonic()
+
+    def _step_copies(self) -> None:
+        state, memory, sensors = self._guard_state.copy(), self._memory.copy(), sensor_block(self._samples).blank()
+        apply_order(state[0], LEAVE)
+        begin(self._guard_params, state, memory, COMMAND_LAYOUT.blank(0), ANNOUNCE_LAYOUT.blank(0))
+        rows = np.zeros((int(memory["source"].max()) + 1, self._samples))
+        fill(state, memory, self.block_ns, 0, rows, sensors)
+        end(self._guard_params, state, memory, 0.0, 0.0, 0, 0, 0, 0, sensors, APPLIED_LAYOUT.blank())
+
+    def _act(self, commands: Records) -> int | None:
+        if self._silent_since_s is None and not self._is_begun:
+            self._begin(commands)
+        block = self._read()
+        if block is None:
+            return None
+        self._block, self._is_begun = block, False
+        self._note_block(block)
+        fill(self._guard_state, self._memory, self.block_ns, block.lost, block.samples, self._sensors)
+        return self._accepted
+
+    def _begin(self, commands: Records) -> None:
+        """Set the vibration of the next block; later commands are dropped until it is there, as they answer older blocks."""
+        announce = self._device.announcements()
+        self.announcements = [Outgoing(ANNOUNCE, announce[row : row + 1].tobytes()) for row in range(len(announce))]
+        self._accepted = begin(self._guard_params, self._guard_state, self._memory, commands, announce)
+        self._write()
+        self._is_begun = True
+
+    def _write(self) -> None:
+        """Order the vibration that the guard allows; after a refusal it begins again from rest."""
+        device, g = self._device, self._guard_state[0]
+        is_on = bool(g.enable)
+        try:
+            if has_line := device.setup.has_enable_line:
+                device.enable(is_on, int(g.toggle))
+            device.write(float(g.frequency_Hz), float(g.amplitude_m) / self._stroke_m if is_on or has_line else 0.0)
+        except Exception as error:
+            self._rest()
+            self._problems.append(
+                ("DEVICE_REFUSED", f"{_reason(error)}: the exciter rests, and begins again from 0", 1)
+            )
+
+    def _whole(self, block: DeviceBlock | None) -> DeviceBlock | None:
+        """A block for the kernels; None for a block of another shape, or with a vibration that is not finite."""
+        if block is None:
+            return None
+        samples = np.ascontiguousarray(block.samples, np.float64)
+        needed, numbers = int(self._memory["source"].max()) + 1, (block.frequency_Hz, block.amplitude)
+        if samples.ndim != 2 or len(samples) < needed or samples.shape[1] != self._samples:
+            due = f"must be {needed} channels or more x {self._samples}"
+            self._problems.append(("DEVICE_DATA", f"samples of shape {samples.shape}: {due}: dropped", 1))
+            return None
+        if not all(map(math.isfinite, numbers)):
+            self._problems.append(("DEVICE_DATA", f"a vibration of {numbers}: dropped", 1))
+            return None
+        return block._replace(samples=samples)
+
+    def _note_block(self, block: DeviceBlock) -> None:
+        if block.lost:
+            self._problems.append(("SAMPLES_LOST", "blocks were lost before they were read", block.lost))
+        if block.dropped:
+            self._problems.append(("DEVICE_DATA", f"{block.dropped}: dropped", 1))
+        if block.waiting * self._device.block_s > _BEHIND_S:
+            self._problems.append(("BEHIND", f"{block.waiting} blocks waited to be read", 1))
+        if self.paced_by_rig and (measured := self._clock.add(1 + block.lost, time.monotonic())):
+            self._problems.append((*measured, 1))
+
+    def _rest(self) -> None:
+        self._guard_state["amplitude_m"] = 0.0
+        try:
+            self._device.safe()
+        except Exception as error:
+            self._problems.append(("DEVICE_REFUSED", f"{_reason(error)}: the exciter may still vibrate", 1))
+
+    def _read(self) -> DeviceBlock | None:
+        try:
+            if not self._is_open:
+                self._open_again()
+            block = self._whole(self._device.read()) if self._is_open else None
+        except Exception as error:
+            self._fall_silent(_reason(error))
+            with contextlib.suppress(Exception):  # it is lost already
+                self._device.close()
+            self._is_open, self._open_again_s = False, time.monotonic() + _OPEN_AGAIN_S
+            return None
+        now_s = time.monotonic()
+        if block is None:
+            if now_s - self._heard_s > self._timeout_s:
+                self._fall_silent(f"no block for {self._timeout_s:g} s")
+            return None
+        self._heard_s = now_s
+        if self._silent_since_s is not None:
+            self._problems.append(("DEVICE_BACK", f"blocks again after {now_s - self._silent_since_s:.2f} s", 1))
+            self._silent_since_s = None
+            self._clock = RateWatch(self._device.setup.sample_rate_Hz, self._samples)
+        return block
+
+    def _fall_silent(self, why: str) -> None:
+        """Let the exciter rest until blocks arrive again."""
+        if self._silent_since_s is None:
+            self._silent_since_s, self._is_begun, self._accepted = self._heard_s, False, 0
+            self._rest()
+            self._problems.append(("DEVICE_SILENT", f"{why}: the exciter rests", 1))
+
+    def _open_again(self) -> None:
+        """Try to open a lost device, once each second. Raises DeviceError."""
+        if time.monotonic() < self._open_again_s:
+            time.sleep(self.block_ns * 1e-9)
+            return
+        self._device.open()
+        self._device.safe()
+        self._is_open = True
+
+    def _report(self, accepted: int, commands_late: int, round_trip_ns: int, late_ns: int) -> None:
+        block = self._block
+        if self.paced_by_rig:
+            late_ns = block.waiting * self.block_ns
+        end(
+            self._guard_params, self._guard_state, self._memory, block.frequency_Hz, block.amplitude * self._stroke_m,
+            accepted, commands_late, round_trip_ns, late_ns, self._sensors, self._applied,
+        )  # fmt: skip
+
+    def let_go(self) -> None:
+        """Drop the command in force and enter DISARMED: the vibration fades to zero at the exciter's rate."""
+        self._memory["command_block"] = NO_COMMAND
+        self.apply_order(LEAVE)
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the guard allows no vibration and the device executes none, or the exciter was switched off."""
+        return self._guard_state["amplitude_m"][0] == 0.0 and (
+            self._silent_since_s is not None or self._block.amplitude == 0.0
+        )
+
+    def problems(self) -> list[tuple[str, str, int]]:
+        """Codes, texts and numbers of new problems with the device, and its measured rate."""
+        problems, self._problems = self._problems, []
+        return problems
+
+    def close(self) -> None:
+        """Bring the exciter to rest and disconnect."""
+        self._rest()
+        self._device.close()
+
+
+def _reason(error: Exception) -> str:
+    """The reason of a failed call. An adapter may be foreign code: its error must not end the loop of the guard."""
+    if isinstance(error, DeviceError):
+        return str(error)
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{Path(place.filename).name}, line {place.lineno}: {type(error).__name__}: {error}"

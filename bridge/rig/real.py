@@ -1,0 +1,62 @@
+"""A real rig behind its guard, from its rig file: its device, opened, with calibration and limits."""
+
+from pathlib import Path
+
+from bridge.arrays import Records
+from bridge.faults import Fault
+from bridge.guard.absent import absent
+from bridge.guard.records import ExciterLimits, build
+from bridge.guard.wide import protection
+from bridge.rig.device import DeviceError
+from bridge.rig.faults.schedule import Faults
+from bridge.rig.file import DeviceRig
+from bridge.rig.load import device_of
+from bridge.rig.node import DeviceNode
+from bridge.rig.process import Served
+from bridge.rig.step import device_memory
+from bridge.wire.channels import CHANNELS
+
+
+def served(rig: DeviceRig, folder: Path) -> Served:
+    """A real rig for `bridge.rig.process.serve`; it never starts ARMED."""
+
+    def make(run: int, _may_arm: bool) -> DeviceNode:
+        return open_node(rig, folder, run)
+
+    return Served(rig.name, rig.guard, notes(rig), make)
+
+
+def open_node(rig: DeviceRig, folder: Path, run: int) -> DeviceNode:
+    """The node of a rig whose device is open. Raises Fault CONFIG, NO_DEVICE; a rig that cannot be opened is never simulated."""
+    device = device_of(rig, folder)
+    guard = build(rig.guard, _exciter(rig), run, absent=absent(rig.channels))
+    faults = Faults((), 0, rig.converter.block_s, rig.converter.samples_per_block)
+    try:
+        device.open()
+    except DeviceError as error:
+        raise Fault("NO_DEVICE", f"{rig.name}: {error}") from None
+    return DeviceNode(device, guard, faults, calibration(rig), rig.exciter.stroke_m_per_V or 1.0)
+
+
+def notes(rig: DeviceRig) -> list[tuple[str, str]]:
+    """Codes and texts of events at the start of a run: wide limits, and protection that this rig lacks."""
+    events = protection(rig.guard, _exciter(rig), rig.guard.fastest_drive_mps or 0.0, absent(rig.channels))
+    if not rig.exciter.enable_line:
+        events.append(("UNPROTECTED", "no enable line: the loop check finds no exciter that cannot be switched off"))
+    if rig.exciter.watchdog_s == 0.0:
+        events.append(("UNPROTECTED", "no watchdog: a killed process leaves the exciter vibrating"))
+    return events
+
+
+def calibration(rig: DeviceRig) -> Records:
+    """The wiring and calibration of the channels, as the memory of a `DeviceNode`."""
+    memory = device_memory()
+    for row, name in enumerate(CHANNELS):
+        channel = rig.channels[name]
+        memory["source"][0, row] = -1 if channel.source is None else channel.source
+        memory["scale"][0, row], memory["offset"][0, row] = channel.sign * channel.scale, channel.offset
+    return memory
+
+
+def _exciter(rig: DeviceRig) -> ExciterLimits:
+    return ExciterLimits.of(rig.exciter, rig.converter.block_s, rig.converter.samples_per_block)

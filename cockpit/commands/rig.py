@@ -1,0 +1,80 @@
+"""`stickslip rig ...`: serve and check a real rig; simulate a device."""
+
+import threading
+from pathlib import Path
+from typing import Annotated, NamedTuple
+
+import typer
+
+from cockpit.commands.as_json.option import Json, JsonGroup, print_result
+from cockpit.commands.options import SharedOptions, command
+from cockpit.commands.processes import WaitFor, serve_rig
+
+rig_app = typer.Typer(
+    cls=JsonGroup, help="Serve a real rig behind the guard, check it; simulate a device.", no_args_is_help=True
+)
+RigArgument = Annotated[str, typer.Argument(metavar="RIG", help="A rig file of a real rig, .toml.")]
+
+
+class Boxed(NamedTuple):
+    """Result of `rig box`."""
+
+    port: int
+
+
+@rig_app.command("serve")
+@command("scenario", "settings", "endpoint", "prefix", "certs", "insecure", "wait")
+def rig_serve(shared: SharedOptions, rig: RigArgument, wait_for: WaitFor = "controller", as_json: Json = None) -> None:
+    """Serve a rig on the bus, as `plant --rig`: open its device behind the guard, or simulate it."""
+    serve_rig(shared, rig, wait_for, as_json)
+
+
+@rig_app.command("check")
+@command("settings")
+def rig_check(
+    shared: SharedOptions,
+    rig: RigArgument,
+    seconds: Annotated[float, typer.Option("--seconds", min=1.0, max=600.0, metavar="S", help="Length.")] = 5.0,
+    as_json: Json = None,
+) -> int:
+    """Check the device of a rig with its exciter at rest; exit status 0: ok, 1: problems, each with a remedy."""
+    from bridge.faults import Fault
+    from bridge.rig.check import check
+    from bridge.rig.device import DeviceError
+    from bridge.rig.load import device_of
+    from cockpit.run.device_run import load_device_rig
+
+    made, folder = load_device_rig(rig, shared.settings)
+    device = device_of(made, folder)
+    try:
+        device.open()
+        result = check(device, made, seconds)
+    except DeviceError as error:
+        raise Fault("NO_DEVICE", f"{made.name}: {error}") from None
+    finally:
+        device.close()
+    print_result(as_json, result, result.in_words())
+    return 0 if result.ok else 1
+
+
+@rig_app.command("box")
+@command()
+def rig_box(
+    box: Annotated[Path, typer.Argument(metavar="BOX", help="File of a simulated device, .toml.")], as_json: Json = None
+) -> None:
+    """Simulate a device for the adapter `stream` until Ctrl-C: the plant's physics behind a TCP port, with a dead man."""
+    from bridge.config import read_toml, validate
+    from bridge.plain import print_line
+    from bridge.wire import realtime
+    from cockpit.run.child_process import stop_event
+    from cockpit.run.scenario import load_rig
+    from plant.box import Box, BoxConfig
+
+    config = validate(BoxConfig, read_toml(box), box.name)
+    made = Box(config, load_rig(config.rig, config.settings))
+    if not config.waits:
+        realtime.claim(realtime.core(1))
+    print_line(f"box      {config.rig} at {config.host}:{made.port}")
+    stop: threading.Event = stop_event()
+    made.run(stop)
+    print_result(as_json, Boxed(made.port), [])

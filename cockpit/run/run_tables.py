@@ -1,0 +1,108 @@
+"""The tables of a scenario that runs of simulated and of real rigs share, and the headers of their processes."""
+
+import json
+import platform
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, Field
+
+from bridge.config import Strict
+from bridge.guard.config import VibrationLimits
+from bridge.log.storage.log_files import Rotation
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.payloads import SCHEMA_VERSION
+from bridge.wire.zenoh_link import BusConfig
+from controller.config import ControllerConfig
+
+
+def _plain(name: str) -> str:
+    if name in {"", ".", ".."} or "/" in name or not name.isprintable():
+        rule = "must be a plain file name, as the log is runs/NAME.mcap"
+        raise ValueError(f"{name!r}: {rule}; leave out every / and control character")
+    return name
+
+
+class LogTable(Strict):
+    """Limits of a file of the log; the log continues in `NAME-0001.mcap` and so on."""
+
+    file_MB: Annotated[float, Field(ge=0)] = Field(default=1000.0, description="Largest size of a file; 0: no limit.")
+    file_s: Annotated[float, Field(ge=0)] = Field(default=3600.0, description="Longest time in a file; 0: no limit.")
+
+    @property
+    def rotation(self) -> Rotation:
+        """The limits in the units of the log writer."""
+        return Rotation(round(self.file_MB * 1e6), self.file_s)
+
+
+class RunTables(Strict):
+    """Configuration of one run without its rig."""
+
+    name: Annotated[str, AfterValidator(_plain)] = "unnamed"
+    description: str = ""
+    duration_s: Annotated[float, Field(ge=0)] = Field(default=16.0, description="Length; 0: until Ctrl-C or SIGTERM.")
+    seed: Annotated[int, Field(ge=0)] = 1
+    arm: bool = Field(
+        default=False,
+        description="true: the simulated rig starts ARMED, without the loop check; false: `stickslip arm`.",
+    )
+    controller: ControllerConfig = ControllerConfig()
+    bus: BusConfig = BusConfig()
+    log: LogTable = LogTable()
+
+
+def processor() -> str:
+    """Name of this processor: the last bit of a sine or an exponential depends on it."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor() or platform.machine()
+    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), platform.machine())
+
+
+def versions() -> dict[str, str]:
+    """Versions of packages, Python, libc and processor: with equal ones a run in simulated time repeats bit for bit."""
+    packages = {name: version(name) for name in ("stickslip", "numpy", "numba", "protobuf", "eclipse-zenoh", "mcap")}
+    return packages | {
+        "python": platform.python_version(),
+        "libc": "-".join(platform.libc_ver()),
+        "processor": processor(),
+    }
+
+
+def header_of(
+    run: RunTables,
+    rig: dict[str, Any],
+    limits: VibrationLimits,
+    name: str,
+    role: str,
+    lockstep: bool,
+    more: dict[str, Any] | None = None,
+) -> wire.Header:
+    """The header of a process of a run: role, configuration and versions.
+
+    Args:
+        run: its tables.
+        rig, limits, name: the rig as in the header, its limits of the vibration, its name.
+        role, lockstep: of the process.
+        more: further keys of the rig's configuration.
+
+    """
+    if role == "plant":
+        configuration: dict[str, Any] = {
+            "rig": rig,
+            "seed": run.seed,
+            "duration_s": run.duration_s,
+            "lockstep": lockstep,
+            "limits": limits._asdict(),
+        } | (more or {})
+    else:
+        configuration = run.controller.model_dump(mode="json")
+    return wire.Header(
+        role=role,
+        schema_version=SCHEMA_VERSION,
+        configuration=json.dumps(configuration, sort_keys=True),
+        versions=json.dumps(versions(), sort_keys=True),
+        rig=name,
+    )
