@@ -7,9 +7,9 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 
 from bridge.files import write_whole
-from bridge.log.finding import Finding
 from bridge.pages import filled_page
 from bridge.provenance import provenance
+from cockpit.look.pieces import Looked
 from diagnosis.look.look import LookResult
 from diagnosis.look.words import TITLES, headline, limits_of_look, with_interval
 
@@ -169,8 +169,9 @@ def _draw(axes: Any, x: Any, y: Any, alpha: float = 1.0) -> None:
     axes.margins(x=0.01)
 
 
-def write_page(seen: LookResult, source: Path, findings: list[Finding], out: Path) -> None:
-    """Write the offline page: numbers and pictures of a record, and findings on its reading. Raises OSError."""
+def write_page(result: Looked, source: Path, out: Path) -> None:
+    """Write the offline page: numbers and pictures of a record, its pieces, and findings on its reading. Raises OSError."""
+    seen = result.seen
     answer = headline(seen)
     text = filled_page(
         Path(__file__).with_name("page.html.j2"),
@@ -184,8 +185,11 @@ def write_page(seen: LookResult, source: Path, findings: list[Finding], out: Pat
         ],
         open=limits_of_look(seen),
         figures=[(title, caption, as_svg(figure)) for title, caption, figure in pictures(seen)],
-        findings=findings,
+        findings=result.findings,
         provenance=provenance([source]).in_words(),
         seen=seen,
+        result=result,
+        unit="" if seen.known.coefficient else seen.known.force_unit,
+        with_interval=with_interval,
     )
     write_whole(out, text)

@@ -13,25 +13,28 @@ from bridge.arrays import Bools, Floats
 from bridge.config import read_toml, validate
 from bridge.faults import Fault
 from bridge.log.finding import Finding
-from bridge.results import in_json
 from bridge.tables.kinds import kind_of
-from bridge.tables.readers import read_table
+from bridge.tables.readers import Dialect, read_table
 from bridge.tables.table import Table
-from bridge.tables.unit_words import in_brackets, known_unit, weight_unit
+from bridge.tables.unit_words import known_unit, si_unit, unit_in_name, weight_unit
 from cockpit.look.findings import of_time, of_values, tare_of
 from diagnosis.evidence.import_table import ImportMap
 from diagnosis.evidence.manifest_keys import USUAL, ChannelMap, Columns
 from diagnosis.evidence.mapped import calendar_unit_s, has_time, mapped
 from diagnosis.evidence.run_log import LoggedRun, columns_of_log
-from diagnosis.look.guess import Guess, guess, no_time
+from diagnosis.look.guess import Guess, guess, no_time, unused
 from diagnosis.look.look import LookResult, RecordFacts, look
 from diagnosis.look.slips import FEWEST
 from diagnosis.look.sticks import is_of_slide
-from diagnosis.look.words import headline
 
 # Shortest stretch without vibration that is looked at. Shorter: stops and turns of the drive between two vibrations count as
 # swings, 1.5 s in docs/guides/describe-an-axis.md. Longer: the controller's trials without vibration, 5 s, are left out.
 _ALONE_S = 2.0
+_OPTIONS = {
+    "t_s": '--time "NAME [ms]"',
+    "drive_force_N": '--force "NAME [kN]"',
+    "drive_position_m": '--position "NAME [mm]"',
+}
 _LOOKED_AT = ("t_s", "drive_force_N", "drive_position_m")
 
 
@@ -46,6 +49,9 @@ class LookOptions(NamedTuple):
     force: str = ""
     map: Path | None = None
     speed_turns: bool | None = None  # the given speed is angular; None: no speed is given
+    position: str = ""
+    piece: int | None = None  # from 1; None: all
+    encoding: str | None = None
 
 
 class MeasuredRecord(NamedTuple):
@@ -60,6 +66,7 @@ class MeasuredRecord(NamedTuple):
     findings: list[Finding]
     rig: Mapping[str, float]  # numbers of [rig] that a run log describes; empty for another file
     map_text: str  # map that reproduces this reading; empty if a map was given, or for a run log
+    starts_s: tuple[float, ...] = ()  # start of each piece of a file whose time begins again
 
     @property
     def free(self) -> Bools:
@@ -74,45 +81,77 @@ class MeasuredRecord(NamedTuple):
         return free
 
 
+class _Reading(NamedTuple):
+    """The columns of a table that are the record, and the facts that the table states."""
+
+    columns: Columns
+    known: RecordFacts
+    findings: list[Finding]
+    starts_s: tuple[float, ...]
+    map_text: str = ""
+
+
 def read_record(path: Path, asked: LookOptions) -> MeasuredRecord:
     """Read a table or a run log. Raises Fault BAD_TABLE, BAD_LOG, CONFIG."""
     if path.is_file() and kind_of(path) == "mcap" and (logged := _logged(path)) is not None:
         known = RecordFacts(asked.speed_mps, asked.load_N, asked.mass_kg)
         return _record(path, logged.columns, known, logged.findings, "", logged.rig)
     if asked.map is not None:
-        wanted = validate(ImportMap, read_toml(asked.map), asked.map.name)
-        table = read_table(path, wanted.source.dialect, wanted.source.format)
-        columns, findings = mapped(table, wanted.channels, asked.rate_Hz or wanted.source.sample_rate_Hz)
-        speed = asked.speed_mps if asked.speed_mps is not None else wanted.run.drive_velocity_mps
-        mass = asked.mass_kg if asked.mass_kg is not None else wanted.rig.get("mass_kg")
-        findings += [
-            *of_values(table, _as_read(wanted.channels, columns), findings),
-            *of_time(columns["t_s"], f"{path.name}: t_s"),
-        ]
-        if asked.speed_mps is not None:
-            columns.pop("drive_position_m", None)
-        return _record(path, columns, RecordFacts(speed, asked.load_N, mass), findings, "")
-    table = read_table(path)
-    guessed = guess(table, {"time": asked.time, "force": asked.force})
-    channels = _channels(table, guessed)
+        read = _by_map(path, asked, validate(ImportMap, read_toml(asked.map), asked.map.name))
+    else:
+        read = _by_names(read_table(path, Dialect(encoding=asked.encoding)), asked)
+    record = _record(path, read.columns, read.known, read.findings, read.map_text)
+    return _piece(record._replace(starts_s=read.starts_s), asked.piece)
+
+
+def _by_map(path: Path, asked: LookOptions, wanted: ImportMap) -> _Reading:
+    """The record as a map describes it; options of the command line replace keys of the map."""
+    dialect = wanted.source.dialect
+    table = read_table(path, dialect._replace(encoding=asked.encoding or dialect.encoding), wanted.source.format)
+    named = {"t_s": asked.time, "drive_force_N": asked.force, "drive_position_m": asked.position}
+    channels = wanted.channels | {name: _channel(table, column) for name, column in named.items() if column}
+    columns, findings, starts_s = mapped(table, channels, asked.rate_Hz or wanted.source.sample_rate_Hz)
+    speed = asked.speed_mps if asked.speed_mps is not None else wanted.run.drive_velocity_mps
+    mass = asked.mass_kg if asked.mass_kg is not None else wanted.rig.get("mass_kg")
+    findings += [
+        *of_values(table, _as_read(channels, columns), findings),
+        *of_time(columns["t_s"], f"{path.name}: t_s"),
+    ]
+    if asked.speed_mps is not None:
+        columns.pop("drive_position_m", None)
+    return _Reading(columns, RecordFacts(speed, asked.load_N, mass), findings, starts_s)
+
+
+def _by_names(table: Table, asked: LookOptions) -> _Reading:
+    """The record by the names, units and values of the columns."""
+    path = table.path
+    guessed = guess(table, {"time": asked.time, "force": asked.force, "position": asked.position})
+    given = {"t_s": asked.time, "drive_force_N": asked.force, "drive_position_m": asked.position}
+    channels = _channels(table, guessed) | {name: _channel(table, column) for name, column in given.items() if column}
+    findings = [Finding("assumed", path.name, "; ".join(guessed.reasons))] if guessed.reasons else []
     if asked.rate_Hz is None and not has_time(table, channels):
-        known = ", ".join(f'"{name}"' for name in table.columns)
-        line = f"{path.name}: no time: {no_time(table)}which column is the time, or how many rows per second are there?"
-        raise Fault("CONFIG", f'{line} Add --time "NAME" or --rate 1kHz; columns here: {known}')
-    torsion = bool(guessed.force) and (known_unit(table.unit(guessed.force)) or ("",))[0] == "torque"
+        raise Fault("CONFIG", f"{path.name}: no time: {no_time(table)}")
+    unit = _own_unit(table, guessed, channels, findings)
+    torsion = bool(guessed.force) and not unit and _quantity(table, channels["drive_force_N"]) == "torque"
     if asked.speed_turns not in (None, torsion):
         kind, example = ("torque", "10mrad/s or 5rpm") if torsion else ("force", "0.5mm/s")
         raise Fault("CONFIG", f"--speed: {guessed.force!r} is a {kind}: must be a speed such as {example}")
-    if torsion and guessed.position and (known_unit(table.unit(guessed.position)) or ("",))[0] == "length":
-        del channels["drive_position_m"]  # on a turning rig a length is a displacement along the axis
-        guessed = guessed._replace(position="")
-    columns, findings = mapped(table, channels, asked.rate_Hz)
-    findings = [Finding("assumed", path.name, "; ".join(guessed.reasons)), *findings, *_unitless(table, channels)]
+    for name, column in (("drive_position_m", guessed.position),):
+        of_force = len(table.columns[channels["drive_force_N"].column])
+        if torsion and column and _quantity(table, channels[name]) == "length":
+            del channels[name]  # on a turning rig a length is a displacement along the axis
+        elif asked.rate_Hz and column and len(table.columns[column]) != of_force:
+            del channels[name]
+            text = "has another number of rows than the force, and --rate is the rate of the force: not used"
+            findings.append(Finding("unused", f"{path.name}: {column}", text))
+    guessed = guessed if "drive_position_m" in channels else guessed._replace(position="")
+    columns, of_columns, starts_s = mapped(table, channels, asked.rate_Hz)
+    findings += [*of_columns, *_unitless(table, channels, bool(asked.rate_Hz))]
     if torsion:
         text = f"{guessed.force!r} is a torque: the rig turns, so positions are angles in rad"
         findings.append(Finding("assumed", path.name, text))
     load_N, of_load = asked.load_N, not guessed.force and bool(guessed.coefficient)
-    if load_N is None and guessed.load and not torsion:
+    if load_N is None and guessed.load and not torsion and not unit:
         loads_N = _si(table, guessed.load, "N", findings)
         findings += of_values(table, {guessed.load: loads_N}, table.findings)
         load_N = float(np.nanmean(np.abs(loads_N))) or None
@@ -161,8 +200,64 @@ def read_record(path: Path, asked: LookOptions) -> MeasuredRecord:
         speed_mps = _si(table, guessed.speed, "rad/s" if torsion else "m/s", findings)
         steps_m = 0.5 * (speed_mps[1:] + speed_mps[:-1]) * np.diff(columns["t_s"])
         columns["drive_position_m"] = np.concatenate([[0.0], np.nancumsum(steps_m)])
-    known = RecordFacts(asked.speed_mps, load_N, asked.mass_kg, of_load and load_N is None, torsion)
-    return _record(path, columns, known, findings, map_text(table, channels, asked))
+    if left := unused(table, guessed):
+        findings.append(Finding("unused", path.name, f"columns: {', '.join(map(repr, left))}"))
+    known = RecordFacts(asked.speed_mps, load_N, asked.mass_kg, of_load and load_N is None, torsion, unit)
+    return _Reading(columns, known, findings, starts_s, "" if unit else map_text(table, channels, asked))
+
+
+def _piece(record: MeasuredRecord, piece: int | None) -> MeasuredRecord:
+    """The record of one piece, or of all. Raises Fault CONFIG for a number without a piece."""
+    if piece is None:
+        return record
+    starts_s = record.starts_s or (-np.inf,)
+    if not 1 <= piece <= len(starts_s):
+        raise Fault("CONFIG", f"--piece {piece}: must be from 1 to {len(starts_s)}, the pieces of {record.path.name}")
+    end_s = starts_s[piece] if piece < len(starts_s) else np.inf
+    inside = (record.t_s >= starts_s[piece - 1]) & (record.t_s < end_s)
+    return record._replace(
+        t_s=record.t_s[inside],
+        force_N=record.force_N[inside],
+        position_m=None if record.position_m is None else record.position_m[inside],
+        others={name: values[inside] for name, values in record.others.items()},
+        starts_s=(),
+    )
+
+
+def pieces_of(record: MeasuredRecord) -> list[MeasuredRecord]:
+    """The record of each piece; the record itself where its time does not begin again."""
+    return [_piece(record, number) for number in range(1, len(record.starts_s) + 1)] or [record]
+
+
+def _channel(table: Table, column: str) -> ChannelMap:
+    """The column that an option names; with a unit behind it, as in `T [ms]`, where the file states none."""
+    key = table.find(column)
+    unit = unit_in_name(column) if column not in (key, table.unit(key)) and not table.unit(key) else ""
+    return ChannelMap(column=key, unit=unit)
+
+
+def _quantity(table: Table, channel: ChannelMap) -> str:
+    return (known_unit(channel.unit or table.unit(channel.column)) or ("",))[0]
+
+
+def _own_unit(table: Table, guessed: Guess, channels: dict[str, ChannelMap], findings: list[Finding]) -> str:
+    """The unit in which a column is printed that holds no force; empty for a force, a torque or a coefficient.
+
+    The column keeps its numbers, and nothing is derived from them: neither stiffness nor mass nor a coefficient.
+    """
+    channel = channels["drive_force_N"]
+    unit = channel.unit or table.stated_unit(channel.column)
+    known = weight_unit(unit) if unit else None
+    if not guessed.force or not unit or (known is not None and known[0] in ("force", "torque")):
+        return ""
+    shown, factor = ("%" if known and known[0] == "share" and known[1] != 1.0 else unit), 1.0
+    if known is not None and known[0] != "share":
+        shown, factor = si_unit(known[0]), known[1]
+    channels["drive_force_N"] = channel.model_copy(update={"scale": factor, "unit": ""})
+    what = f"is a {known[0]}" if known is not None else f"has the unknown unit {unit!r}"
+    text = f"{what}, no force: printed in {shown}, and no stiffness, mass or coefficient comes from it"
+    findings.append(Finding("units", f"{table.path.name}: column {channel.column}", text))
+    return shown
 
 
 def looked_at(record: MeasuredRecord) -> LookResult:
@@ -254,19 +349,24 @@ def _si(table: Table, column: str, unit: str, findings: list[Finding]) -> Floats
     return table.column(column) * (known[1] if known else 1.0)
 
 
-def _unitless(table: Table, channels: dict[str, ChannelMap]) -> list[Finding]:
-    """A finding for each channel without a stated unit."""
+def _unitless(table: Table, channels: dict[str, ChannelMap], rate: bool) -> list[Finding]:
+    """A finding for each channel without a stated unit. Raises Fault CONFIG for a time in an unknown unit."""
+    if "t_s" in channels and not rate:
+        unit = channels["t_s"].unit or table.stated_unit(channels["t_s"].column)
+        if unit and known_unit(unit) is None:
+            line = f"{table.path.name}: column {channels['t_s'].column}: {unit!r} is not a known unit of time"
+            raise Fault("CONFIG", f"{line}; add --rate 1kHz in its place")
     assumed = {"t_s": "s", "drive_force_N": "N", "drive_position_m": "m"}
     return [
         Finding(
-            "assumed",
+            "unit",
             f"{table.path.name}: {channel.column}",
-            f"states no unit: taken as {assumed[name]}; set unit = ... in a map if it is not",
+            f"states no unit: taken as {assumed[name]}; else name it with its unit, as in {_OPTIONS[name]}",
         )
         for name, channel in channels.items()
         if channel.scale is None
-        and not (table.unit(channel.column) or in_brackets(channel.column))
-        and not (name == "t_s" and _is_time(table, channel))
+        and not (channel.unit or table.stated_unit(channel.column))
+        and not (name == "t_s" and (rate or _is_time(table, channel)))
     ]
 
 
@@ -280,6 +380,7 @@ def map_text(table: Table, channels: dict[str, ChannelMap], asked: LookOptions) 
     lines = [f"# columns of {table.path.name} as they were read; correct mistakes and give this file to --map"]
     source: dict[str, Any] = dict(table.written)
     source.pop("columns", None)
+    channels = {name: channel for name, channel in channels.items() if name != "t_s" or asked.rate_Hz is None}
     if "t_s" not in channels and (rate_Hz := asked.rate_Hz or table.sample_rate_Hz):
         source["sample_rate_Hz"] = float(rate_Hz)
     if source:
@@ -290,7 +391,7 @@ def map_text(table: Table, channels: dict[str, ChannelMap], asked: LookOptions) 
         ]
     lines.append("[channels]")
     for name, channel in channels.items():
-        unit = table.unit(channel.column)
+        unit = channel.unit or table.unit(channel.column)
         keys = [f"column = {json.dumps(channel.column, ensure_ascii=False)}"]
         if channel.scale is not None:
             keys.append(f"scale = {channel.scale!r}")
@@ -302,17 +403,3 @@ def map_text(table: Table, channels: dict[str, ChannelMap], asked: LookOptions) 
     if asked.speed_mps is not None:
         lines += ["", "[run]", f"drive_velocity_mps = {asked.speed_mps!r}"]
     return "\n".join(lines) + "\n"
-
-
-class Looked(NamedTuple):
-    """The numbers of a file, with findings on its data and the files that were written."""
-
-    seen: LookResult
-    findings: list[Finding]
-    written: list[Path]
-    JSON_MERGED = "seen"
-
-    @in_json
-    def headline(self) -> str:
-        """The answer in one line."""
-        return headline(self.seen)

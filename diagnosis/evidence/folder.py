@@ -208,7 +208,7 @@ def read_columns(path: Path, channels: dict[str, ChannelMap], rotary: bool = Fal
             has = ", ".join(wanted) or "no standard column"
             line = f"{path.name}: t_s: missing; the file has {has}; add the column or map it in [channels]"
             raise Fault("BAD_EVIDENCE", line)
-        standard, noted = mapped(table, wanted, rotary=rotary)
+        standard, noted, _ = mapped(table, wanted, rotary=rotary)
     except Fault as fault:
         line = fault.line if path.name in fault.line else f"{path.name}: {fault.line}"
         raise Fault("BAD_EVIDENCE", line) from None

@@ -115,7 +115,7 @@ def import_file(path: Path, map_path: Path, out: Path) -> Imported:
     table = read_table(path, wanted.source.dialect, wanted.source.format)
     try:
         rotary = wanted.rig["drive"] == "torsion" if "drive" in wanted.rig else None
-        columns, findings = mapped(table, wanted.channels, wanted.source.sample_rate_Hz, rotary)
+        columns, findings, _ = mapped(table, wanted.channels, wanted.source.sample_rate_Hz, rotary)
         if out.suffix == ".mcap":
             _check_free(out)
             done = _to_log(path, columns, out)

@@ -25,6 +25,8 @@ _MU = {
     "dwell_N_per_decade": "mu_dwell_per_decade",
 }
 
+_OF_SPRING = ("series_N_per_m", "stiffness_N_per_m", "mass_kg")  # numbers that only a force gives
+
 # unit of a linear rig -> unit of a rotary rig
 _TURNING = {"N": "N m", "N/s": "N m/s", "N/m": "N m/rad", "kg": "kg m²", "N per decade": "N m per decade"}
 
@@ -37,11 +39,12 @@ class RecordFacts(NamedTuple):
     mass_kg: float | None = None  # mass of the slide
     coefficient: bool = False  # the record holds the force over an unknown load
     torsion: bool = False  # the rig is rotary: forces are torques, ways are angles
+    unit: str = ""  # unit of a record that holds no force: a motor current, a following error; empty for a force
 
     @property
     def force_unit(self) -> str:
         """Unit of the record's force or coefficient."""
-        return "1" if self.coefficient else "N m" if self.torsion else "N"
+        return self.unit or ("1" if self.coefficient else "N m" if self.torsion else "N")
 
     @property
     def speed_unit(self) -> str:
@@ -106,6 +109,12 @@ def look(
     mean_N = float(np.average([part.force_N.mean() for part in parts], weights=[len(part.t_s) for part in parts]))
     if known.coefficient:
         numbers = _of_coefficient(numbers)
+    elif known.unit:
+        numbers = {
+            name: number._replace(unit=re.sub(r"^N\b", known.unit, number.unit))
+            for name, number in numbers.items()
+            if name not in _OF_SPRING
+        }
     elif known.torsion:
         numbers = {
             name: number._replace(unit=_TURNING.get(number.unit, number.unit)) for name, number in numbers.items()
@@ -131,7 +140,7 @@ def _of_coefficient(numbers: dict[str, Number]) -> dict[str, Number]:
     return {
         _MU.get(name, name): number._replace(unit=re.sub(r"^N\b", "1", number.unit))
         for name, number in numbers.items()
-        if name not in ("series_N_per_m", "stiffness_N_per_m", "mass_kg")
+        if name not in _OF_SPRING
     }
 
 

@@ -30,10 +30,15 @@ TITLES = {
     "dwell_N_per_decade": ("ageing", "rise of the breakaway force per decade of stick time"),
 }
 
+# units that take a prefix; a unit of the file, such as counts, takes none
+_WITH_PREFIX = {"N", "N m", "m", "s", "A", "V", "Pa", "kg", "kg m²", "rad"}
+
 
 def with_interval(number: Number) -> str:
     """A number with its unit and its interval of 90 %."""
-    factor, unit = (1.0, "") if number.unit == "1" else prefixed(abs(number.value), number.unit)
+    factor, unit = (1.0, "") if number.unit == "1" else (1.0, number.unit)
+    if number.unit.partition("/")[0].partition(" per ")[0] in _WITH_PREFIX:
+        factor, unit = prefixed(abs(number.value), number.unit)
     value, low, high = number.value * factor, number.low * factor, number.high * factor
     digits = _digits(value, high - low)
     if not math.isfinite(low):
@@ -54,6 +59,7 @@ def headline(seen: LookResult) -> str:
     if not seen.cycles:
         known = seen.known
         quantity = "friction coefficient" if known.coefficient else "torque" if known.torsion else "force"
+        quantity = "mean" if known.unit else quantity
         unit = "" if known.coefficient else f" {known.force_unit}"
         level = f"the {quantity} is {seen.mean_force_N:.4g}{unit} on average, with {seen.noise_N:.2g}{unit} of noise"
         return f"no slip in {seen.seconds:.3g} s: {level}"
@@ -98,7 +104,9 @@ def limits_of_look(seen: LookResult) -> list[str]:
         lines.append(
             "no stiffness of the contact: the sticks are straight, so the stiffness above holds for drive and contact in series"
         )
-    if seen.known.coefficient:
+    if seen.known.unit:
+        lines = []  # the reading reports that no force was measured
+    elif seen.known.coefficient:
         lines.append("no force: the normal load is not known; add --load 94.5N")
     elif seen.known.load_N is None and not seen.known.torsion:
         lines.append("no friction coefficient: the normal load is not known; add --load 94.5N")
