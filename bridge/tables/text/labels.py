@@ -1,4 +1,4 @@
-"""Labels between the numbers of a line: `F:14.1,x:3.2` and `t=20 ms  F=14.1 N` of serial ports; and mixed delimiters."""
+"""Labels between the numbers of a line: `F:14.1,x:3.2` and `t=20 ms  F=14.1 N` of serial ports; and blanks beside commas."""
 
 import re
 from collections import Counter
@@ -28,7 +28,7 @@ def without_labels(text: str, labels: Sequence[str], lines: Sequence[str]) -> tu
 
 
 def is_mixed(lines: Sequence[str]) -> bool:
-    """Whether blanks and commas both separate whole numbers and decimals: `17.25 0,92 14.1`."""
+    """Whether blanks separate the columns, and commas the numbers of one cell: `17.25 0,92 14.1`."""
     filled = [line for line in lines if line.strip()]
     mixed = [line for line in filled if "," in line and " " in line.strip() and _MIXED.fullmatch(line.strip())]
     # with a decimal comma `0,5 14,1` no number has a decimal point

@@ -19,12 +19,21 @@ _NAMES = {
     "trace_name",
     "trace name",
 }
-_NAMES |= {"variable", "kanal", "kanalname", "signalname", "title", "source"}
-_UNITS = {"unit", "units", "einheit", "channel unit", "vertical units", "y_unit_label", "unit symbol", "unité", "vunit"}
+_NAMES |= {"variable", "kanal", "kanalname", "signalname", "title"}
+_UNITS = {"unit", "units", "einheit", "channel unit", "vertical units", "y_unit_label", "unit symbol", "unit_string", "unité"}
 _STEP = re.compile(
     r"(?:sample|sampling|abtast)[ _]?(?:time|interval|period|zeit|intervall)\s*[\[(]?(?P<unit>\w*)[\])]?", re.I
 )
+_IN_EACH = re.compile(r"\s*([A-Za-z][\w .-]*):")  # `name: Time, name: Force`
 _FEWEST = 2  # fewest lines of a block
+
+
+class _Property(NamedTuple):
+    """One line: its key, and its cells, of which the first is the key or not."""
+
+    key: str
+    cells: list[str]
+    has_key: bool
 
 
 class Properties(NamedTuple):
@@ -41,27 +50,25 @@ def properties_above(lines: Sequence[str], form: TextLayout, width: int) -> Prop
 
     In pairs, as TwinCAT writes them, each channel has a column of times before it, and each key is written before each value.
     """
+    rows = [_property(line, form, width) for line in lines]
     for at in range(len(lines) - 1, -1, -1):
-        names = _filled(form.cells(lines[at]), width)
-        if len(names) < width or _key(names[0]) not in _NAMES:
+        row = rows[at]
+        if row is None or row.key not in _NAMES:
             continue
-        block: list[tuple[int, list[str]]] = []
-        for below in range(at, len(lines)):
-            cells = form.cells(lines[below])
-            if not lines[below].strip() or form.is_number(cells[0]):
-                break
-            block.append((below, _filled(cells, width)))
+        end = next((below for below in range(at, len(lines)) if rows[below] is None), len(lines))
+        block = [(line, found) for line in range(at, end) if (found := rows[line]) is not None]
         if len(block) < _FEWEST:
             continue
-        of_units = next(((line, cells) for line, cells in block if _key(cells[0]) in _UNITS), (-1, [""] * width))
-        units = [_unit(cell) for cell in of_units[1]]
-        steps = (_STEP.fullmatch(cells[0].strip()) for _, cells in block)
-        of_time = next((step["unit"] for step in steps if step is not None), "")
-        pairs = width > 2 and width % 2 == 0 and len({_key(key) for key in names[::2]}) == 1
-        for key in range(0, width, 2 if pairs else width):
-            names[key] = f"time {names[key + 1].strip()}" if pairs else "time"
-            units[key] = of_time if known_unit(of_time) else ""
-        return Properties(at, of_units[0], names, units)
+        of_units = next(((line, found) for line, found in block if found.key in _UNITS), None)
+        names, units = row.cells, [_unit(cell) for cell in of_units[1].cells] if of_units else [""] * width
+        if row.has_key:
+            steps = (_STEP.fullmatch(found.cells[0].strip()) for _, found in block)
+            of_time = next((step["unit"] for step in steps if step is not None), "")
+            pairs = width > 2 and width % 2 == 0 and len({_key(key) for key in names[::2]}) == 1
+            for key in range(0, width, 2 if pairs else width):
+                names[key] = f"time {names[key + 1].strip()}" if pairs else "time"
+                units[key] = of_time if known_unit(of_time) else ""
+        return Properties(at, of_units[0] if of_units else -1, names, units)
     return None
 
 
@@ -83,9 +90,17 @@ def _key(cell: str) -> str:
     return re.sub(r"[\[(].*|:", "", cell).strip().lower()
 
 
-def _filled(cells: list[str], width: int) -> list[str]:
-    """The cells of a line, with empty cells to the width where it ends sooner by one."""
-    return [*cells, *[""] * (width - len(cells))][:width] if len(cells) >= width - 1 else cells
+def _property(line: str, form: TextLayout, width: int) -> _Property | None:
+    """A line of properties: its key in the first cell, or in each cell before a colon; None for another line."""
+    text = line.strip("\r\n").lstrip("#%! ")
+    cells = form.cells(text)
+    if not width - 1 <= len(cells) or not text.strip() or form.is_number(cells[0]):
+        return None
+    cells = [*cells, ""][:width]
+    keys = [_IN_EACH.match(cell) for cell in cells]
+    if width > 1 and all(keys) and len({key[1].strip().lower() for key in keys if key}) == 1:
+        return _Property(_key(cells[0].partition(":")[0]), [cell.partition(":")[2].strip() for cell in cells], False)
+    return _Property(_key(cells[0]), cells, True)
 
 
 def _unit(cell: str) -> str:

@@ -51,7 +51,6 @@ def read_text(path: Path, given: Dialect) -> Table:
         text, names = without_labels(text, labels, body)
         given = given._replace(delimiter="\t", names=given.names or names)
     elif given.delimiter is None and is_mixed(body):
-        text = text.replace(",", " ")
         given = given._replace(delimiter=BLANK, decimal=".")
     if given is not before:
         head_lines = text[:_HEAD_CHARACTERS].splitlines()
