@@ -92,15 +92,16 @@ def in_pieces(t_s: Floats, segments: Sequence[Segment], where: str) -> Pieces:
 
 
 def _falls(times_s: Floats) -> Indices:
-    """The rows at which a time begins again [n]."""
+    """The rows at which a time begins again [n]: it falls below the middle of its piece; rows sent twice go back less."""
     steps_s = np.diff(times_s)
     if not (steps_s > 0.0).any():
         return np.zeros(0, np.int64)
     fall_s = _FALL_STEPS * float(np.median(steps_s[steps_s > 0.0]))
     candidates = np.flatnonzero(steps_s < -fall_s) + 1
-    kept = [
-        at
-        for at in candidates.tolist()
-        if np.median(times_s[max(at - _AROUND, 0) : at]) - np.median(times_s[at : at + _AROUND]) > fall_s
-    ]
+    kept: list[int] = []
+    for at in candidates.tolist():
+        before_s, after_s = np.median(times_s[max(at - _AROUND, 0) : at]), np.median(times_s[at : at + _AROUND])
+        middle_s = 0.5 * (times_s[kept[-1] if kept else 0] + before_s)
+        if before_s - after_s > fall_s and after_s < middle_s:
+            kept.append(at)
     return np.array(kept, np.int64)

@@ -150,7 +150,7 @@ def _by_names(table: Table, asked: LookOptions) -> _Reading:
     if torsion:
         text = f"{guessed.force!r} is a torque: the rig turns, so positions are angles in rad"
         findings.append(Finding("assumed", path.name, text))
-    load_N, of_load = asked.load_N, not guessed.force and bool(guessed.coefficient)
+    load_N, of_load = None if unit else asked.load_N, not guessed.force and bool(guessed.coefficient)
     if load_N is None and guessed.load and not torsion and not unit:
         loads_N = _si(table, guessed.load, "N", findings)
         findings += of_values(table, {guessed.load: loads_N}, table.findings)

@@ -14,7 +14,9 @@ _MARKS = (
     (codecs.BOM_UTF16_BE, "utf-16-be"),
 )
 _SIGNS = set("µ°²³·±–−×Ω§")  # signs of units alone show no language, so chardet cannot tell an encoding from them
-_INSIDE = re.compile(r"[A-Za-z][µ°²³±−–Ω§][A-Za-z]")  # a sign inside of a word is a letter of another encoding: `Si³a` is Siła
+_INSIDE = re.compile(
+    r"[A-Za-z][µ°²³±−–Ω§][A-Za-z]"
+)  # a sign inside of a word is a letter of another encoding: `Si³a` is Siła
 _OTHER = re.compile(rb"[^\r\n]*[\x80-\xff][^\r\n]*")
 _LINES = 50  # lines with other letters than ASCII that chardet sees; the numbers of the rows would only make it unsure
 _LOOKED_AT = 4096  # first bytes, which reveal UTF-16 without a mark: every other byte of western text is 0
@@ -76,4 +78,5 @@ def _detected(data: bytes) -> str:
     if {letter for letter in western if not letter.isascii()} <= _SIGNS and not _INSIDE.search(western):
         return "cp1252"
     found = detect(text, encoding_era=EncodingEra.MODERN_WEB)["encoding"]
-    return codecs.lookup(found or "cp1252").name
+    # many encodings share these letters: the usual one of them is reported
+    return codecs.lookup(found).name if found and text.decode(found, errors="replace") != western else "cp1252"

@@ -20,7 +20,17 @@ _NAMES = {
     "trace name",
 }
 _NAMES |= {"variable", "kanal", "kanalname", "signalname", "title"}
-_UNITS = {"unit", "units", "einheit", "channel unit", "vertical units", "y_unit_label", "unit symbol", "unit_string", "unité"}
+_UNITS = {
+    "unit",
+    "units",
+    "einheit",
+    "channel unit",
+    "vertical units",
+    "y_unit_label",
+    "unit symbol",
+    "unit_string",
+    "unité",
+}
 _STEP = re.compile(
     r"(?:sample|sampling|abtast)[ _]?(?:time|interval|period|zeit|intervall)\s*[\[(]?(?P<unit>\w*)[\])]?", re.I
 )
