@@ -3,10 +3,10 @@
 import json
 import struct
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from bridge.units import counted
 
 _DEEPEST = 6  # deepest level of nested messages that is read
 _MOST_ITEMS = 64  # longest array whose elements are channels: joints are, the pixels of a picture are not
-_FURTHER_ON = 'record it as ROS 2 with "ros2msg" schemas, as protobuf or as JSON; a bag of ROS 1 is converted by `rosbags-convert`'
+_FURTHER_ON = 'record it as ROS 2 with "ros2msg" schemas, as protobuf or as JSON; `rosbags-convert` converts a bag of ROS 1'
 
 
 def read_message_log(path: Path) -> Table:
@@ -136,5 +136,5 @@ def _numbers(message: Any, key: str, depth: int) -> Iterator[tuple[str, float]]:
             yield from _numbers(value, at, depth + 1)
 
 
-def _is_list(value: Any) -> bool:
+def _is_list(value: Any) -> TypeGuard[Sequence[Any]]:
     return hasattr(value, "__len__") and hasattr(value, "__iter__") and not isinstance(value, str | bytes | dict)

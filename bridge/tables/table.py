@@ -112,17 +112,18 @@ class Table:
         return next((f"{stem[1]}{end}" for end in _NANOSECONDS if stem and f"{stem[1]}{end}" in self.columns), "")
 
     def unit(self, name: str | int) -> str:
-        """The unit of a column, from the file's list of units or the column's name; empty if unknown."""
+        """The unit of a column: from the file's list of units, its name, or the given name, as in `T [ms]`; empty if unknown."""
         key = self.find(name)
         first = _AGAIN.sub("", key)
         if (unit := self.units.get(key)) or (self.names_are_paths and key.endswith("]")):
             return unit or ""
-        return unit_in_name(first if first in self.columns else key)
+        unit = unit_in_name(first if first in self.columns else key)
+        return unit or ("" if str(name) == key else unit_in_name(str(name)))
 
     def stated_unit(self, name: str | int) -> str:
         """The unit of a column, known or not, as the file writes it; empty if it states none."""
         key = self.find(name)
-        return self.unit(key) or ("" if self.names_are_paths else in_brackets(key))
+        return self.unit(name) or ("" if self.names_are_paths else in_brackets(key))
 
 
 def _simplified(text: str, bare: bool) -> str:

@@ -67,7 +67,7 @@ def look(
     ]
     if record.map_text and not any(target.suffix == ".toml" for target in out):
         lines.append(
-            "map        --out map.toml saves how the columns were read (--why prints it); correct that file and pass it with --map"
+            "map        --out map.toml saves how the columns were read, --why prints it; correct that file and pass it with --map"
         )
     print_result(as_json, result, lines)
 

@@ -16,7 +16,7 @@ from bridge.log.finding import Finding
 from bridge.tables.kinds import kind_of
 from bridge.tables.readers import Dialect, read_table
 from bridge.tables.table import Table
-from bridge.tables.unit_words import known_unit, si_unit, unit_in_name, weight_unit
+from bridge.tables.unit_words import known_unit, si_unit, weight_unit
 from cockpit.look.findings import of_time, of_values, tare_of
 from diagnosis.evidence.import_table import ImportMap
 from diagnosis.evidence.manifest_keys import USUAL, ChannelMap, Columns
@@ -52,6 +52,12 @@ class LookOptions(NamedTuple):
     position: str = ""
     piece: int | None = None  # from 1; None: all
     encoding: str | None = None
+
+    @property
+    def channels(self) -> dict[str, ChannelMap]:
+        """The columns that the options name."""
+        named = {"t_s": self.time, "drive_force_N": self.force, "drive_position_m": self.position}
+        return {name: ChannelMap(column=column) for name, column in named.items() if column}
 
 
 class MeasuredRecord(NamedTuple):
@@ -97,37 +103,48 @@ def read_record(path: Path, asked: LookOptions) -> MeasuredRecord:
         known = RecordFacts(asked.speed_mps, asked.load_N, asked.mass_kg)
         return _record(path, logged.columns, known, logged.findings, "", logged.rig)
     if asked.map is not None:
-        read = _by_map(path, asked, validate(ImportMap, read_toml(asked.map), asked.map.name))
+        wanted = validate(ImportMap, read_toml(asked.map), asked.map.name)
+        read = _by_map(path, asked, overridden(wanted, asked))
     else:
         read = _by_names(read_table(path, Dialect(encoding=asked.encoding)), asked)
     record = _record(path, read.columns, read.known, read.findings, read.map_text)
     return _piece(record._replace(starts_s=read.starts_s), asked.piece)
 
 
+def overridden(wanted: ImportMap, asked: LookOptions) -> ImportMap:
+    """A map in which the options of the command line replace its keys."""
+    source, run, rig = wanted.source, wanted.run, wanted.rig
+    channels = wanted.channels | asked.channels
+    if asked.encoding:
+        source = source.model_copy(update={"encoding": asked.encoding})
+    if asked.rate_Hz:
+        source = source.model_copy(update={"sample_rate_Hz": asked.rate_Hz})
+    if asked.speed_mps is not None:
+        run = run.model_copy(update={"drive_velocity_mps": asked.speed_mps})
+    if asked.mass_kg is not None and rig:
+        rig = rig | {"mass_kg": asked.mass_kg}
+    return wanted.model_copy(update={"source": source, "channels": channels, "run": run, "rig": rig})
+
+
 def _by_map(path: Path, asked: LookOptions, wanted: ImportMap) -> _Reading:
-    """The record as a map describes it; options of the command line replace keys of the map."""
-    dialect = wanted.source.dialect
-    table = read_table(path, dialect._replace(encoding=asked.encoding or dialect.encoding), wanted.source.format)
-    named = {"t_s": asked.time, "drive_force_N": asked.force, "drive_position_m": asked.position}
-    channels = wanted.channels | {name: _channel(table, column) for name, column in named.items() if column}
-    columns, findings, starts_s = mapped(table, channels, asked.rate_Hz or wanted.source.sample_rate_Hz)
-    speed = asked.speed_mps if asked.speed_mps is not None else wanted.run.drive_velocity_mps
-    mass = asked.mass_kg if asked.mass_kg is not None else wanted.rig.get("mass_kg")
+    """The record as a map describes it."""
+    table = read_table(path, wanted.source.dialect, wanted.source.format)
+    columns, findings, starts_s = mapped(table, wanted.channels, wanted.source.sample_rate_Hz)
     findings += [
-        *of_values(table, _as_read(channels, columns), findings),
+        *of_values(table, _as_read(wanted.channels, columns), findings),
         *of_time(columns["t_s"], f"{path.name}: t_s"),
     ]
     if asked.speed_mps is not None:
         columns.pop("drive_position_m", None)
-    return _Reading(columns, RecordFacts(speed, asked.load_N, mass), findings, starts_s)
+    mass_kg = asked.mass_kg if asked.mass_kg is not None else wanted.rig.get("mass_kg")
+    return _Reading(columns, RecordFacts(wanted.run.drive_velocity_mps, asked.load_N, mass_kg), findings, starts_s)
 
 
 def _by_names(table: Table, asked: LookOptions) -> _Reading:
     """The record by the names, units and values of the columns."""
     path = table.path
     guessed = guess(table, {"time": asked.time, "force": asked.force, "position": asked.position})
-    given = {"t_s": asked.time, "drive_force_N": asked.force, "drive_position_m": asked.position}
-    channels = _channels(table, guessed) | {name: _channel(table, column) for name, column in given.items() if column}
+    channels = _channels(table, guessed) | asked.channels
     findings = [Finding("assumed", path.name, "; ".join(guessed.reasons))] if guessed.reasons else []
     if asked.rate_Hz is None and not has_time(table, channels):
         raise Fault("CONFIG", f"{path.name}: no time: {no_time(table)}")
@@ -136,12 +153,12 @@ def _by_names(table: Table, asked: LookOptions) -> _Reading:
     if asked.speed_turns not in (None, torsion):
         kind, example = ("torque", "10mrad/s or 5rpm") if torsion else ("force", "0.5mm/s")
         raise Fault("CONFIG", f"--speed: {guessed.force!r} is a {kind}: must be a speed such as {example}")
-    for name, column in (("drive_position_m", guessed.position),):
-        of_force = len(table.columns[channels["drive_force_N"].column])
-        if torsion and column and _quantity(table, channels[name]) == "length":
-            del channels[name]  # on a turning rig a length is a displacement along the axis
-        elif asked.rate_Hz and column and len(table.columns[column]) != of_force:
-            del channels[name]
+    if column := guessed.position:
+        rows = len(table.columns[table.find(channels["drive_force_N"].column)])
+        if torsion and _quantity(table, channels["drive_position_m"]) == "length":
+            del channels["drive_position_m"]  # on a turning rig a length is a displacement along the axis
+        elif asked.rate_Hz and len(table.columns[column]) != rows:
+            del channels["drive_position_m"]
             text = "has another number of rows than the force, and --rate is the rate of the force: not used"
             findings.append(Finding("unused", f"{path.name}: {column}", text))
     guessed = guessed if "drive_position_m" in channels else guessed._replace(position="")
@@ -227,13 +244,6 @@ def _piece(record: MeasuredRecord, piece: int | None) -> MeasuredRecord:
 def pieces_of(record: MeasuredRecord) -> list[MeasuredRecord]:
     """The record of each piece; the record itself where its time does not begin again."""
     return [_piece(record, number) for number in range(1, len(record.starts_s) + 1)] or [record]
-
-
-def _channel(table: Table, column: str) -> ChannelMap:
-    """The column that an option names; with a unit behind it, as in `T [ms]`, where the file states none."""
-    key = table.find(column)
-    unit = unit_in_name(column) if column not in (key, table.unit(key)) and not table.unit(key) else ""
-    return ChannelMap(column=key, unit=unit)
 
 
 def _quantity(table: Table, channel: ChannelMap) -> str:

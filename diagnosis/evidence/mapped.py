@@ -58,7 +58,7 @@ def mapped(
         text = (
             f"column {channels['t_s'].column} is not used as the time: the rate of {sample_rate_Hz:.9g} Hz replaces it"
         )
-        findings.append(Finding("assumed", f"{file}: t_s", text))
+        findings.append(Finding("time", f"{file}: t_s", text))
     elif "t_s" in channels:
         t_s, starts_s, of_pieces = in_pieces(_time(table, channels["t_s"], findings), table.segments, f"{file}: t_s")
         findings += of_pieces

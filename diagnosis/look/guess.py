@@ -11,8 +11,8 @@ from bridge.tables.table import Table
 from bridge.tables.unit_words import bare_name, known_unit, weight_unit
 
 _NAMES = {
-    "time": r"^(t|ts|time|zeit|x_value|timestamp|elapsed.*|.*\btime\b.*|.*zeit.*|__time|%time|.*stamp.*|sekunden|seconds?|m?sec|ms|us"
-    r"|(milli|micro|nano)s(ec(ond)?s?)?|temps|czas|tiempo|tempo|время|时间|時間)$",
+    "time": r"^(t|ts|time|zeit|x_value|timestamp|elapsed.*|.*\btime\b.*|.*zeit.*|__time|%time|.*stamp.*|sekunden"
+    r"|seconds?|m?sec|ms|us|(milli|micro|nano)s(ec(ond)?s?)?|temps|czas|tiempo|tempo|время|时间|時間)$",
     "coefficient": r"(^|[^a-z])(mu|µ|cof|c\.o\.f)([^a-z]|$)|coeff.*(fric|trac)|(fric|trac).*coeff"
     r"|reib(bei)?wert|reibungskoeff|reibzahl",
     "load": r"normal|(^|[^a-z])(fz|fn|f_n|f_z|load|last)([^a-z]|$)|auflast|anpress",
@@ -136,7 +136,8 @@ def _refuse_empty_force(table: Table, numeric: list[str]) -> None:
 def no_time(table: Table) -> str:
     """The question for the time, with the reason why a column that is named as a time holds none."""
     known = ", ".join(f'"{name}"' for name in table.columns)
-    ask = f'which column is the time, or how many rows per second are there? Add --time "NAME" or --rate 1kHz; columns here: {known}'
+    ask = 'which column is the time, or how many rows per second are there? Add --time "NAME" or --rate 1kHz'
+    ask += f"; columns here: {known}"
     for name, values in table.columns.items():
         if re.search(_NAMES["time"], bare_name(name), re.IGNORECASE):
             try:

@@ -23,7 +23,8 @@ _RATE = re.compile(
     re.IGNORECASE,
 )
 _STEP = re.compile(
-    r"(?:delta_?[xt]|dt|(?:sampl|abtast)\w*[ _\-]?(?:interval|intervall|period|time|zeit|schritt))[^\w+-]*(?:is\s+)?(?:\[(?P<u1>\w+)\]\W*)?"
+    r"(?:delta_?[xt]|dt|(?:sampl|abtast)\w*[ _\-]?(?:interval|intervall|period|time|zeit|schritt))[^\w+-]*(?:is\s+)?"
+    r"(?:\[(?P<u1>\w+)\]\W*)?"
     r"(?P<value>\d[\d.,]*(?:[eE][-+]?\d+)?)\s*(?P<unit>ms|µs|us|ns|s)?\b",
     re.IGNORECASE,
 )

@@ -172,7 +172,7 @@ def _rows(rows: str, head: Head, form: TextLayout, given: Dialect) -> tuple[Any,
 
 
 def _named_by_words(columns: dict[str, Any]) -> dict[str, Any]:
-    """The columns, each named by a column of one repeated word before it: `force +14.1 position +3.2`; words keep their number."""
+    """The columns, each named by a column of one repeated word before it: `force +14.1 position +3.2`."""
     result: dict[str, Any] = {}
     word = ""
     for name, column in columns.items():
