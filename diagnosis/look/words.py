@@ -2,10 +2,13 @@
 
 import math
 
+import numpy as np
+
 from bridge.units import counted, fixed_digits, prefixed
 from diagnosis.look.look import LookResult
 from diagnosis.look.numbers import Number
 from diagnosis.look.speeds import confounded, unsteady
+from diagnosis.slips import NOISE_SPANS
 
 # in the order of the output
 TITLES = {
@@ -30,6 +33,7 @@ TITLES = {
     "dwell_N_per_decade": ("ageing", "rise of the breakaway force per decade of stick time"),
 }
 
+_SAMPLES_OF_SLIP = 20  # samples of a slip that show how the force falls
 # units that take a prefix; a unit of the file, such as counts, takes none
 _WITH_PREFIX = {"N", "N m", "m", "s", "A", "V", "Pa", "kg", "kg m²", "rad"}
 
@@ -91,15 +95,51 @@ def sentences(seen: LookResult) -> list[str]:
     return lines
 
 
+def _why_no_stiffness(seen: LookResult, example: str) -> str:
+    if not any(cycle.speed_mps > 0.0 for cycle in seen.cycles):
+        return f"no stiffness and no mass: the drive's speed is not known; add --speed {example}"
+    samples = seen.numbers["dwell_s"].value * seen.rate_Hz if "dwell_s" in seen.numbers else 0.0
+    return (
+        f"no stiffness and no mass: a stick has {samples:.0f} samples; record at {_SAMPLES_OF_SLIP} or more, or slower"
+    )
+
+
+def _why_no_mass(seen: LookResult) -> str:
+    if "omega_rad_per_s" in seen.numbers:
+        return "no mass: the force falls slower than a free mass swings, by friction or damping; weigh the slide"
+    slip_s = seen.numbers["slip_s"].value
+    least_Hz = _SAMPLES_OF_SLIP / slip_s
+    return f"no mass: a slip has {slip_s * seen.rate_Hz:.0f} samples; record at {least_Hz:.2g} Hz or more"
+
+
+def _why_no_slip(seen: LookResult) -> str:
+    """Why a record shows no stick-slip, and what to record."""
+    unit = "" if seen.known.coefficient else f" {seen.known.force_unit}"
+    if seen.cycles:
+        spans_s = np.diff([cycle.breakaway_t_s for cycle in seen.cycles])
+        period_s = float(np.median(spans_s)) if len(spans_s) else seen.seconds
+        line = (
+            f"no stick: the force swings every {period_s * 1e3:.3g} ms and its climbs are bent, or as long as its falls"
+        )
+        least_Hz = 2.0 * _SAMPLES_OF_SLIP / period_s
+        rate = f", at {least_Hz:.2g} Hz or more" if seen.rate_Hz < least_Hz else ""
+        return f"{line}; a slide that rests shows it at a fifth of the speed: record there{rate}"
+    least = NOISE_SPANS * seen.noise_N
+    line = f"no fall of the force above {least:.2g}{unit}, {NOISE_SPANS:g} times its noise, and above 4 % of its range"
+    return f"{line}: smaller slips are not seen; record with less noise, or at a lower speed, which lets slips grow"
+
+
 def limits_of_look(seen: LookResult) -> list[str]:
     """A line for each missing number: the reason, and the option to add."""
     lines: list[str] = []
     if not seen.sticks:
-        return lines
+        return [_why_no_slip(seen)]
     example = "10mrad/s" if seen.known.torsion else "0.5mm/s"
     names = ("mu_s", "mu_k") if seen.known.coefficient else ("static_force_N", "kinetic_force_N")
     if "stiffness_N_per_m" not in seen.numbers and "slope_N_per_s" in seen.numbers:
-        lines.append(f"no stiffness and no mass: the drive's speed is not known; add --speed {example}")
+        lines.append(_why_no_stiffness(seen, example))
+    if "stiffness_N_per_m" in seen.numbers and "mass_kg" not in seen.numbers:
+        lines.append(_why_no_mass(seen))
     if "stiffness_N_per_m" in seen.numbers and "series_N_per_m" not in seen.numbers:
         lines.append(
             "no stiffness of the contact: the sticks are straight, so the stiffness above holds for drive and contact in series"
