@@ -11,7 +11,7 @@ from bridge.pages import filled_page
 from bridge.provenance import provenance
 from cockpit.look.pieces import Looked
 from diagnosis.look.look import LookResult
-from diagnosis.look.words import TITLES, headline, limits_of_look, with_interval
+from diagnosis.look.words import TITLES, headline, limits_of_look, meaning_of, with_interval
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -179,8 +179,8 @@ def write_page(result: Looked, source: Path, out: Path) -> None:
         name=source.name,
         headline=answer,
         rows=[
-            (symbol, with_interval(seen.numbers[name]), meaning)
-            for name, (symbol, meaning) in TITLES.items()
+            (symbol, with_interval(seen.numbers[name]), meaning_of(name, seen))
+            for name, (symbol, _) in TITLES.items()
             if name in seen.numbers
         ],
         open=limits_of_look(seen),

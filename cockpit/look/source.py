@@ -24,6 +24,7 @@ from diagnosis.evidence.mapped import calendar_unit_s, has_time, mapped
 from diagnosis.evidence.run_log import LoggedRun, columns_of_log
 from diagnosis.look.guess import Guess, guess, no_time, unused
 from diagnosis.look.look import LookResult, RecordFacts, look
+from diagnosis.look.motion import lag_of
 from diagnosis.look.slips import FEWEST
 from diagnosis.look.sticks import is_of_slide
 
@@ -164,6 +165,10 @@ def _by_names(table: Table, asked: LookOptions) -> _Reading:
     guessed = guessed if "drive_position_m" in channels else guessed._replace(position="")
     columns, of_columns, starts_s = mapped(table, channels, asked.rate_Hz)
     findings += [*of_columns, *_unitless(table, channels, bool(asked.rate_Hz))]
+    if guessed.stands_in == "a position":
+        columns["drive_force_N"] = lag_of(columns["t_s"], columns["drive_force_N"])
+        text = f"column {guessed.force} is a position: how far it lies behind an even motion is looked at"
+        findings.append(Finding("lag", path.name, text))
     if torsion:
         text = f"{guessed.force!r} is a torque: the rig turns, so positions are angles in rad"
         findings.append(Finding("assumed", path.name, text))
@@ -191,8 +196,10 @@ def _by_names(table: Table, asked: LookOptions) -> _Reading:
         *of_values(table, _as_read(channels, columns), findings),
         *of_time(columns["t_s"], f"{path.name}: t_s"),
     ]
-    zero_N, tare_findings = tare_of(
-        columns["drive_force_N"], columns.get("drive_position_m"), f"{path.name}: drive_force_N"
+    zero_N, tare_findings = (
+        (0.0, [])
+        if unit
+        else tare_of(columns["drive_force_N"], columns.get("drive_position_m"), f"{path.name}: drive_force_N")
     )
     findings += tare_findings
     if zero_N:
@@ -258,8 +265,10 @@ def _own_unit(table: Table, guessed: Guess, channels: dict[str, ChannelMap], fin
     channel = channels["drive_force_N"]
     unit = channel.unit or table.stated_unit(channel.column)
     known = weight_unit(unit) if unit else None
-    if not guessed.force or not unit or (known is not None and known[0] in ("force", "torque")):
+    if not guessed.force or (known is not None and known[0] in ("force", "torque")):
         return ""
+    if not unit:
+        return "units" if guessed.stands_in else ""
     shown, factor = ("%" if known and known[0] == "share" and known[1] != 1.0 else unit), 1.0
     if known is not None and known[0] != "share":
         shown, factor = si_unit(known[0]), known[1]

@@ -31,6 +31,11 @@ _QUANTITIES = {
     "coefficient": ("share",),
     "frequency": ("frequency",),
 }
+# what shows stick-slip where no force is measured, the clearest first
+_STAND_INS = {
+    "a following error": r"foll.*err|(^|[^a-z])f?_?err(or)?([^a-z]|$)|schlepp|nachlauf|(^|[^a-z])lag([^a-z]|$)|regelabw|contour",
+    "a motor current or torque": r"current|strom|torque|moment|(^|[^a-z])i_?[qa]?([^a-z]|$)|load ?%|auslastung|effort",
+}
 _FREQUENCY = r"^freq(uency|uenz)?s?$"  # first column of a spectrum
 _FEWEST_STEPS = 8
 # columns that are never used as force, load, speed or position, even if their name matches
@@ -50,6 +55,7 @@ class Guess(NamedTuple):
     speed: str
     coefficient: str
     reasons: list[str]
+    stands_in: str = ""  # what the column of the force holds where none is a force: an error, a current, a position
 
 
 def guess(table: Table, given: dict[str, str]) -> Guess:
@@ -95,6 +101,13 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
                 reasons.append(f"time = {name!r}, which {why}")
                 break
     left = [name for name in numeric if name not in chosen.values()]
+    stands_in = ""
+    if "force" not in chosen and "coefficient" not in chosen and not any(_in(table, name, "force") for name in left):
+        stands_in, chosen["force"] = _stand_in(table, left, chosen.get("position", ""))
+        if stands_in:
+            reasons.append(f"no force: {stands_in} {chosen['force']!r} shows stick-slip in its place")
+        else:
+            del chosen["force"]
     if "force" not in chosen and "coefficient" not in chosen:
         by_unit = [name for name in left if _in(table, name, "force")]
         if len(by_unit) != 1:
@@ -116,7 +129,16 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
             reasons.append(f"no {what}, as column {empty!r} holds no number")
     kinds = ("time", "force", "load", "position", "speed", "coefficient")
     time, force, load, position, speed, coefficient = (chosen.get(what, "") for what in kinds)
-    return Guess(time, force, load, position, speed, coefficient, reasons)
+    return Guess(time, force, load, "" if position == force else position, speed, coefficient, reasons, stands_in)
+
+
+def _stand_in(table: Table, left: list[str], position: str) -> tuple[str, str]:
+    """What shows stick-slip where no column is a force, and its column; empty without one."""
+    moving = [name for name in left if not _flat(table, name)]
+    for what, pattern in _STAND_INS.items():
+        if name := next((name for name in moving if re.search(pattern, bare_name(name), re.IGNORECASE)), ""):
+            return what, name
+    return ("a position", position) if position and not _flat(table, position) else ("", "")
 
 
 def _in(table: Table, name: str, what: str) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 from bridge.arrays import Floats
 from bridge.results import in_json
 from diagnosis.look.laid_over import breakaway_of, with_slip_times
+from diagnosis.look.motion import StickSlip, best_way
 from diagnosis.look.numbers import Number, jackknifed, mean_of
 from diagnosis.look.slip_shape import Shape, falls_of, hidden_by_damping_N, shape_of
 from diagnosis.look.slips import OneWayPart, RecordSlips, find_slips, parts_of
@@ -60,6 +61,11 @@ class RecordFacts(NamedTuple):
         return self.unit or ("1" if self.coefficient else "N m" if self.torsion else "N")
 
     @property
+    def follows(self) -> bool:
+        """Whether the record is a following error: its sign changes in each slip."""
+        return self.unit in ("m", "rad")
+
+    @property
     def speed_unit(self) -> str:
         """Unit of the drive's speed."""
         return "rad/s" if self.torsion else "m/s"
@@ -78,7 +84,13 @@ class LookResult(NamedTuple):
     parts: list[OneWayPart]
     known: RecordFacts
     mean_force_N: float
-    JSON_HIDDEN = "cycles", "sticks", "parts", "known"
+    answer: StickSlip | None  # whether a record without a force shows stick-slip; None for a force
+    JSON_HIDDEN = "cycles", "sticks", "parts", "known", "answer"
+
+    @in_json
+    def stick_slip(self) -> str:
+        """yes, no or cannot tell."""
+        return self.answer.answer if self.answer is not None else "yes" if self.sticks else "no"
 
     @in_json
     def swings_without_stick(self) -> int:
@@ -96,14 +108,18 @@ def look(
 ) -> LookResult | None:
     """Look at a record: time, force and drive position, [samples] each, SI units. None where it is too short."""
     known = known or RecordFacts()
-    parts = parts_of(t_s, force_N, position_m)
+    parts = parts_of(t_s, force_N, position_m, not known.follows)
     if not parts:
         return None
     slips_of_parts = [slips for slips in (find_slips(part) for part in parts) if slips is not None]
+    answer = None
+    if known.unit:
+        parts, slips_of_parts, answer = best_way(parts, known.follows)
     cycles = [cycle for slips in slips_of_parts for cycle in cycles_of(slips, known.speed_mps)]
     weights = [len(slips.tops) for slips in slips_of_parts]
     straight = [slips.straight for slips in slips_of_parts]
     sticks = bool(slips_of_parts) and float(np.average(straight, weights=weights)) >= 0.5
+    sticks = sticks if answer is None else answer.answer == "yes"
     seconds = sum(float(part.t_s[-1] - part.t_s[0]) for part in parts)
     step_s = float(np.median([part.step_s for part in parts]))
     numbers: dict[str, Number] = {}
@@ -128,6 +144,8 @@ def look(
             for name, number in numbers.items()
             if name not in _OF_SPRING
         }
+        if "period_s" in numbers:
+            numbers["frequency_Hz"] = _inverse(numbers["period_s"], "Hz")
     elif known.torsion:
         numbers = {
             name: number._replace(unit=_TURNING.get(number.unit, number.unit)) for name, number in numbers.items()
@@ -145,7 +163,12 @@ def look(
         parts,
         known,
         mean_N,
+        answer,
     )
+
+
+def _inverse(number: Number, unit: str) -> Number:
+    return Number(1.0 / number.value, 1.0 / number.high, 1.0 / number.low, unit)
 
 
 def _of_coefficient(numbers: dict[str, Number]) -> dict[str, Number]:

@@ -1,6 +1,7 @@
 """The numbers of a record in sentences."""
 
 import math
+import re
 
 import numpy as np
 
@@ -24,6 +25,7 @@ TITLES = {
     "mu_dwell_per_decade": ("ageing", "rise of the coefficient at breakaway per decade of stick time"),
     "swing_N": ("swing", "fall of the force in a slip"),
     "period_s": ("period", "time from breakaway to breakaway"),
+    "frequency_Hz": ("frequency", "slips per second"),
     "dwell_s": ("stick", "time from re-stick to breakaway"),
     "slip_s": ("slip", "time from breakaway to re-stick"),
     "slope_N_per_s": ("climb", "rise of the force in a stick"),
@@ -58,8 +60,18 @@ def _digits(value: float, width: float) -> int:
     return min(max(1 - math.floor(math.log10(width)), 0), max(most, 0), 6)
 
 
+def meaning_of(name: str, seen: LookResult) -> str:
+    """The meaning of a number; in a record without a force it is that of a value."""
+    meaning = TITLES[name][1]
+    return re.sub(r"force|sliding friction", "value", meaning) if seen.known.unit else meaning
+
+
 def headline(seen: LookResult) -> str:
     """The result in one line."""
+    return _headline(seen) if seen.answer is None else f"stick-slip: {seen.answer.answer}: {_headline(seen)}"
+
+
+def _headline(seen: LookResult) -> str:
     if not seen.cycles:
         known = seen.known
         quantity = "friction coefficient" if known.coefficient else "torque" if known.torsion else "force"
@@ -83,9 +95,9 @@ def headline(seen: LookResult) -> str:
 def sentences(seen: LookResult) -> list[str]:
     """A line for each number, and a line for each number that the record cannot give."""
     lines: list[str] = []
-    for name, (symbol, meaning) in TITLES.items():
+    for name, (symbol, _) in TITLES.items():
         if name in seen.numbers:
-            lines.append(f"{symbol:<10} {with_interval(seen.numbers[name])}: {meaning}")
+            lines.append(f"{symbol:<10} {with_interval(seen.numbers[name])}: {meaning_of(name, seen)}")
     lines += [f"{'':<10} {text}" for text in limits_of_look(seen)]
     for at_speed in seen.at_speeds:
         top = "" if at_speed.breakaway_N is None else f", breakaway {with_interval(at_speed.breakaway_N)}"
@@ -132,6 +144,8 @@ def _why_no_slip(seen: LookResult) -> str:
 def limits_of_look(seen: LookResult) -> list[str]:
     """A line for each missing number: the reason, and the option to add."""
     lines: list[str] = []
+    if seen.answer is not None:
+        return [seen.answer.why]
     if not seen.sticks:
         return [_why_no_slip(seen)]
     example = "10mrad/s" if seen.known.torsion else "0.5mm/s"
@@ -144,9 +158,7 @@ def limits_of_look(seen: LookResult) -> list[str]:
         lines.append(
             "no stiffness of the contact: the sticks are straight, so the stiffness above holds for drive and contact in series"
         )
-    if seen.known.unit:
-        lines = []  # the reading reports that no force was measured
-    elif seen.known.coefficient:
+    if seen.known.coefficient:
         lines.append("no force: the normal load is not known; add --load 94.5N")
     elif seen.known.load_N is None and not seen.known.torsion:
         lines.append("no friction coefficient: the normal load is not known; add --load 94.5N")
