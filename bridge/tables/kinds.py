@@ -1,5 +1,6 @@
 """The format of a table file, from its first bytes; its suffix may be wrong."""
 
+import re
 import shlex
 import tomllib
 from pathlib import Path
@@ -29,6 +30,11 @@ _BY_SUFFIX.update(dict.fromkeys((".xlsx", ".xls", ".ods"), "sheet"))
 _LOOKED_AT = 4096  # first bytes that decide whether a file is a text
 _CONTROLS = bytes({*range(32)} - {*b"\t\n\v\f\r\x1a\x1b"})
 _MOST_CONTROLS = 0.02  # share of control characters in a text; a serial port gives a few at its start
+_PROSE = 1 << 16  # first and last bytes in which lines are searched for numbers
+_LEAST_ROWS = (
+    0.3  # share of lines that begin with a number or a label and a number; 0.02 in this project's README, 0.9 in tables
+)
+_ROW = re.compile(rb"""[^\w\r\n]*(?:[^\s\d,;]{1,40}[\s=:"']*)?[-+.]?\d""")
 _SHOWN = 8  # first bytes of an unknown file that the message shows
 
 
@@ -56,7 +62,27 @@ def kind_of(path: Path) -> Kind:
     if binary:
         line = f"{path.name}: is binary, of an unknown kind (it begins with {start[:_SHOWN].hex(' ')})"
         raise Fault("BAD_TABLE", f"{line}; export it as CSV in the program that wrote it")
-    return "json" if start.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] in (b"{", b"[") and b'"' in start else "text"
+    kind = "json" if start.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] in (b"{", b"[") and b'"' in start else "text"
+    if kind == "text":
+        _refuse_prose(path)
+    return kind
+
+
+def _refuse_prose(path: Path) -> None:
+    """Raise Fault BAD_TABLE for a text without rows of numbers, such as a README, before any library for tables is needed."""
+    with path.open("rb") as file:
+        begin = file.read(_PROSE)
+        file.seek(max(path.stat().st_size - _PROSE, 0))
+        end = file.read(_PROSE)
+    if wide_encoding(begin):
+        return
+    shares: list[float] = []
+    for part in (begin, end):  # a long head may fill the begin, notes the end
+        lines = [line for line in part.splitlines()[:-1] or [part] if line.strip()]
+        shares.append(sum(_ROW.match(line) is not None for line in lines) / max(len(lines), 1))
+    if begin.strip() and max(shares) < _LEAST_ROWS:
+        line = f"{path.name}: is a text with numbers in {100.0 * max(shares):.0f} % of its lines: no row of numbers in most"
+        raise Fault("BAD_TABLE", f"{line}; give a file of measured data")
 
 
 def _of_zip(path: Path, start: bytes) -> Kind:

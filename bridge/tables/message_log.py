@@ -17,7 +17,9 @@ from bridge.units import counted
 
 _DEEPEST = 6  # deepest level of nested messages that is read
 _MOST_ITEMS = 64  # longest array whose elements are channels: joints are, the pixels of a picture are not
-_FURTHER_ON = 'record it as ROS 2 with "ros2msg" schemas, as protobuf or as JSON; `rosbags-convert` converts a bag of ROS 1'
+_FURTHER_ON = (
+    'record it as ROS 2 with "ros2msg" schemas, as protobuf or as JSON; `rosbags-convert` converts a bag of ROS 1'
+)
 
 
 def read_message_log(path: Path) -> Table:

@@ -30,6 +30,10 @@ def look(
     as_json: Json = None,
 ) -> None:
     """Estimate slips, period, F_s, F_k, mu, stiffness and mass from a measured file, each with its 90 % interval."""
+    from bridge.tables.kinds import kind_of
+
+    check_file(path, "BAD_TABLE", "give the path of a file of measured data")
+    kind_of(path)  # refuses what is no table before the libraries for tables are imported
     from cockpit.look.cycles import refuse_to_replace_sheet
     from cockpit.look.doubts import refuse_absurd
     from cockpit.look.evidence import hints
@@ -37,7 +41,6 @@ def look(
     from cockpit.look.source import looked_at, read_record
     from diagnosis.look.words import headline, sentences
 
-    check_file(path, "BAD_TABLE", "give the path of a file of measured data")
     for target in out:
         check_output("--out", target, _OUTPUTS)
         refuse_to_lose([path], "the measured file", "--out", target)

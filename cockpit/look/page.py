@@ -11,7 +11,7 @@ from bridge.pages import filled_page
 from bridge.provenance import provenance
 from cockpit.look.pieces import Looked
 from diagnosis.look.look import LookResult
-from diagnosis.look.words import TITLES, headline, limits_of_look, meaning_of, with_interval
+from diagnosis.look.words import TITLES, headline, limits_of_look, meaning_of, symbol_of, with_interval
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -87,6 +87,7 @@ def histograms(seen: LookResult) -> "Figure":
         axes.set_xlabel(label)
         axes.set_ylabel("slips")
         axes.yaxis.get_major_locator().set_params(integer=True)
+        axes.locator_params(axis="x", nbins=4)  # values that hardly differ have labels of many digits
         _plain(axes)
     return figure
 
@@ -179,8 +180,8 @@ def write_page(result: Looked, source: Path, out: Path) -> None:
         name=source.name,
         headline=answer,
         rows=[
-            (symbol, with_interval(seen.numbers[name]), meaning_of(name, seen))
-            for name, (symbol, _) in TITLES.items()
+            (symbol_of(name, seen), with_interval(seen.numbers[name]), meaning_of(name, seen))
+            for name in TITLES
             if name in seen.numbers
         ],
         open=limits_of_look(seen),

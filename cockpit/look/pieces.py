@@ -6,10 +6,11 @@ from typing import NamedTuple
 from bridge.faults import Fault
 from bridge.log.finding import Finding
 from bridge.results import in_json
+from bridge.units import counted
 from cockpit.look.source import MeasuredRecord, looked_at, pieces_of
 from diagnosis.look.look import LookResult
 from diagnosis.look.numbers import Number
-from diagnosis.look.words import headline, with_interval
+from diagnosis.look.words import headline, symbol_of, with_interval
 
 _IN_A_LINE = ("mu_s", "mu_k", "static_force_N", "kinetic_force_N")
 
@@ -86,15 +87,12 @@ def of_pieces_in_words(result: Looked) -> list[str]:
     """A line for each piece."""
     lines: list[str] = []
     for piece in result.pieces:
-        shown = [f"{name} {with_interval(piece.numbers[name])}" for name in _IN_A_LINE if name in piece.numbers][:2]
+        known = [name for name in _IN_A_LINE if name in piece.numbers][:2]
+        shown = [f"{symbol_of(name, result.seen)} {with_interval(piece.numbers[name])}" for name in known]
         unit = result.seen.known.force_unit
         mean = f"mean {piece.mean_force_N:.4g}{'' if unit == '1' else f' {unit}'}"
         if "mu_mean" in piece.numbers:
             mean += f", mu {piece.numbers['mu_mean'].value:.4g}"
-        names = ", ".join(
-            [mean, *(text.replace("static_force_N", "F_s").replace("kinetic_force_N", "F_k") for text in shown)]
-        )
-        lines.append(
-            f"{f'piece {piece.number}':<10} {piece.slips} slips in {piece.seconds:.3g} s from {piece.start_s:.6g} s: {names}"
-        )
+        when = f"{counted(piece.slips, 'slip')} in {piece.seconds:.3g} s from {piece.start_s:.6g} s"
+        lines.append(f"{f'piece {piece.number}':<10} {when}: {', '.join([mean, *shown])}")
     return lines

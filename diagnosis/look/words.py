@@ -35,6 +35,7 @@ TITLES = {
     "dwell_N_per_decade": ("ageing", "rise of the breakaway force per decade of stick time"),
 }
 
+_OTHER_SYMBOLS = {"static_force_N": "breakaway", "kinetic_force_N": "sliding", "restick_force_N": "re-stick"}
 _SAMPLES_OF_SLIP = 20  # samples of a slip that show how the force falls
 # units that take a prefix; a unit of the file, such as counts, takes none
 _WITH_PREFIX = {"N", "N m", "m", "s", "A", "V", "Pa", "kg", "kg m²", "rad"}
@@ -58,6 +59,11 @@ def _digits(value: float, width: float) -> int:
     if not math.isfinite(width) or width <= 0.0:
         return min(max(most - 1, 0), 6)
     return min(max(1 - math.floor(math.log10(width)), 0), max(most, 0), 6)
+
+
+def symbol_of(name: str, seen: LookResult) -> str:
+    """The symbol of a number; F is a force, so a record without one has words."""
+    return _OTHER_SYMBOLS.get(name, TITLES[name][0]) if seen.known.unit else TITLES[name][0]
 
 
 def meaning_of(name: str, seen: LookResult) -> str:
@@ -94,10 +100,11 @@ def _headline(seen: LookResult) -> str:
 
 def sentences(seen: LookResult) -> list[str]:
     """A line for each number, and a line for each number that the record cannot give."""
-    lines: list[str] = []
-    for name, (symbol, _) in TITLES.items():
-        if name in seen.numbers:
-            lines.append(f"{symbol:<10} {with_interval(seen.numbers[name])}: {meaning_of(name, seen)}")
+    lines = [
+        f"{symbol_of(name, seen):<10} {with_interval(seen.numbers[name])}: {meaning_of(name, seen)}"
+        for name in TITLES
+        if name in seen.numbers
+    ]
     lines += [f"{'':<10} {text}" for text in limits_of_look(seen)]
     for at_speed in seen.at_speeds:
         top = "" if at_speed.breakaway_N is None else f", breakaway {with_interval(at_speed.breakaway_N)}"
