@@ -163,7 +163,7 @@ def _names_above(lines: Sequence[str], first: int, form: TextLayout, width: int,
                 break
             continue
         cells = _named(lines[at], form, width)
-        fits = width <= len(cells) <= width + (not fitting and width > 1) and any(
+        fits = width <= len(cells) <= width + (not fitting and width > 1 and form.delimiter != BLANK) and any(
             cell.strip() and not form.is_number(cell) for cell in cells
         )
         if fits:

@@ -91,7 +91,9 @@ def with_increment(lines: Sequence[str], form: TextLayout) -> tuple[list[str], f
         place = next((i for i, cell in enumerate(cells) if cell in ("increment", "tinc", "delta")), 0)
         if place and place < len(below) and form.is_number(below[place]):
             cut = place - (cells[place - 1] in ("start", "t0"))
-            result[at], result[at + 1] = (form.delimiter.join(form.cells(line)[:cut]) for line in lines[at : at + 2])
+            result[at] = form.delimiter.join(form.cells(lines[at])[:cut])
+            # the first column numbers the rows, so `Sequence` is no unit
+            result[at + 1] = form.delimiter.join(["", *below[1:cut]] if below[0].strip() == "Sequence" else below[:cut])
             return result, float(below[place].replace(form.decimal, "."))
     return result, None
 
