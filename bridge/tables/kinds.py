@@ -34,7 +34,7 @@ _PROSE = 1 << 16  # first and last bytes in which lines are searched for numbers
 _LEAST_ROWS = (
     0.3  # share of lines that begin with a number or a label and a number; 0.02 in this project's README, 0.9 in tables
 )
-_ROW = re.compile(rb"""[^\w\r\n]*(?:[^\s\d,;]{1,40}[\s=:"']*)?[-+.]?\d""")
+_ROW = re.compile(rb"""[^\w\r\n]*(?:[^\s\d,;]{1,40}[\s=:"']*)?[-+.]?\d|[^\r\n]*[,;\t]\s*["']?[-+.]?\d""")
 _SHOWN = 8  # first bytes of an unknown file that the message shows
 
 

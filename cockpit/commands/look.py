@@ -56,7 +56,7 @@ def look(
             )
         refuse_to_replace_corrected(target, record.map_text, f"--out {target}")
     seen = looked_at(record)
-    refuse_absurd(seen, path.name)
+    refuse_absurd(seen, path.name, record.counts)
     findings = [*record.findings, *hints(seen, {} if asked.mass_kg is None else {"mass_kg": asked.mass_kg})]
     result = looked(record, seen, findings, out)
     for target in out:

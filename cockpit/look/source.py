@@ -74,6 +74,7 @@ class MeasuredRecord(NamedTuple):
     rig: Mapping[str, float]  # numbers of [rig] that a run log describes; empty for another file
     map_text: str  # map that reproduces this reading; empty if a map was given, or for a run log
     starts_s: tuple[float, ...] = ()  # start of each piece of a file whose time begins again
+    counts: str = ""  # column of the time, if it holds whole numbers without a unit, as of milliseconds
 
     @property
     def free(self) -> Bools:
@@ -96,6 +97,7 @@ class _Reading(NamedTuple):
     findings: list[Finding]
     starts_s: tuple[float, ...]
     map_text: str = ""
+    counts: str = ""
 
 
 def read_record(path: Path, asked: LookOptions) -> MeasuredRecord:
@@ -109,7 +111,7 @@ def read_record(path: Path, asked: LookOptions) -> MeasuredRecord:
     else:
         read = _by_names(read_table(path, Dialect(encoding=asked.encoding)), asked)
     record = _record(path, read.columns, read.known, read.findings, read.map_text)
-    return _piece(record._replace(starts_s=read.starts_s), asked.piece)
+    return _piece(record._replace(starts_s=read.starts_s, counts=read.counts), asked.piece)
 
 
 def overridden(wanted: ImportMap, asked: LookOptions) -> ImportMap:
@@ -227,7 +229,19 @@ def _by_names(table: Table, asked: LookOptions) -> _Reading:
     if left := unused(table, guessed):
         findings.append(Finding("unused", path.name, f"columns: {', '.join(map(repr, left))}"))
     known = RecordFacts(asked.speed_mps, load_N, asked.mass_kg, of_load and load_N is None, torsion, unit)
-    return _Reading(columns, known, findings, starts_s, "" if unit else map_text(table, channels, asked))
+    return _Reading(
+        columns, known, findings, starts_s, "" if unit else map_text(table, channels, asked), _counts(table, channels)
+    )
+
+
+def _counts(table: Table, channels: dict[str, ChannelMap]) -> str:
+    """The column of the time, if it holds whole numbers and states no unit; else empty."""
+    channel = channels.get("t_s")
+    if channel is None or channel.unit or table.stated_unit(channel.column) or _is_time(table, channel):
+        return ""
+    values = table.column(channel.column)
+    values = values[np.isfinite(values)]
+    return channel.column if len(values) and (values == np.round(values)).all() else ""
 
 
 def _piece(record: MeasuredRecord, piece: int | None) -> MeasuredRecord:

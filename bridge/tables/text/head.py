@@ -9,10 +9,11 @@ from bridge.faults import Fault
 from bridge.log.finding import Finding
 from bridge.tables.text.dialect import BLANK, Dialect, TextLayout
 from bridge.tables.text.properties import properties_above, with_increment
-from bridge.tables.unit_words import is_unit_row, known_unit, unknown_units
+from bridge.tables.unit_words import in_brackets, is_unit_row, known_unit, unit_in_name, unknown_units
 
 COMMENTS = ("#", "%", "//", "!", "*", ";;", "'")
 _CONFIRMED = 5  # number of lines after the first row of which at least half must be rows too
+_SYMBOL = 2  # longest symbol of a quantity that may be a unit too, as in `t, m`
 _FIRST_ROWS = 20  # first rows that show the full number of columns
 _LABEL = "Y_Unit_Label"  # start of LabVIEW's line of units, each above its column
 _MOST_ABOVE = 6  # lines above the first row in which names are searched
@@ -85,7 +86,8 @@ def read_head(lines: Sequence[str], body: Sequence[str], form: TextLayout, given
     above, step_s = with_increment(lines[:first], form)
     block = None if given.names or given.skip_rows is not None else properties_above(above, form, width)
     if block is not None:
-        names_line, units_line, names, units = block
+        names_line, units_line, names, units, of_block = block
+        step_s = step_s or of_block
     else:
         names_line, units_line = _names_above([*above, *lines[first : first + 2]], first, form, width, given)
         names = list(given.names or [])
@@ -97,6 +99,8 @@ def read_head(lines: Sequence[str], body: Sequence[str], form: TextLayout, given
             [unit.strip().strip("[]()") for unit in _named(above[units_line], form, width)] if units_line >= 0 else []
         )
         units = ["" if unit == _LABEL else unit for unit in (units + [""] * width)[:width]] if units else []
+    if not units and len(names) == width and all(map(known_unit, names)) and any(len(name) > _SYMBOL for name in names):
+        units = names  # `Second,Volt` is a line of units in the place of names
     names = _each_once([name.strip() for name in names], width)
     step_s = step_s or (_step_s(above) if block is None else None)
     return Head(first, names_line, names, units, units_line, step_s, numeric, given.comment)
@@ -203,8 +207,9 @@ def _named(line: str, form: TextLayout, width: int) -> list[str]:
         cells = form.cells(text)
     while len(cells) > width and (not cells[-1].strip() or cells[-1].strip().lower() == "comment"):
         cells = cells[:-1]
-    if len(cells) == width - 1:
-        cells = [*cells, ""]  # rows may end in a delimiter
+    # rows may end in a delimiter; above rows of two cells a single one is a title, unless it has a unit
+    if len(cells) == width - 1 and (len(cells) > 1 or unit_in_name(text) or in_brackets(text)):
+        cells = [*cells, ""]
     return cells
 
 

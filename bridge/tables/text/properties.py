@@ -16,10 +16,11 @@ _NAMES = {
     "channelname",
     "signal",
     "signal name",
+    "tracename",
     "trace_name",
     "trace name",
 }
-_NAMES |= {"variable", "kanal", "kanalname", "signalname", "title"}
+_NAMES |= {"variable", "kanal", "kanalname", "signalname"}
 _UNITS = {
     "unit",
     "units",
@@ -28,6 +29,7 @@ _UNITS = {
     "vertical units",
     "y_unit_label",
     "unit symbol",
+    "vunit",
     "unit_string",
     "unité",
 }
@@ -35,6 +37,18 @@ _STEP = re.compile(
     r"(?:sample|sampling|abtast)[ _]?(?:time|interval|period|zeit|intervall)\s*[\[(]?(?P<unit>\w*)[\])]?", re.I
 )
 _IN_EACH = re.compile(r"\s*([A-Za-z][\w .-]*):")  # `name: Time, name: Force`
+# keys of the time between samples
+_INTERVALS = {
+    "hresolution",
+    "sample interval",
+    "sampleinterval",
+    "interval",
+    "delta",
+    "dt",
+    "tdelta",
+    "increment",
+    "xincrement",
+}
 _FEWEST = 2  # fewest lines of a block
 
 
@@ -53,6 +67,7 @@ class Properties(NamedTuple):
     units_line: int  # -1: missing
     names: list[str]
     units: list[str]
+    step_s: float | None  # time between rows, where a line states it for all channels
 
 
 def properties_above(lines: Sequence[str], form: TextLayout, width: int) -> Properties | None:
@@ -78,7 +93,9 @@ def properties_above(lines: Sequence[str], form: TextLayout, width: int) -> Prop
             for key in range(0, width, 2 if pairs else width):
                 names[key] = f"time {names[key + 1].strip()}" if pairs else "time"
                 units[key] = of_time if known_unit(of_time) else ""
-        return Properties(at, of_units[0] if of_units else -1, names, units)
+        steps = [found.cells[1].replace(form.decimal, ".") for _, found in block if found.key in _INTERVALS]
+        step_s = float(steps[0]) if steps and re.fullmatch(r"\s*[\d.]+(?:[eE][-+]?\d+)?\s*", steps[0]) else None
+        return Properties(at, of_units[0] if of_units else -1, names, units, step_s)
     return None
 
 
