@@ -245,7 +245,7 @@ def _counted_on(times_s: Floats) -> Floats:
 
 
 def starts_of(heads: Sequence[str]) -> list[float]:
-    """The start that the head of each piece states, in s from that of the first piece; NaN without a clock time in a head.
+    """The start that the head of each piece states, in s after the first piece; NaN without a clock time in a head.
 
     The last clock time of a head counts, as a program may write the creation of the file first; with the last date.
     """

@@ -24,7 +24,7 @@ def read_json(path: Path, given: Dialect) -> Table:
             value = [json.loads(line) for line in lines[:-1]]
             value += [json.loads(lines[-1])] if lines[-1].rstrip().endswith("}") else []  # a cut last line
         except json.JSONDecodeError as error:
-            raise Fault("BAD_TABLE", f"{path.name}: is no JSON: {error}; export it as CSV") from None
+            raise Fault("BAD_TABLE", f"{path.name}: is not valid JSON: {error}; export it as CSV") from None
     if not isinstance(value, dict):
         return table_of(path, columns_of(value))
     rows = next(
@@ -34,7 +34,7 @@ def read_json(path: Path, given: Dialect) -> Table:
 
 
 def columns_of(rows: list[Any]) -> dict[str, Any]:
-    """The columns of a list of objects or of lists, a row each; a missing value is None."""
+    """The columns of a list of objects or of lists, a row each; None for a missing value."""
     if rows and isinstance(rows[0], list):
         return {str(i + 1): [row[i] if i < len(row) else None for row in rows] for i in range(len(rows[0]))}
     flat = [_flat(row) for row in rows if isinstance(row, dict)]

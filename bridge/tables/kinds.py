@@ -111,7 +111,7 @@ def _is(row: dict[str, Any], start: bytes, binary: bool, path: Path) -> bool:
 
 
 def _is_binary(start: bytes) -> bool:
-    """Whether the first bytes of a file are no text of any encoding."""
+    """Whether the first bytes of a file belong to no text of any encoding."""
     if not start or wide_encoding(start):
         return False
     return len(start) - len(start.translate(None, _CONTROLS)) > _MOST_CONTROLS * len(start)

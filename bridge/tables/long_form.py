@@ -14,7 +14,7 @@ from bridge.tables.table import ChannelClock, Table
 _NAME = re.compile(r"name|channel|kanal|signal|tag|variable|topic|sensor|measurement|field|item|id", re.IGNORECASE)
 _VALUE = re.compile(r"value|wert|reading|messwert|val|_value", re.IGNORECASE)
 _TIME = re.compile(r"time|zeit|stamp|date|datum|^t$|^ts$", re.IGNORECASE)
-_MOST_CHANNELS = 64  # most channels; more different words are no names
+_MOST_CHANNELS = 64  # most channels; a column of more words holds no names
 _FEWEST_ROWS = 16  # fewest rows of a channel on average
 
 
@@ -46,7 +46,7 @@ def pivoted(table: Table) -> Table:
 
 
 def _numbers(table: Table, key: str) -> Floats:
-    """The values, NaN for a word, such as the state of a channel that is no number."""
+    """The values, NaN for a word, such as a state."""
     texts = texts_of(np.asarray(table.columns[key]))
     plain = [text if re.match(r"\s*[-+.,\d]", text) else "" for text in texts]
     return numbers(np.array(plain, object), f"{table.path.name}: column {key}", table.decimal, table.thousands)[0]

@@ -16,7 +16,7 @@ _UNIT_KEYS = ("unit", "units", "Unit", "Units", "unit_string")
 _STEP_KEYS, _START_KEYS = (
     ("dt", "wf_increment"),
     ("t0", "wf_start_offset"),
-)  # attributes of channels with a rate of their own
+)  # attributes of channels with separate rates
 _OF_MATLAB = {"#refs#", "#subsystem#"}  # MATLAB's groups for the targets of references
 
 

@@ -64,9 +64,9 @@ def _messages(path: Path, unread: Counter[str], findings: list[Finding]) -> Iter
     with path.open("rb") as file:
         for schema, channel, message in _records(file, path.name, findings):
             if channel.id not in decoders:
-                found = (factory.decoder_for(channel.message_encoding, schema) for factory in factories)
+                choices = (factory.decoder_for(channel.message_encoding, schema) for factory in factories)
                 of_json = json.loads if channel.message_encoding == "json" else None
-                decoders[channel.id] = next((decoder for decoder in found if decoder is not None), of_json)
+                decoders[channel.id] = next((decoder for decoder in choices if decoder is not None), of_json)
             decoder = decoders[channel.id]
             if decoder is None:
                 how = f"{channel.message_encoding} with {schema.encoding}" if schema else channel.message_encoding
@@ -90,7 +90,7 @@ def _records(file: Any, name: str, findings: list[Finding]) -> Iterator[tuple[An
     file.seek(0)
     schemas: dict[int, Any] = {}
     channels: dict[int, Any] = {}
-    found: list[Any] = []
+    messages: list[Any] = []
     with suppress(McapError, struct.error, EOFError):
         for record in StreamReader(file).records:
             if isinstance(record, Schema):
@@ -98,10 +98,10 @@ def _records(file: Any, name: str, findings: list[Finding]) -> Iterator[tuple[An
             elif isinstance(record, Channel):
                 channels[record.id] = record
             elif isinstance(record, Message):
-                found.append(record)
-    text = f"its end is missing, as after a recorder that was killed: {counted(len(found), 'message')} up to the cut are read"
-    findings.append(Finding("cut", name, text, len(found)))
-    for message in sorted(found, key=lambda message: message.log_time):
+                messages.append(record)
+    text = f"its end is missing, as after a recorder that was killed: {counted(len(messages), 'message')} up to the cut are read"
+    findings.append(Finding("cut", name, text, len(messages)))
+    for message in sorted(messages, key=lambda message: message.log_time):
         channel = channels[message.channel_id]
         yield schemas.get(channel.schema_id), channel, message
 

@@ -1,4 +1,4 @@
-"""Times that begin again: counters that overflow, and files of several runs, whose clock starts anew with each."""
+"""Times that begin again: counters that overflow, and files of several runs, whose clock restarts with each."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -13,12 +13,12 @@ _COUNTERS = (2.0**16, 2.0**31, 2.0**32)  # counts at which the counters of micro
 # Usual steps: a fall of the time by more begins a piece, by less it is disorder. Also the longest step across an overflow.
 _FALL_STEPS = 10.0
 _AROUND = 5  # rows on either side of a fall whose medians must fall too: a single wrong stamp begins no piece
-_FEWEST_ROWS = 16  # fewest rows of a piece on average; a column that falls more often is no time
+_FEWEST_ROWS = 16  # fewest rows of a piece on average; a column that falls more often holds no time
 _APART_STEPS = 20.0  # gap before a piece without a stated start, longer than the gaps that readers bridge
 
 
 class Segment(NamedTuple):
-    """The first row of a part of a file that has a head of its own, and its start in s from that of the first part."""
+    """The first row of a part of a file with a separate head, and its start in s after the start of the first part."""
 
     row: int
     start_s: float  # NaN: not stated

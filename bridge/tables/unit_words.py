@@ -43,7 +43,7 @@ _BEHIND = re.compile(
     r"|\s+in\s+(?P<e>\S+)|_(?P<f>[^\W_]+)|\s+(?P<h>\S{2,}))\s*$"
 )
 
-# units that after an underscore or a blank are words or symbols of their own: `x_t`, `F_min`, `pos_in`, `force_p`, `axis_C`
+# units that after an underscore or a blank are words or symbols: `x_t`, `F_min`, `pos_in`, `force_p`, `axis_C`
 _NOT_BEHIND = {"t", "h", "U", "C", "K", "p", "in", "min", "mil", "rev", "1", "-"}
 # A and V after an underscore may number a channel: `force_A`; they are units in names of the quantity
 _ELECTRIC = {

@@ -33,7 +33,7 @@ def look(
     from bridge.tables.kinds import kind_of
 
     check_file(path, "BAD_TABLE", "give the path of a file of measured data")
-    kind_of(path)  # refuses what is no table before the libraries for tables are imported
+    kind_of(path)  # refuses other files before the libraries for tables are imported
     from cockpit.look.cycles import refuse_to_replace_sheet
     from cockpit.look.doubts import refuse_absurd
     from cockpit.look.evidence import hints

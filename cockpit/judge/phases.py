@@ -33,7 +33,7 @@ class Phase(NamedTuple):
     slips: int
     slips_per_min: float
     # Drive force: mean fall in a slip, as `look` gives it, which block means would flatten. Without a slip: largest less smallest
-    # block mean in the steady part of a stroke, median of strokes, as a vibration alone is no swing.
+    # block mean in the steady part of a stroke, median of strokes, as a vibration alone does not count.
     swing_N: float
     strokes: int  # number of these strokes; 0 without even motion: then a swing without a slip is over all blocks
     mean_force_N: float  # mean drive force of the stretch, without its first 4 s, or first half if that is shorter

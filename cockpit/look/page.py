@@ -87,7 +87,7 @@ def histograms(seen: LookResult) -> "Figure":
         axes.set_xlabel(label)
         axes.set_ylabel("slips")
         axes.yaxis.get_major_locator().set_params(integer=True)
-        axes.locator_params(axis="x", nbins=4)  # values that hardly differ have labels of many digits
+        axes.locator_params(axis="x", nbins=4)  # nearly equal values have labels of many digits
         _plain(axes)
     return figure
 

@@ -52,7 +52,7 @@ class Looked(NamedTuple):
 
     @in_json
     def strokes(self) -> list[Stroke]:
-        """The strokes of a rig that moves both ways; empty for one that moves one way."""
+        """The strokes of a rig that moves both ways; empty for a rig with one direction."""
         seen, load_N = self.seen, self.seen.known.load_N
         if len({part.sign for part in seen.parts}) < 2:
             return []

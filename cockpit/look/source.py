@@ -16,11 +16,12 @@ from bridge.log.finding import Finding
 from bridge.tables.kinds import kind_of
 from bridge.tables.readers import Dialect, read_table
 from bridge.tables.table import Table
-from bridge.tables.unit_words import known_unit, si_unit, weight_unit
+from bridge.tables.unit_words import known_unit
 from cockpit.look.findings import of_time, of_values, tare_of
+from cockpit.look.units import counts, own_unit, quantity, si, unitless
 from diagnosis.evidence.import_table import ImportMap
 from diagnosis.evidence.manifest_keys import USUAL, ChannelMap, Columns
-from diagnosis.evidence.mapped import calendar_unit_s, has_time, mapped
+from diagnosis.evidence.mapped import has_time, mapped
 from diagnosis.evidence.run_log import LoggedRun, columns_of_log
 from diagnosis.look.guess import Guess, guess, no_time, unused
 from diagnosis.look.look import LookResult, RecordFacts, look
@@ -31,11 +32,6 @@ from diagnosis.look.sticks import is_of_slide
 # Shortest stretch without vibration that is looked at. Shorter: stops and turns of the drive between two vibrations count as
 # swings, 1.5 s in docs/guides/describe-an-axis.md. Longer: the controller's trials without vibration, 5 s, are left out.
 _ALONE_S = 2.0
-_OPTIONS = {
-    "t_s": '--time "NAME [ms]"',
-    "drive_force_N": '--force "NAME [kN]"',
-    "drive_position_m": '--position "NAME [mm]"',
-}
 _LOOKED_AT = ("t_s", "drive_force_N", "drive_position_m")
 
 
@@ -151,14 +147,14 @@ def _by_names(table: Table, asked: LookOptions) -> _Reading:
     findings = [Finding("assumed", path.name, "; ".join(guessed.reasons))] if guessed.reasons else []
     if asked.rate_Hz is None and not has_time(table, channels):
         raise Fault("CONFIG", f"{path.name}: no time: {no_time(table)}")
-    unit = _own_unit(table, guessed, channels, findings)
-    torsion = bool(guessed.force) and not unit and _quantity(table, channels["drive_force_N"]) == "torque"
+    unit = own_unit(table, guessed, channels, findings)
+    torsion = bool(guessed.force) and not unit and quantity(table, channels["drive_force_N"]) == "torque"
     if asked.speed_turns not in (None, torsion):
         kind, example = ("torque", "10mrad/s or 5rpm") if torsion else ("force", "0.5mm/s")
         raise Fault("CONFIG", f"--speed: {guessed.force!r} is a {kind}: must be a speed such as {example}")
     if column := guessed.position:
         rows = len(table.columns[table.find(channels["drive_force_N"].column)])
-        if torsion and _quantity(table, channels["drive_position_m"]) == "length":
+        if torsion and quantity(table, channels["drive_position_m"]) == "length":
             del channels["drive_position_m"]  # on a turning rig a length is a displacement along the axis
         elif asked.rate_Hz and len(table.columns[column]) != rows:
             del channels["drive_position_m"]
@@ -166,7 +162,7 @@ def _by_names(table: Table, asked: LookOptions) -> _Reading:
             findings.append(Finding("unused", f"{path.name}: {column}", text))
     guessed = guessed if "drive_position_m" in channels else guessed._replace(position="")
     columns, of_columns, starts_s = mapped(table, channels, asked.rate_Hz)
-    findings += [*of_columns, *_unitless(table, channels, bool(asked.rate_Hz))]
+    findings += [*of_columns, *unitless(table, channels, bool(asked.rate_Hz))]
     if guessed.stands_in == "a position":
         columns["drive_force_N"] = lag_of(columns["t_s"], columns["drive_force_N"])
         text = f"column {guessed.force} is a position: how far it lies behind an even motion is looked at"
@@ -176,7 +172,7 @@ def _by_names(table: Table, asked: LookOptions) -> _Reading:
         findings.append(Finding("assumed", path.name, text))
     load_N, of_load = None if unit else asked.load_N, not guessed.force and bool(guessed.coefficient)
     if load_N is None and guessed.load and not torsion and not unit:
-        loads_N = _si(table, guessed.load, "N", findings)
+        loads_N = si(table, guessed.load, "N", findings)
         findings += of_values(table, {guessed.load: loads_N}, table.findings)
         load_N = float(np.nanmean(np.abs(loads_N))) or None
         text = (
@@ -223,25 +219,15 @@ def _by_names(table: Table, asked: LookOptions) -> _Reading:
         and asked.speed_mps is None
         and len(table.columns[guessed.speed]) == len(columns["t_s"])
     ):
-        speed_mps = _si(table, guessed.speed, "rad/s" if torsion else "m/s", findings)
+        speed_mps = si(table, guessed.speed, "rad/s" if torsion else "m/s", findings)
         steps_m = 0.5 * (speed_mps[1:] + speed_mps[:-1]) * np.diff(columns["t_s"])
         columns["drive_position_m"] = np.concatenate([[0.0], np.nancumsum(steps_m)])
     if left := unused(table, guessed):
         findings.append(Finding("unused", path.name, f"columns: {', '.join(map(repr, left))}"))
     known = RecordFacts(asked.speed_mps, load_N, asked.mass_kg, of_load and load_N is None, torsion, unit)
     return _Reading(
-        columns, known, findings, starts_s, "" if unit else map_text(table, channels, asked), _counts(table, channels)
+        columns, known, findings, starts_s, "" if unit else map_text(table, channels, asked), counts(table, channels)
     )
-
-
-def _counts(table: Table, channels: dict[str, ChannelMap]) -> str:
-    """The column of the time, if it holds whole numbers and states no unit; else empty."""
-    channel = channels.get("t_s")
-    if channel is None or channel.unit or table.stated_unit(channel.column) or _is_time(table, channel):
-        return ""
-    values = table.column(channel.column)
-    values = values[np.isfinite(values)]
-    return channel.column if len(values) and (values == np.round(values)).all() else ""
 
 
 def _piece(record: MeasuredRecord, piece: int | None) -> MeasuredRecord:
@@ -265,32 +251,6 @@ def _piece(record: MeasuredRecord, piece: int | None) -> MeasuredRecord:
 def pieces_of(record: MeasuredRecord) -> list[MeasuredRecord]:
     """The record of each piece; the record itself where its time does not begin again."""
     return [_piece(record, number) for number in range(1, len(record.starts_s) + 1)] or [record]
-
-
-def _quantity(table: Table, channel: ChannelMap) -> str:
-    return (known_unit(channel.unit or table.unit(channel.column)) or ("",))[0]
-
-
-def _own_unit(table: Table, guessed: Guess, channels: dict[str, ChannelMap], findings: list[Finding]) -> str:
-    """The unit in which a column is printed that holds no force; empty for a force, a torque or a coefficient.
-
-    The column keeps its numbers, and nothing is derived from them: neither stiffness nor mass nor a coefficient.
-    """
-    channel = channels["drive_force_N"]
-    unit = channel.unit or table.stated_unit(channel.column)
-    known = weight_unit(unit) if unit else None
-    if not guessed.force or (known is not None and known[0] in ("force", "torque")):
-        return ""
-    if not unit:
-        return "units" if guessed.stands_in else ""
-    shown, factor = ("%" if known and known[0] == "share" and known[1] != 1.0 else unit), 1.0
-    if known is not None and known[0] != "share":
-        shown, factor = si_unit(known[0]), known[1]
-    channels["drive_force_N"] = channel.model_copy(update={"scale": factor, "unit": ""})
-    what = f"is a {known[0]}" if known is not None else f"has the unknown unit {unit!r}"
-    text = f"{what}, no force: printed in {shown}, and no stiffness, mass or coefficient comes from it"
-    findings.append(Finding("units", f"{table.path.name}: column {channel.column}", text))
-    return shown
 
 
 def looked_at(record: MeasuredRecord) -> LookResult:
@@ -370,42 +330,6 @@ def _channels(table: Table, guessed: Guess) -> dict[str, ChannelMap]:
 def _as_read(channels: dict[str, ChannelMap], columns: dict[str, Floats]) -> dict[str, Floats]:
     """The values of the channels by the names of their columns in the table."""
     return {str(channel.column): columns[name] for name, channel in channels.items()}
-
-
-def _si(table: Table, column: str, unit: str, findings: list[Finding]) -> Floats:
-    """A load or a speed in SI units; without a stated unit it is taken as SI, with a finding."""
-    known = (weight_unit if unit == "N" else known_unit)(table.unit(column))
-    if known is None:
-        add = "--load 94.5N" if unit == "N" else "--speed 0.5mm/s"
-        text = f"states no known unit: taken as {unit}; add {add} if it is not"
-        findings.append(Finding("assumed", f"{table.path.name}: {column}", text))
-    return table.column(column) * (known[1] if known else 1.0)
-
-
-def _unitless(table: Table, channels: dict[str, ChannelMap], rate: bool) -> list[Finding]:
-    """A finding for each channel without a stated unit. Raises Fault CONFIG for a time in an unknown unit."""
-    if "t_s" in channels and not rate:
-        unit = channels["t_s"].unit or table.stated_unit(channels["t_s"].column)
-        if unit and known_unit(unit) is None:
-            line = f"{table.path.name}: column {channels['t_s'].column}: {unit!r} is not a known unit of time"
-            raise Fault("CONFIG", f"{line}; add --rate 1kHz in its place")
-    assumed = {"t_s": "s", "drive_force_N": "N", "drive_position_m": "m"}
-    return [
-        Finding(
-            "unit",
-            f"{table.path.name}: {channel.column}",
-            f"states no unit: taken as {assumed[name]}; else name it with its unit, as in {_OPTIONS[name]}",
-        )
-        for name, channel in channels.items()
-        if channel.scale is None
-        and not (channel.unit or table.stated_unit(channel.column))
-        and not (name == "t_s" and (rate or _is_time(table, channel)))
-    ]
-
-
-def _is_time(table: Table, channel: ChannelMap) -> bool:
-    times_s, counted_already = table.seconds(channel.column)
-    return counted_already or calendar_unit_s(times_s) is not None
 
 
 def map_text(table: Table, channels: dict[str, ChannelMap], asked: LookOptions) -> str:

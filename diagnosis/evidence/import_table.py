@@ -147,20 +147,20 @@ def import_columns(
             name = path.with_name(f"{path.stem}-{number}{path.suffix}")
             target = out.with_name(f"{out.stem}-{number}.mcap") if out.suffix == ".mcap" else out
         try:
-            one = _written(name, columns, wanted, map_name, target)
+            written = _written(name, columns, wanted, map_name, target)
         except Fault as fault:
             if len(starts_s) < 2:
                 raise
             refused.append(fault)
             findings.append(Finding("pieces", f"{path.name}: piece {number}", f"left out: {fault.line}"))
             continue
-        done.append(one)
+        done.append(written)
         findings += [
-            finding for finding in _with_sign(one.findings, name.name, columns, wanted) if finding not in findings
+            finding for finding in _with_sign(written.findings, name.name, columns, wanted) if finding not in findings
         ]
     if not done:
         raise refused[0]
-    rows, files = sum(one.rows for one in done), [one.file for one in done]
+    rows, files = sum(part.rows for part in done), [part.file for part in done]
     return done[0]._replace(rows=rows, findings=findings, files=files)
 
 

@@ -31,7 +31,7 @@ _QUANTITIES = {
     "coefficient": ("share",),
     "frequency": ("frequency",),
 }
-# what shows stick-slip where no force is measured, the clearest first
+# columns that show stick-slip where no force is measured, the clearest first
 _STAND_INS = {
     "a following error": r"foll.*err|(^|[^a-z])f?_?err(or)?([^a-z]|$)|schlepp|nachlauf|(^|[^a-z])lag([^a-z]|$)|regelabw|contour",
     "a motor current or torque": r"current|strom|torque|moment|(^|[^a-z])i_?[qa]?([^a-z]|$)|load ?%|auslastung|effort",
@@ -55,7 +55,9 @@ class Guess(NamedTuple):
     speed: str
     coefficient: str
     reasons: list[str]
-    stands_in: str = ""  # what the column of the force holds where none is a force: an error, a current, a position
+    stands_in: str = (
+        ""  # content of the column of the force, if it holds another quantity: an error, a current, a position
+    )
 
 
 def guess(table: Table, given: dict[str, str]) -> Guess:
@@ -133,7 +135,7 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
 
 
 def _stand_in(table: Table, left: list[str], position: str) -> tuple[str, str]:
-    """What shows stick-slip where no column is a force, and its column; empty without one."""
+    """The quantity that shows stick-slip where no column is a force, and its column; empty without such a column."""
     moving = [name for name in left if not _flat(table, name)]
     for what, pattern in _STAND_INS.items():
         if name := next((name for name in moving if re.search(pattern, bare_name(name), re.IGNORECASE)), ""):

@@ -33,11 +33,11 @@ _TURNING = {"N": "N m", "N/s": "N m/s", "N/m": "N m/rad", "kg": "kg m²", "N per
 
 # Errors that all slips of a record share, so that their scatter does not show them. From 16 axes of `bench.control.drawn` at 1
 # and 10 kHz and 43 rigs of `tests.look`, half with a damped drive, against the numbers of the friction law; 24 other axes are in
-# docs/guides/look.md. Larger: intervals hold more often and say less.
+# docs/guides/look.md. Larger: wider intervals, which hold more often.
 # F_s may be lower, in rises of the force until the slide is as fast as its drive (0 to 0.43 on the axes), and higher, as a share
 # of F_s - F_k (creep: 0.04 in the middle, 0.5 on the softest contact).
 _FALLS_SLOWLY, _CREEPS = 0.4, 0.06
-# Stiffness: shares by which the correction for the contact may be too large or too small (0.46 and 0.82 at most, but for 2 rigs).
+# Stiffness: shares by which the correction for the contact may be too large or small (0.46 and 0.82 at most, except on 2 rigs).
 _TOO_MUCH, _TOO_LITTLE = 0.5, 0.75
 # Fewest samples of a stick from which a stiffness comes. At 5 to 13 it was 8 to 33 % too small on 7 drawn axes, as the ring of a
 # re-stick fills the climb; from 17 on 0 to 4 % wrong. Larger: records of fast axes give none.
@@ -89,7 +89,7 @@ class LookResult(NamedTuple):
 
     @in_json
     def stick_slip(self) -> str:
-        """yes, no or cannot tell."""
+        """Whether the record shows stick-slip."""
         return self.answer.answer if self.answer is not None else "yes" if self.sticks else "no"
 
     @in_json

@@ -6,7 +6,7 @@ the motor and a swinging loop rise and fall alike.
 """
 
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -29,9 +29,9 @@ _NEAR_TURN = 0.05  # share of a stroke at each end that the loop needs to settle
 
 
 class StickSlip(NamedTuple):
-    """Whether a record shows stick-slip: yes, no or cannot tell; and why."""
+    """Whether a record shows stick-slip, and why."""
 
-    answer: str
+    answer: Literal["yes", "no", "cannot tell"]
     why: str
 
 
@@ -40,26 +40,26 @@ def best_way(parts: list[OneWayPart], follows: bool) -> tuple[list[OneWayPart], 
     ways = [parts]
     if follows:
         ways.append([part._replace(force_N=-part.force_N, sign=-part.sign) for part in parts])
-    found = [[slips for slips in map(find_slips, way) if slips is not None] for way in ways]
-    way = max(range(len(ways)), key=lambda i: _shape(found[i])[0])
-    return ways[way], found[way], _answer(found[way], follows)
+    slips_of = [[slips for slips in map(find_slips, way) if slips is not None] for way in ways]
+    way = max(range(len(ways)), key=lambda i: _shape(slips_of[i])[0])
+    return ways[way], slips_of[way], _answer(slips_of[way], follows)
 
 
 def _shape(slips: list[RecordSlips]) -> tuple[float, float, int, float]:
     """Ratio of climb to fall durations, share of straight climbs, number of swings, and duration of a fall [samples]."""
-    climbs = [one.tops[1 : len(one.bottoms) + 1] - one.bottoms[: len(one.tops) - 1] for one in slips]
-    falls = [one.bottoms - one.tops[: len(one.bottoms)] for one in slips]
+    climbs = [part.tops[1 : len(part.bottoms) + 1] - part.bottoms[: len(part.tops) - 1] for part in slips]
+    falls = [part.bottoms - part.tops[: len(part.bottoms)] for part in slips]
     climb, fall = np.concatenate([*climbs, np.empty(0)]), np.concatenate([*falls, np.empty(0)])
     if not len(climb) or not len(fall):
         return 0.0, 0.0, 0, 0.0
-    straight = float(np.average([one.straight for one in slips], weights=[len(one.tops) for one in slips]))
+    straight = float(np.average([part.straight for part in slips], weights=[len(part.tops) for part in slips]))
     middle = float(np.median(fall))
-    return float(np.median(climb)) / max(middle, 1.0), straight, sum(len(one.tops) for one in slips), middle
+    return float(np.median(climb)) / max(middle, 1.0), straight, sum(len(part.tops) for part in slips), middle
 
 
 def _uneven(slips: list[RecordSlips]) -> float:
     """Inter-quartile range of the times between breakaways, as a share of their median."""
-    spans = np.concatenate([np.diff(one.tops) for one in slips])
+    spans = np.concatenate([np.diff(part.tops) for part in slips])
     if not len(spans):
         return np.inf
     low, middle, high = np.quantile(spans, (0.25, 0.5, 0.75))

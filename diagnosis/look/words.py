@@ -67,7 +67,7 @@ def symbol_of(name: str, seen: LookResult) -> str:
 
 
 def meaning_of(name: str, seen: LookResult) -> str:
-    """The meaning of a number; in a record without a force it is that of a value."""
+    """The meaning of a number; a value in place of a force in a record without one."""
     meaning = TITLES[name][1]
     return re.sub(r"force|sliding friction", "value", meaning) if seen.known.unit else meaning
 
@@ -132,7 +132,7 @@ def _why_no_mass(seen: LookResult) -> str:
 
 
 def _why_no_slip(seen: LookResult) -> str:
-    """Why a record shows no stick-slip, and what to record."""
+    """Why a record shows no stick-slip, and how to record it."""
     unit = "" if seen.known.coefficient else f" {seen.known.force_unit}"
     if seen.cycles:
         spans_s = np.diff([cycle.breakaway_t_s for cycle in seen.cycles])

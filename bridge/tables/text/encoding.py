@@ -13,7 +13,7 @@ _MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16-le"),
     (codecs.BOM_UTF16_BE, "utf-16-be"),
 )
-_SIGNS = set("µ°²³·±–−×Ω§")  # signs of units alone show no language, so chardet cannot tell an encoding from them
+_SIGNS = set("µ°²³·±–−×Ω§")  # signs of units alone show no language, so chardet cannot detect an encoding by them
 _INSIDE = re.compile(
     r"[A-Za-z][µ°²³±−–Ω§][A-Za-z]"
 )  # a sign inside of a word is a letter of another encoding: `Si³a` is Siła
@@ -77,6 +77,6 @@ def _detected(data: bytes) -> str:
     western = text.decode("cp1252", errors="replace")
     if {letter for letter in western if not letter.isascii()} <= _SIGNS and not _INSIDE.search(western):
         return "cp1252"
-    found = detect(text, encoding_era=EncodingEra.MODERN_WEB)["encoding"]
+    likely = detect(text, encoding_era=EncodingEra.MODERN_WEB)["encoding"]
     # many encodings share these letters: the usual one of them is reported
-    return codecs.lookup(found).name if found and text.decode(found, errors="replace") != western else "cp1252"
+    return codecs.lookup(likely).name if likely and text.decode(likely, errors="replace") != western else "cp1252"

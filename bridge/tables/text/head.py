@@ -108,14 +108,14 @@ def read_head(lines: Sequence[str], body: Sequence[str], form: TextLayout, given
 
 def _first_values(lines: Sequence[str], form: TextLayout) -> list[str]:
     """The first lines of values alone: where channels end sooner than others, later rows are shorter."""
-    found: list[str] = []
+    values: list[str] = []
     for line in lines:
         cells = form.cells(line)
         if len(cells) > 1 and form.is_number(cells[0]) and all(map(form.is_value, cells)):
-            found.append(line)
-            if len(found) == _FIRST_ROWS:
+            values.append(line)
+            if len(values) == _FIRST_ROWS:
                 break
-    return found
+    return values
 
 
 def _columns(body: Sequence[str], form: TextLayout) -> tuple[int, list[bool]]:

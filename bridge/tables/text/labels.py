@@ -1,4 +1,4 @@
-"""Labels between the numbers of a line: `F:14.1,x:3.2` and `t=20 ms  F=14.1 N` of serial ports; and blanks beside commas."""
+"""Labels between the numbers of a line: `F:14.1,x:3.2` and `t=20 ms  F=14.1 N` of serial ports; cells with commas."""
 
 import re
 from collections import Counter
@@ -15,9 +15,9 @@ _MIXED = re.compile(r"[-+.\deE]+(?:(?:[ \t]+|[ \t]*,[ \t]*)[-+.\deE]+)+[ \t]*")
 
 def labels_of(lines: Sequence[str]) -> list[str]:
     """The labels of the numbers, the same in most lines; empty without labels."""
-    found = Counter(tuple(_LABELS.findall(line)) for line in lines if line.strip())
-    labels, count = found.most_common(1)[0] if found else ((), 0)
-    return list(labels) if count > _MOST * sum(found.values()) and len(set(labels)) == len(labels) else []
+    counted = Counter(tuple(_LABELS.findall(line)) for line in lines if line.strip())
+    labels, count = counted.most_common(1)[0] if counted else ((), 0)
+    return list(labels) if count > _MOST * sum(counted.values()) and len(set(labels)) == len(labels) else []
 
 
 def without_labels(text: str, labels: Sequence[str], lines: Sequence[str]) -> tuple[str, tuple[str, ...]]:

@@ -8,47 +8,17 @@ from bridge.tables.text.dialect import TextLayout
 from bridge.tables.unit_words import known_unit
 
 # keys of the lines of names and units, without their unit and case: TwinCAT Scope, DIAdem, imc, NI, Yokogawa, Hioki, HBM
-_NAMES = {
-    "name",
-    "names",
-    "channel",
-    "channel name",
-    "channelname",
-    "signal",
-    "signal name",
-    "tracename",
-    "trace_name",
-    "trace name",
-}
-_NAMES |= {"variable", "kanal", "kanalname", "signalname"}
-_UNITS = {
-    "unit",
-    "units",
-    "einheit",
-    "channel unit",
-    "vertical units",
-    "y_unit_label",
-    "unit symbol",
-    "vunit",
-    "unit_string",
-    "unité",
-}
+_NAMES = re.compile(
+    "name|names|channel|channel name|channelname|signal|signal name|tracename|trace_name|trace name"
+    "|variable|kanal|kanalname|signalname"
+)
+_UNITS = re.compile("unit|units|einheit|channel unit|vertical units|y_unit_label|unit symbol|vunit|unit_string|unité")
 _STEP = re.compile(
     r"(?:sample|sampling|abtast)[ _]?(?:time|interval|period|zeit|intervall)\s*[\[(]?(?P<unit>\w*)[\])]?", re.I
 )
 _IN_EACH = re.compile(r"\s*([A-Za-z][\w .-]*):")  # `name: Time, name: Force`
 # keys of the time between samples
-_INTERVALS = {
-    "hresolution",
-    "sample interval",
-    "sampleinterval",
-    "interval",
-    "delta",
-    "dt",
-    "tdelta",
-    "increment",
-    "xincrement",
-}
+_INTERVALS = re.compile("hresolution|sample interval|sampleinterval|interval|delta|dt|tdelta|increment|xincrement")
 _FEWEST = 2  # fewest lines of a block
 
 
@@ -78,22 +48,22 @@ def properties_above(lines: Sequence[str], form: TextLayout, width: int) -> Prop
     rows = [_property(line, form, width) for line in lines]
     for at in range(len(lines) - 1, -1, -1):
         row = rows[at]
-        if row is None or row.key not in _NAMES:
+        if row is None or not _NAMES.fullmatch(row.key):
             continue
         end = next((below for below in range(at, len(lines)) if rows[below] is None), len(lines))
-        block = [(line, found) for line in range(at, end) if (found := rows[line]) is not None]
+        block = [(line, below) for line in range(at, end) if (below := rows[line]) is not None]
         if len(block) < _FEWEST:
             continue
-        of_units = next(((line, found) for line, found in block if found.key in _UNITS), None)
+        of_units = next(((line, below) for line, below in block if _UNITS.fullmatch(below.key)), None)
         names, units = row.cells, [_unit(cell) for cell in of_units[1].cells] if of_units else [""] * width
         if row.has_key:
-            steps = (_STEP.fullmatch(found.cells[0].strip()) for _, found in block)
+            steps = (_STEP.fullmatch(below.cells[0].strip()) for _, below in block)
             of_time = next((step["unit"] for step in steps if step is not None), "")
             pairs = width > 2 and width % 2 == 0 and len({_key(key) for key in names[::2]}) == 1
             for key in range(0, width, 2 if pairs else width):
                 names[key] = f"time {names[key + 1].strip()}" if pairs else "time"
                 units[key] = of_time if known_unit(of_time) else ""
-        steps = [found.cells[1].replace(form.decimal, ".") for _, found in block if found.key in _INTERVALS]
+        steps = [below.cells[1].replace(form.decimal, ".") for _, below in block if _INTERVALS.fullmatch(below.key)]
         step_s = float(steps[0]) if steps and re.fullmatch(r"\s*[\d.]+(?:[eE][-+]?\d+)?\s*", steps[0]) else None
         return Properties(at, of_units[0] if of_units else -1, names, units, step_s)
     return None
@@ -109,7 +79,7 @@ def with_increment(lines: Sequence[str], form: TextLayout) -> tuple[list[str], f
         if place and place < len(below) and form.is_number(below[place]):
             cut = place - (cells[place - 1] in ("start", "t0"))
             result[at] = form.delimiter.join(form.cells(lines[at])[:cut])
-            # the first column numbers the rows, so `Sequence` is no unit
+            # the first column numbers the rows: `Sequence` names no unit
             result[at + 1] = form.delimiter.join(["", *below[1:cut]] if below[0].strip() == "Sequence" else below[:cut])
             return result, float(below[place].replace(form.decimal, "."))
     return result, None

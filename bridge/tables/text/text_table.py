@@ -99,7 +99,7 @@ def _spread(text: str, head_lines: list[str], given: Dialect) -> list[str]:
 
 
 def _pieces(text: str, head: Head, form: TextLayout, given: Dialect) -> tuple[Any, list[str], tuple[Segment, ...]]:
-    """The rows of all pieces as one Arrow table, lines that are no rows, and the pieces where the line of names comes again."""
+    """The rows of all pieces as one Arrow table, the other lines, and the pieces where the line of names repeats."""
     # the lines of the head end as `read_text` splits them
     lines = text[:_HEAD_CHARACTERS].splitlines(keepends=True)
     begin = sum(map(len, lines[: head.lines]))
@@ -171,8 +171,8 @@ def _named_by_words(columns: dict[str, Any]) -> dict[str, Any]:
     word = ""
     for name, column in columns.items():
         result[word if word and word not in columns and word not in result else name] = column
-        one = column.unique() if pa.types.is_string(column.type) else []
-        word = str(one[0]).strip(" :=") if len(one) == 1 and one[0].is_valid else ""
+        words = column.unique() if pa.types.is_string(column.type) else []
+        word = str(words[0]).strip(" :=") if len(words) == 1 and words[0].is_valid else ""
     return result
 
 

@@ -69,10 +69,10 @@ def test_missing_information_is_asked_for(tmp_path: Path, words: list[str], expe
 
 
 def test_a_file_of_unnamed_columns_is_asked_about(tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text("t,p,q\n" + "".join(f"{i},{i % 7},{i % 5}\n" for i in range(100)))
+    (tmp_path / "a.csv").write_text("t [s],p,q\n" + "".join(f"{i},{i % 7},{i % 5}\n" for i in range(100)))
     result = CliRunner().invoke(app, ["look", str(tmp_path / "a.csv"), "--json"])
     assert (
-        'which column is the force? add --force "NAME"; columns here: "t", "p", "q"'
+        'which column is the force? add --force "NAME"; columns here: "t [s]", "p", "q"'
         in json.loads(result.stdout)["line"]
     )
     result = CliRunner().invoke(app, ["look", str(tmp_path / "a.csv"), "--force", "p", "--json"])
