@@ -1,4 +1,4 @@
-"""Units of the columns of a record: of a number that is no force, of a column that states none, and in SI."""
+"""Units of the columns of a record: of a number that holds another quantity than a force, of a column without a stated unit, and in SI."""
 
 import numpy as np
 

@@ -53,7 +53,7 @@ def is_right(seen: dict[str, Any], top: float = TOP_N, slips: int = SLIPS) -> No
 
 
 class Kind(NamedTuple):
-    """A file of a program, what an operator types, and the force at breakaway in the file's unit."""
+    """A file of a program, the words of the operator, and the force at breakaway in the file's unit."""
 
     name: str
     text: str
@@ -235,7 +235,7 @@ def convert_command(line: str) -> list[str]:
 @pytest.mark.parametrize("kind", ["arrow", "wav", "gz"])
 @pytest.mark.slow
 def test_the_command_that_converts_a_file_works(tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The commands that need no program beyond those of a test; the others name packages that this project does not use."""
+    """The commands whose programs the tests have; the others name packages that this project does not use."""
     path = tmp_path / f"rig.{kind}"
     if kind == "arrow":
         feather.write_feather(pa.table({"time_s": T_S, "force_N": FORCE_N}), path, compression="uncompressed")
@@ -283,7 +283,7 @@ def test_prose_and_spectra_are_no_records(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("way", ["following_error_mm", "position_mm"])
 def test_stick_slip_shows_without_a_force(tmp_path: Path, way: str) -> None:
-    """On a spring of 10 N/mm the slide lies F / k behind its drive; a motion without slips and a ripple are no stick-slip."""
+    """On a spring of 10 N/mm the slide lies F / k behind its drive; a motion without slips and a ripple show no stick-slip."""
     path = tmp_path / "axis.csv"
     lag_mm = FORCE_N / 10 - 1.1
     even_mm = 0.3 * np.sin(2 * np.pi * T_S / 0.4)
