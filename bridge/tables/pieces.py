@@ -34,6 +34,8 @@ class Pieces(NamedTuple):
 
 def unwrapped(counts: Floats) -> tuple[Floats, int]:
     """A column of whole numbers that counts on after each overflow, [rows], and the number of overflows."""
+    if _rises(counts):
+        return counts, 0
     filled = np.flatnonzero(np.isfinite(counts))
     values = counts[filled]
     steps = np.diff(values)
@@ -63,6 +65,8 @@ def in_pieces(t_s: Floats, segments: Sequence[Segment], where: str) -> Pieces:
         where: file and column, for the finding.
 
     """
+    if not segments and _rises(t_s):
+        return Pieces(t_s, (), [])
     filled = np.flatnonzero(np.isfinite(t_s))
     times_s = t_s[filled]
     stated = {int(np.searchsorted(filled, segment.row)): segment.start_s for segment in segments}
@@ -89,6 +93,11 @@ def in_pieces(t_s: Floats, segments: Sequence[Segment], where: str) -> Pieces:
     text = f"begins again in row {filled[edges[1]] + 1}{' and others' if len(edges) > 2 else ''}"
     text = f"{text}: {counted(len(edges), 'piece')}; {how}; --piece N takes one"
     return Pieces(result, tuple(starts), [Finding("pieces", where, text, len(edges))])
+
+
+def _rises(times: Floats) -> bool:
+    """Whether no value is missing or smaller than the value before it, as in most files."""
+    return bool((times[1:] >= times[:-1]).all())
 
 
 def _falls(times_s: Floats) -> Indices:

@@ -50,6 +50,8 @@ class Table:
     written: dict[str, Any] = field(default_factory=dict[str, Any])  # how the file was read; keys of [source] of a map
     own_times: dict[str, str] = field(default_factory=dict[str, str])  # column of a channel's times, by channel
     segments: tuple[Segment, ...] = ()  # parts with a head each; empty for a file with one head
+    # numbers of the columns that were read: recognising the columns of a long record reads each several times
+    _numbers: dict[str, Floats] = field(default_factory=dict[str, Floats], init=False, repr=False)
     names_are_paths: bool = (
         False  # of messages, structs and groups, where brackets hold an index or the name of a joint
     )
@@ -76,9 +78,11 @@ class Table:
     def column(self, name: str | int) -> Floats:
         """One column, float64 [rows]; cells without a number are NaN. Raises Fault BAD_TABLE if it is missing or not numeric."""
         key = self.find(name)
-        values, findings = numbers(self.columns[key], f"{self.path.name}: column {key}", self.decimal, self.thousands)
-        self._add(findings)
-        return values
+        if key not in self._numbers:
+            where = f"{self.path.name}: column {key}"
+            self._numbers[key], findings = numbers(self.columns[key], where, self.decimal, self.thousands)
+            self._add(findings)
+        return self._numbers[key]
 
     def _add(self, findings: list[Finding]) -> None:
         self.findings.extend(finding for finding in findings if finding not in self.findings)
