@@ -31,10 +31,9 @@ _LOOKED_AT = 4096  # first bytes that decide whether a file is a text
 _CONTROLS = bytes({*range(32)} - {*b"\t\n\v\f\r\x1a\x1b"})
 _MOST_CONTROLS = 0.02  # share of control characters in a text; a serial port gives a few at its start
 _PROSE = 1 << 16  # first and last bytes in which lines are searched for numbers
-_LEAST_ROWS = (
-    0.3  # share of lines that begin with a number or a label and a number; 0.02 in this project's README, 0.9 in tables
-)
-_ROW = re.compile(rb"""[^\w\r\n]*(?:[^\s\d,;]{1,40}[\s=:"']*)?[-+.]?\d|[^\r\n]*[,;\t]\s*["']?[-+.]?\d""")
+# Share of words in a line that begin with a digit, and of such lines: 0.02 to 0.31 in texts of this project, 0.5 to 1 in tables.
+_OF_WORDS, _LEAST_ROWS = 0.25, 0.3
+_BETWEEN_WORDS = re.compile(rb"""[\s,;|=:"'{}\[\]()]+""")
 _SHOWN = 8  # first bytes of an unknown file that the message shows
 
 
@@ -79,10 +78,15 @@ def _refuse_prose(path: Path) -> None:
     shares: list[float] = []
     for part in (begin, end):  # a long head may fill the begin, notes the end
         lines = [line for line in part.splitlines()[:-1] or [part] if line.strip()]
-        shares.append(sum(_ROW.match(line) is not None for line in lines) / max(len(lines), 1))
+        shares.append(sum(map(_may_be_row, lines)) / max(len(lines), 1))
     if begin.strip() and max(shares) < _LEAST_ROWS:
         line = f"{path.name}: is a text with numbers in {100.0 * max(shares):.0f} % of its lines: no row of numbers in most"
         raise Fault("BAD_TABLE", f"{line}; give a file of measured data")
+
+
+def _may_be_row(line: bytes) -> bool:
+    words = [word for word in _BETWEEN_WORDS.split(line) if word]
+    return sum(word.lstrip(b"+-.")[:1].isdigit() for word in words) >= max(_OF_WORDS * len(words), 1)
 
 
 def _of_zip(path: Path, start: bytes) -> Kind:

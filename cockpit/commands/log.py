@@ -204,6 +204,7 @@ def _import_as_seen(path: Path, out: Path, kept: Path, asked: "LookOptions") -> 
 
     from bridge.config import validate
     from bridge.files import refuse_to_replace_corrected, write_whole
+    from cockpit.look.doubts import refuse_absurd
     from cockpit.look.evidence import columns_of, full_map
     from cockpit.look.source import looked_at, read_record
     from diagnosis.evidence.import_table import ImportMap, import_columns
@@ -217,7 +218,9 @@ def _import_as_seen(path: Path, out: Path, kept: Path, asked: "LookOptions") -> 
         raise Fault("CONFIG", f"{path.name}: is a run log of this project; use it without import")
     made = record.map_text
     if out.suffix != ".mcap":
-        made = full_map(record, looked_at(record))
+        seen = looked_at(record)
+        refuse_absurd(seen, path.name, record.counts)
+        made = full_map(record, seen)
     refuse_to_replace_corrected(kept, made, str(kept))
     wanted = validate(ImportMap, tomllib.loads(made), kept.name)
     read = Mapped(columns_of(record), record.findings, record.starts_s)

@@ -167,9 +167,9 @@ def _names_above(lines: Sequence[str], first: int, form: TextLayout, width: int,
                 break
             continue
         cells = _named(lines[at], form, width)
-        fits = width <= len(cells) <= width + (not fitting and width > 1 and form.delimiter != BLANK) and any(
-            cell.strip() and not form.is_number(cell) for cell in cells
-        )
+        if len(cells) == width + 1 and width > 1 and re.fullmatch(r"\W*|.*:\s*", cells[-1]):
+            cells = cells[:-1]  # a label behind the last name
+        fits = len(cells) == width and any(cell.strip() and not form.is_number(cell) for cell in cells)
         if fits:
             fitting.append(at)
         elif fitting:
