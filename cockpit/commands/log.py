@@ -212,7 +212,7 @@ def _import_as_seen(path: Path, out: Path, kept: Path, asked: "LookOptions") -> 
 
     record = read_record(path, asked._replace(piece=None))
     if record.known.unit:
-        line = f"{path.name}: holds no force but a number in {record.known.unit}: evidence and logs need a force"
+        line = f"{path.name}: holds no force but a number in {record.known.unit}: a log needs a force"
         raise Fault("CONFIG", f"{line}; `stickslip look` reads it, and a map with scale = ... makes a force of it")
     if not record.map_text:
         raise Fault("CONFIG", f"{path.name}: is a run log of this project; use it without import")

@@ -42,6 +42,9 @@ def rig_of(seen: LookResult, file: str, described: Mapping[str, float]) -> tuple
     Raises Fault CONFIG, with an option to copy, for a number that can be neither estimated nor assumed.
     """
     numbers = seen.numbers
+    if seen.known.unit:
+        line = f"{file}: holds no force but a number in {seen.known.unit}: a rig needs a force"
+        raise Fault("CONFIG", f"{line}; `stickslip look` reads it, and a map with scale = ... makes a force of it")
     if seen.known.coefficient:
         raise Fault(
             "CONFIG", f"{file}: has a friction coefficient but no load, so the force is unknown; add --load 94.5N"

@@ -1,4 +1,4 @@
-"""Units of the columns of a record: of a number that holds another quantity than a force, of a column without a stated unit, and in SI."""
+"""Units of the columns of a record: of another quantity than a force, of a column without a stated unit, and in SI."""
 
 import numpy as np
 

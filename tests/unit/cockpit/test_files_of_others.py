@@ -17,6 +17,7 @@ import h5py
 import numpy as np
 import pyarrow as pa
 import pytest
+from google.protobuf import descriptor_pb2
 from mcap.writer import Writer
 from pyarrow import feather
 from typer.testing import CliRunner
@@ -176,6 +177,18 @@ def test_an_import_makes_a_run_of_each_piece(tmp_path: Path) -> None:
     assert (tmp_path / "run-2.mcap").exists()
 
 
+@pytest.mark.parametrize(
+    "words", [["log", "import", "--out", "made"], ["log", "import", "--out", "made.mcap"], ["diagnose"]]
+)
+def test_a_current_is_never_taken_for_a_force_of_evidence(
+    tmp_path: Path, words: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a.csv").write_text("time_s,motor_current_A\n" + rows(T_S, FORCE_N / 7))
+    refused = CliRunner().invoke(app, [*words, "a.csv", "--speed", "1mm/s", "--json"])
+    assert "holds no force but a number in A" in json.loads(refused.stdout)["line"]
+
+
 def test_strokes_have_their_coefficients(tmp_path: Path) -> None:
     sign = np.where(T_S % 2 < 1, 1.0, -1.0)
     path = tmp_path / "reciprocating.csv"
@@ -304,3 +317,23 @@ def test_the_page_and_the_slips_of_pieces_without_a_force(tmp_path: Path) -> Non
     assert look(path, "--out", str(page), "--out", str(slips))["status"] == 0
     assert "<h2>Pieces</h2>" in page.read_text()
     assert "breakaway_force_A" in slips.read_text().splitlines()[0]
+
+
+def test_messages_of_protobuf_are_read(tmp_path: Path) -> None:
+    kind = descriptor_pb2.FileDescriptorProto(name="rig.proto", package="rig", syntax="proto3")
+    field = kind.message_type.add(name="Sample").field
+    double, optional = (
+        descriptor_pb2.FieldDescriptorProto.TYPE_DOUBLE,
+        descriptor_pb2.FieldDescriptorProto.LABEL_OPTIONAL,
+    )
+    field.add(name="force_N", number=1, type=double, label=optional)
+    schema = descriptor_pb2.FileDescriptorSet(file=[kind]).SerializeToString()
+    with (tmp_path / "rig.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start("other", "1.0")
+        channel = writer.register_channel("/rig", "protobuf", writer.register_schema("rig.Sample", "protobuf", schema))
+        for t_s, force_N in zip(T_S.tolist(), FORCE_N.tolist(), strict=True):
+            at_ns = round(t_s * 1e9) + 1
+            writer.add_message(channel, at_ns, b"\x09" + struct.pack("<d", force_N), at_ns)  # field 1, 8 bytes
+        writer.finish()
+    is_right(look(tmp_path / "rig.mcap", "--force", "/rig.force_N"))
