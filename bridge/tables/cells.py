@@ -30,6 +30,9 @@ _MONTHS = {name.lower(): at for names in (calendar.month_abbr, calendar.month_na
 _MONTHS["sept"] = 9
 # orders of day, month and year; a date with slashes is American, unless the dates of the column exclude it
 _ORDERS = ("mdy", "dmy", "ymd")
+# lines of a head that state when a piece began
+_STARTS = re.compile(r"start|begin|began|date|time|zeit|uhr|datum|beginn", re.IGNORECASE)
+_DAY = re.compile(r"\d{1,4}([-./])\d{1,2}\1\d{1,4}|\d{1,2}[- ./][A-Za-z]{3,9}[- ./]\d{4}")
 _ZONE = re.compile(r"\s*(?:Z|UTC|[+-]\d{2}:?\d{2})$")
 _DAY_S, _HOUR_S = 86400.0, 3600.0
 
@@ -239,3 +242,20 @@ def _counted_on(times_s: Floats) -> Floats:
     around_s = _DAY_S if np.nanmax(times_s, initial=0.0) >= _HOUR_S else _HOUR_S
     back = np.concatenate([[0.0], np.diff(times_s)]) < -0.5 * around_s
     return times_s + np.cumsum(back) * around_s
+
+
+def starts_of(heads: Sequence[str]) -> list[float]:
+    """The start that the head of each piece states, in s after the first piece; NaN without a clock time in a head.
+
+    The last clock time of a head counts, as a program may write the creation of the file first; with the last date.
+    """
+    stamps: list[str] = []
+    for head in heads:
+        lines = [line for line in head.splitlines() if _STARTS.search(line)]
+        clocks = [match[0] for line in lines for match in _CLOCK.finditer(line)]
+        dates = [match[0] for line in lines for match in _DAY.finditer(line)]
+        stamps.append(" ".join([*dates[-1:], *clocks[-1:]]) if clocks else "")
+    if not all(stamps):
+        return [np.nan] * len(stamps)
+    times_s = _times_from_text(stamps, "")[0]
+    return [np.nan] * len(stamps) if times_s is None else times_s.tolist()

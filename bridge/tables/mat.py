@@ -13,6 +13,10 @@ from bridge.tables.table import ChannelClock, Table
 _DEEPEST = 8  # deepest level of nested structs and groups that is read
 _MOST_COLUMNS = 4096  # largest number of columns of a matrix that is read; more are a picture
 _UNIT_KEYS = ("unit", "units", "Unit", "Units", "unit_string")
+_STEP_KEYS, _START_KEYS = (
+    ("dt", "wf_increment"),
+    ("t0", "wf_start_offset"),
+)  # attributes of channels with separate rates
 _OF_MATLAB = {"#refs#", "#subsystem#"}  # MATLAB's groups for the targets of references
 
 
@@ -27,7 +31,8 @@ def read_mat(path: Path) -> Table:
 
 def table_of(path: Path, variables: dict[str, Any]) -> Table:
     """A table of variables that may hold structs."""
-    table = Table(path, dict(part for name, value in variables.items() for part in _parts(name, value, 0)))
+    columns = dict(part for name, value in variables.items() for part in _parts(name, value, 0))
+    table = Table(path, columns, names_are_paths=True)
     for name, value in variables.items():
         _add_dspace(table, name, value)
     return table
@@ -144,6 +149,11 @@ def read_hdf5(path: Path) -> Table:
             unit = next((item.attrs[key] for key in _UNIT_KEYS if key in item.attrs), "")
             if isinstance(unit, bytes | str):
                 table.units[name.replace("/", ".")] = unit.decode(errors="replace") if isinstance(unit, bytes) else unit
+            step_s = next((float(item.attrs[key]) for key in _STEP_KEYS if key in item.attrs), 0.0)
+            key = name.replace("/", ".")
+            if step_s > 0.0 and key in table.columns:
+                start_s = next((float(item.attrs[key]) for key in _START_KEYS if key in item.attrs), 0.0)
+                table.clocks[key] = ChannelClock(start_s, step_s)
 
         file.visititems(keep_unit)
         return table

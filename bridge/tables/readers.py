@@ -5,10 +5,12 @@ from pathlib import Path
 
 from bridge.faults import Fault
 from bridge.files import check_file
+from bridge.tables.json_table import read_json
 from bridge.tables.kinds import Kind, kind_of
+from bridge.tables.long_form import pivoted
 from bridge.tables.mat import read_hdf5, read_mat
+from bridge.tables.message_log import read_message_log
 from bridge.tables.own_times import with_own_times
-from bridge.tables.ros_log import read_ros_log
 from bridge.tables.sheet import read_sheet
 from bridge.tables.table import Table
 from bridge.tables.tdms import read_tdms
@@ -40,11 +42,12 @@ def read_table(path: Path, dialect: Dialect | None = None, kind: Kind | None = N
         "hdf5": lambda: read_hdf5(path),
         "tdms": lambda: read_tdms(path),
         "sheet": lambda: read_sheet(path, given),
-        "mcap": lambda: read_ros_log(path),
+        "mcap": lambda: read_message_log(path),
+        "json": lambda: read_json(path, given),
     }
     try:
         table = readers[kind]()
-        return with_own_times(table) if kind in ("text", "sheet") else table
+        return with_own_times(pivoted(table)) if kind in ("text", "sheet") else table
     except (Fault, ModuleNotFoundError):
         raise
     except Exception as error:
@@ -66,4 +69,4 @@ def _read_parquet(path: Path) -> Table:
         for field in table.schema
         if field.metadata and b"unit" in field.metadata
     }
-    return Table(path, {name: table.column(name) for name in table.column_names}, units=units)
+    return pivoted(Table(path, {name: table.column(name) for name in table.column_names}, units=units))

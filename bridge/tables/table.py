@@ -11,7 +11,9 @@ from bridge.arrays import Floats
 from bridge.faults import Fault
 from bridge.log.finding import Finding
 from bridge.tables.cells import numbers, seconds
-from bridge.tables.unit_words import bare_name, unit_in_name
+from bridge.tables.pieces import Segment, unwrapped
+from bridge.tables.unit_words import bare_name, in_brackets, unit_in_name
+from bridge.units import counted
 
 _SECONDS = re.compile(r"(.*?)(?:secs?|seconds)")  # column of the whole seconds of a stamp; see _NANOSECONDS
 _AGAIN = re.compile(r"\.\d+$")  # suffix that a reader adds to a repeated name
@@ -47,6 +49,12 @@ class Table:
     findings: list[Finding] = field(default_factory=list[Finding])
     written: dict[str, Any] = field(default_factory=dict[str, Any])  # how the file was read; keys of [source] of a map
     own_times: dict[str, str] = field(default_factory=dict[str, str])  # column of a channel's times, by channel
+    segments: tuple[Segment, ...] = ()  # parts with a head each; empty for a file with one head
+    # numbers of the columns that were read: recognising the columns of a long record reads each several times
+    _numbers: dict[str, Floats] = field(default_factory=dict[str, Floats], init=False, repr=False)
+    names_are_paths: bool = (
+        False  # of messages, structs and groups, where brackets hold an index or the name of a joint
+    )
 
     def find(self, name: str | int) -> str:
         """The key of a column given by its name, its number from 1, or its name without its unit.
@@ -70,9 +78,11 @@ class Table:
     def column(self, name: str | int) -> Floats:
         """One column, float64 [rows]; cells without a number are NaN. Raises Fault BAD_TABLE if it is missing or not numeric."""
         key = self.find(name)
-        values, findings = numbers(self.columns[key], f"{self.path.name}: column {key}", self.decimal, self.thousands)
-        self._add(findings)
-        return values
+        if key not in self._numbers:
+            where = f"{self.path.name}: column {key}"
+            self._numbers[key], findings = numbers(self.columns[key], where, self.decimal, self.thousands)
+            self._add(findings)
+        return self._numbers[key]
 
     def _add(self, findings: list[Finding]) -> None:
         self.findings.extend(finding for finding in findings if finding not in self.findings)
@@ -92,7 +102,11 @@ class Table:
             return times_s - times_s[:1], True
         times_s, findings = seconds(self.columns[key], where)
         if times_s is None:
-            return self.column(key), False
+            counts, overflows = unwrapped(self.column(key))
+            if overflows:
+                text = f"its counter overflows {counted(overflows, 'time')}: counted on"
+                self._add([Finding("time", where, text, overflows)])
+            return counts, False
         self._add(findings)
         return times_s, True
 
@@ -102,10 +116,18 @@ class Table:
         return next((f"{stem[1]}{end}" for end in _NANOSECONDS if stem and f"{stem[1]}{end}" in self.columns), "")
 
     def unit(self, name: str | int) -> str:
-        """The unit of a column, from the file's list of units or the column's name; empty if unknown."""
+        """The unit of a column: from the file's list of units, its name, or the given name, as in `T [ms]`; empty if unknown."""
         key = self.find(name)
         first = _AGAIN.sub("", key)
-        return self.units.get(key) or unit_in_name(first if first in self.columns else key)
+        if (unit := self.units.get(key)) or (self.names_are_paths and key.endswith("]")):
+            return unit or ""
+        unit = unit_in_name(first if first in self.columns else key)
+        return unit or ("" if str(name) == key else unit_in_name(str(name)))
+
+    def stated_unit(self, name: str | int) -> str:
+        """The unit of a column, known or not, as the file writes it; empty if it states none."""
+        key = self.find(name)
+        return self.unit(name) or ("" if self.names_are_paths else in_brackets(key))
 
 
 def _simplified(text: str, bare: bool) -> str:

@@ -9,12 +9,13 @@ import typer
 from bridge.faults import Fault
 from bridge.units import counted
 from cockpit.commands.as_json.option import STDOUT, Json, JsonGroup, print_result
-from cockpit.commands.options import Strict, Verbose, command, watched_share
+from cockpit.commands.options import FILE, FileOptions, Strict, Verbose, command, watched_share
 from cockpit.run.child_process import ReportedFault
 from cockpit.run.writable import LOG, TABLE, check_output, check_output_folder
 
 if TYPE_CHECKING:
     from cockpit.judge.judged import Judged
+    from cockpit.look.source import LookOptions
     from diagnosis.evidence.import_table import Imported
 
 log_app = typer.Typer(
@@ -156,11 +157,12 @@ def log_export(
 
 
 @log_app.command("import")
-@command()
+@command(*FILE)
 def log_import(
+    options: FileOptions,
     path: Annotated[
         Path,
-        typer.Argument(help="Measured data: text with any delimiter, .xlsx, .parquet, .mat, .h5, .tdms, ROS 2 .mcap."),
+        typer.Argument(help="Measured data: text with any delimiter, .xlsx, .parquet, .mat, .h5, .tdms, .json, .mcap."),
     ],
     out: Annotated[
         Path,
@@ -168,63 +170,63 @@ def log_import(
             "--out", help="Evidence folder, to which a run is added, or FILE.mcap for log check, export and diagnose."
         ),
     ],
-    channel_map: Annotated[
-        Path | None,
-        typer.Option(
-            "--map", help="Channel map, .toml: columns, scales, rig; if not given, a map is made and written."
-        ),
-    ] = None,
-    speed: Annotated[str, typer.Option(help="Without --map: drive speed, e.g. 0.5mm/s.")] = "",
-    mass: Annotated[str, typer.Option(help="Without --map: mass of the slide, e.g. 1.5kg.")] = "",
     as_json: Json = None,
 ) -> None:
-    """Convert measured data of another program to evidence for `stickslip diagnose`, or to a run log."""
-    from diagnosis.evidence.import_table import import_file
+    """Convert measured data of another program to evidence for `stickslip diagnose`, or to a run log; without --map by names."""
+    from bridge.config import read_toml, validate
+    from cockpit.look.source import overridden
+    from diagnosis.evidence.import_table import ImportMap, import_by_map
 
     if out.suffix == ".mcap":
         check_output("--out", out, LOG)
     else:
         check_output_folder("--out", out)
-    kept = None
-    if channel_map is not None:
-        done = import_file(path, channel_map, out)
+    asked, kept = options.asked(), None
+    if asked.map is not None:
+        wanted = overridden(validate(ImportMap, read_toml(asked.map), asked.map.name), asked)
+        done = import_by_map(path, wanted, asked.map.name, out, asked.piece)
     else:
         stem = out.with_suffix("") if out.suffix == ".mcap" else out / path.stem
         kept = stem.with_name(stem.name + ".map.toml")
-        done = _import_as_seen(path, out, kept, speed, mass)
-    place = done.out if done.out.suffix == ".mcap" else done.out / done.file
-    words = [f"{place}: {counted(done.rows, 'sample')} of {', '.join(done.columns)}"]
+        done = _import_as_seen(path, out, kept, asked)
+    folder = done.out.parent if done.out.suffix == ".mcap" else done.out
+    places = ", ".join(str(folder / file) for file in done.files)
+    words = [f"{places}: {counted(done.rows, 'sample')} of {', '.join(done.columns)}"]
     words += [finding.in_words() for finding in done.findings]
     if kept is not None:
         words.append(f"map        {kept} holds the assumptions; correct it, then give it to --map with a new --out")
     print_result(as_json, done, words)
 
 
-def _import_as_seen(path: Path, out: Path, kept: Path, speed: str, mass: str) -> "Imported":
+def _import_as_seen(path: Path, out: Path, kept: Path, asked: "LookOptions") -> "Imported":
     """Import without a map: columns by their names, numbers of the rig from the record; write the resulting map to `kept`."""
-    from tempfile import TemporaryDirectory
+    import tomllib
 
+    from bridge.config import validate
     from bridge.files import refuse_to_replace_corrected, write_whole
-    from cockpit.look.evidence import full_map
-    from cockpit.look.quantity import quantity
-    from cockpit.look.source import LookOptions, looked_at, read_record
-    from diagnosis.evidence.import_table import import_file
+    from cockpit.look.doubts import refuse_absurd
+    from cockpit.look.evidence import columns_of, full_map
+    from cockpit.look.source import looked_at, read_record
+    from diagnosis.evidence.import_table import ImportMap, import_columns
+    from diagnosis.evidence.mapped import Mapped
 
-    record = read_record(
-        path, LookOptions(quantity("--speed", speed, "velocity"), None, quantity("--mass", mass, "mass"))
-    )
+    record = read_record(path, asked._replace(piece=None))
+    if record.known.unit:
+        line = f"{path.name}: holds no force but a number in {record.known.unit}: a log needs a force"
+        raise Fault("CONFIG", f"{line}; `stickslip look` reads it, and a map with scale = ... makes a force of it")
     if not record.map_text:
         raise Fault("CONFIG", f"{path.name}: is a run log of this project; use it without import")
     made = record.map_text
     if out.suffix != ".mcap":
-        made = full_map(record, looked_at(record))
+        seen = looked_at(record)
+        refuse_absurd(seen, path.name, record.counts)
+        made = full_map(record, seen)
     refuse_to_replace_corrected(kept, made, str(kept))
-    with TemporaryDirectory(prefix="stickslip-") as folder:
-        channel_map = Path(folder) / f"{path.stem}.map.toml"
-        channel_map.write_text(made, encoding="utf-8")
-        done = import_file(path, channel_map, out)
+    wanted = validate(ImportMap, tomllib.loads(made), kept.name)
+    read = Mapped(columns_of(record), record.findings, record.starts_s)
+    done = import_columns(path, read, wanted, kept.name, out, asked.piece)
     write_whole(kept, made)
-    return done._replace(findings=list(dict.fromkeys([*record.findings, *done.findings])))
+    return done
 
 
 @log_app.command("check")

@@ -15,6 +15,7 @@ from cockpit.commands.as_json.option import carry_out
 
 if TYPE_CHECKING:
     from bridge.wire.zenoh_link import BusConfig
+    from cockpit.look.source import LookOptions
 
 
 def scenario_names(incomplete: str) -> list[str]:
@@ -112,15 +113,57 @@ class SharedOptions(NamedTuple):
 BUS = ("scenario", "endpoint", "prefix", "certs")  # options that choose the bus of a running rig
 
 
+class FileOptions(NamedTuple):
+    """Options of the commands that read a measured file."""
+
+    speed: Annotated[str, typer.Option(help="Drive speed, e.g. 0.5mm/s; for stiffness and mass.")] = ""
+    load: Annotated[str, typer.Option(help="Normal load, e.g. 94.5N; for friction coefficients.")] = ""
+    mass: Annotated[str, typer.Option(help="Known mass of the slide, e.g. 1.5kg; compared with the estimate.")] = ""
+    rate: Annotated[str, typer.Option(help="Sampling rate, e.g. 1kHz; replaces a time column.")] = ""
+    time: Annotated[str, typer.Option(help='Time column; with its unit if it states none: "T [ms]".')] = ""
+    force: Annotated[str, typer.Option(help="Force column, or a motor current, torque or following error.")] = ""
+    position: Annotated[str, typer.Option(help="Column of the drive's position.")] = ""
+    piece: Annotated[
+        int | None, typer.Option(min=1, help="One piece of a file whose time begins again; all if not given.")
+    ] = None
+    encoding: Annotated[str, typer.Option(help="Encoding of a text, e.g. cp1250, if it is not recognised.")] = ""
+    channel_map: Annotated[
+        Path | None, typer.Option("--map", help="Channel map, .toml: columns, units, scales, rig.")
+    ] = None
+
+    def asked(self) -> "LookOptions":
+        """The options in SI units. Raises Fault CONFIG."""
+        from cockpit.look.quantity import quantity, turns
+        from cockpit.look.source import LookOptions
+
+        return LookOptions(
+            quantity("--speed", self.speed, "velocity"),
+            quantity("--load", self.load, "force"),
+            quantity("--mass", self.mass, "mass"),
+            quantity("--rate", self.rate, "frequency"),
+            self.time,
+            self.force,
+            self.channel_map,
+            turns(self.speed) if self.speed else None,
+            self.position,
+            self.piece,
+            self.encoding or None,
+        )
+
+
+FILE = FileOptions._fields
+
+
 def command(*names: str, **defaults: Any) -> Callable[[Callable[..., int | None]], Callable[..., NoReturn]]:
     """Make a command of a function with the option `as_json`; it ends with the exit status that the function returns.
 
     Args:
-        names: fields of `SharedOptions`; with any, the function receives their values as its first argument.
+        names: fields of `SharedOptions`, or all of `FileOptions`; the function receives their values as its first argument.
         defaults: fields with another default value.
 
     """
-    kinds, values = get_type_hints(SharedOptions, include_extras=True), SharedOptions._field_defaults | defaults
+    group: Any = FileOptions if names == FILE else SharedOptions
+    kinds, values = get_type_hints(group, include_extras=True), group._field_defaults | defaults
     options = [
         Parameter(name, Parameter.KEYWORD_ONLY, default=values[name], annotation=kinds[name])
         for name in (*defaults, *names)
@@ -130,7 +173,7 @@ def command(*names: str, **defaults: Any) -> Callable[[Callable[..., int | None]
         @wraps(function)
         def called(**given: Any) -> NoReturn:
             shared = {option.name: given.pop(option.name) for option in options}
-            first = [SharedOptions(**shared)] if options else []
+            first = [group(**shared)] if options else []
             carry_out(lambda: function(*first, **given), given["as_json"])
 
         parameters = list(signature(function).parameters.values())[bool(options) :]

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from bridge.arrays import Floats
 from bridge.log.in_charge import GONE_S, ChargeWatch
@@ -11,6 +12,7 @@ from cockpit.judge.machine_terms import BlockMotion, Following, FollowingSum
 from cockpit.judge.setup import SETTLING_S, Setup
 from cockpit.judge.slips import Forces, Swing
 from cockpit.judge.watches import RigWatch, StepWatch
+from diagnosis.slips import Cycles
 
 Stretches = list[tuple[float, float]]
 
@@ -30,8 +32,10 @@ class Phase(NamedTuple):
     seconds: float
     slips: int
     slips_per_min: float
-    swing_N: float  # drive force: largest less smallest block mean in the steady part of a stroke, median of strokes
-    strokes: int  # number of these strokes; 0 without even motion: then the swing is over all blocks
+    # Drive force: mean fall in a slip, as `look` gives it, which block means would flatten. Without a slip: largest less smallest
+    # block mean in the steady part of a stroke, median of strokes, as a vibration alone does not count.
+    swing_N: float
+    strokes: int  # number of these strokes; 0 without even motion: then a swing without a slip is over all blocks
     mean_force_N: float  # mean drive force of the stretch, without its first 4 s, or first half if that is shorter
     following: Following | None  # None without motion of the drive or without a measured position
     vibration_dose_mm2_per_s: float  # integral of v_a^2
@@ -49,6 +53,7 @@ class PhaseSum:
         self._blocks = 0
         self._between = self._last = 0  # blocks with a moving drive: most without a slip, and up to the last slip
         self._whole, self._steady = Swing(), Swing()
+        self._falls_N: list[Floats] = []  # falls of the force in the slips that count for the swing
         self._following = FollowingSum()
 
     @property
@@ -74,7 +79,9 @@ class PhaseSum:
             at = self.moving + np.searchsorted(moving_s, breakaway_s[slips])
             self._between = max(self._between, int(np.diff(at, prepend=self._last).max()))
             self._last = int(at[-1])
-        later = inside & (forces.t_s > min(self.from_s + _RAMP_S, 0.5 * (self.from_s + self.to_s)))
+        steady_s = min(self.from_s + _RAMP_S, 0.5 * (self.from_s + self.to_s))
+        later = inside & (forces.t_s > steady_s)
+        self._falls_N.append(_falls_N(forces.cycles, slips & (breakaway_s > steady_s)))
         self._steady.add(forces.mean_N[later], forces.part[later])
         if not self._steady.blocks:
             self._whole.add(forces.mean_N[inside], forces.part[inside])
@@ -87,7 +94,9 @@ class PhaseSum:
             return None
         seconds = self._blocks * block_s
         swing = self._steady if self._steady.blocks else self._whole
+        falls_N = np.concatenate([*self._falls_N, np.empty(0)])
         swing_N, strokes = swing.result()
+        swing_N = float(falls_N.mean()) if len(falls_N) else swing_N
         return Phase(
             seconds=seconds,
             slips=self.slips,
@@ -99,6 +108,18 @@ class PhaseSum:
             vibration_dose_mm2_per_s=self._following.dose_mm2_per_s,
             slips_went_on=self.slips > 0 and self.moving - self._last <= _GOES_ON * self._between,
         )
+
+
+def _falls_N(cycles: Cycles, slips: npt.NDArray[np.bool_]) -> Floats:
+    """Fall of the force in each marked slip that ends before the next one begins."""
+    begins_s = cycles.breakaway_t_s
+    after = np.searchsorted(cycles.restick_t_s, begins_s)
+    ends = after < len(cycles.restick_t_s)
+    ended = slips & ends
+    ended[:-1] &= (
+        cycles.restick_t_s[np.minimum(after[:-1], len(cycles.restick_t_s) - 1)] < begins_s[1:] if ends.any() else False
+    )
+    return np.abs(cycles.breakaway_force_N[ended] - cycles.restick_force_N[after[ended]])
 
 
 class Interruptions:

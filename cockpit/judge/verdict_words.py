@@ -167,7 +167,7 @@ def _slips(verdict: RunVerdict, phase: Phase, more: str = "") -> str:
 
 
 def _swing(phase: Phase) -> str:
-    of = f" (median of {phase.strokes} strokes, without their turns)" if phase.strokes > 1 else ""
+    of = f" (median of {phase.strokes} strokes, without their turns)" if phase.strokes > 1 and not phase.slips else ""
     return f"drive force swings by {phase.swing_N:.2f} N{of}"
 
 

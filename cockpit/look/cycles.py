@@ -1,6 +1,7 @@
 """The slips of a look as a table for a spreadsheet."""
 
 import math
+import re
 import zipfile
 import zlib
 from pathlib import Path
@@ -11,14 +12,16 @@ from bridge.provenance import provenance
 from diagnosis.look.look import LookResult
 from diagnosis.look.sticks import Cycle
 
-_FIRST_LINE = ",".join(Cycle._fields) + "\n"
+# documented in docs/guides/look.md; the compliances of each stick alone are too uncertain to be shown
+_COLUMNS = [name for name in Cycle._fields if name not in ("loading_N_per_s", "drive_m_per_N", "contact_m_per_N")]
+_FIRST_COLUMN = "breakaway_t_s,"
 _AUTHOR = "stickslip look"
 
 
 def refuse_to_replace_sheet(out: Path, place: str) -> None:
     """Raise Fault CONFIG if `out`, .csv or .xlsx, exists and was not written by `write_cycles`."""
     if out.suffix.lower() == ".csv":
-        refuse_to_replace_text(out, _FIRST_LINE, place)
+        refuse_to_replace_text(out, _FIRST_COLUMN, place)
     elif out.is_file() and out.stat().st_size and not _is_our_book(out):
         raise Fault("CONFIG", not_ours(out, place))
 
@@ -34,12 +37,14 @@ def _is_our_book(path: Path) -> bool:
 
 def write_cycles(seen: LookResult, out: Path, source: Path) -> None:
     """Write one row per slip, .csv or .xlsx; unknown values are empty."""
-    names = Cycle._fields
-    rows = [[None if not math.isfinite(value) else value for value in cycle] for cycle in seen.cycles]
+    unit = seen.known.force_unit
+    names = [name if unit == "N" else re.sub(r"(?<=_)N(?=_|$)", unit.replace(" ", "."), name) for name in _COLUMNS]
+    values = [[getattr(cycle, name) for name in _COLUMNS] for cycle in seen.cycles]
+    rows = [[value if math.isfinite(value) else None for value in row] for row in values]
     with replacing(out) as file:
         if out.suffix.lower() == ".csv":
             text = [",".join("" if value is None else repr(value) for value in row) + "\n" for row in rows]
-            file.write("".join([_FIRST_LINE, *text]).encode())
+            file.write("".join([",".join(names) + "\n", *text]).encode())
             return
         import xlsxwriter
 

@@ -13,6 +13,7 @@ from cockpit.look.source import MeasuredRecord
 from diagnosis.evidence.assumed import with_assumed
 from diagnosis.evidence.import_table import write_run
 from diagnosis.evidence.manifest import RigTable, RunTable, rig_lines
+from diagnosis.evidence.manifest_keys import Columns
 from diagnosis.look.look import LookResult
 
 _LEAST_TOLERANCE = 0.01  # least relative tolerance of a number: sensors are calibrated to 1 %
@@ -41,6 +42,9 @@ def rig_of(seen: LookResult, file: str, described: Mapping[str, float]) -> tuple
     Raises Fault CONFIG, with an option to copy, for a number that can be neither estimated nor assumed.
     """
     numbers = seen.numbers
+    if seen.known.unit:
+        line = f"{file}: holds no force but a number in {seen.known.unit}: a rig needs a force"
+        raise Fault("CONFIG", f"{line}; `stickslip look` reads it, and a map with scale = ... makes a force of it")
     if seen.known.coefficient:
         raise Fault(
             "CONFIG", f"{file}: has a friction coefficient but no load, so the force is unknown; add --load 94.5N"
@@ -81,16 +85,19 @@ def full_map(record: MeasuredRecord, seen: LookResult) -> str:
     return "\n".join([record.map_text.rstrip(), "", *rig_lines(rig, assumed)]) + "\n"
 
 
+def columns_of(record: MeasuredRecord) -> Columns:
+    """The standard columns of a record, [samples] each, SI units."""
+    columns = {"t_s": record.t_s, "drive_force_N": record.force_N, **record.others}
+    return columns if record.position_m is None else columns | {"drive_position_m": record.position_m}
+
+
 def write_evidence(record: MeasuredRecord, seen: LookResult, folder: Path) -> tuple[RigTable, list[str]]:
     """Make `folder` an evidence folder of this record; returns its rig and the assumed numbers. Raises Fault, OSError."""
     rig, assumed = rig_of(seen, record.path.name, record.rig)
-    columns = {"t_s": record.t_s, "drive_force_N": record.force_N, **record.others}
-    if record.position_m is not None:
-        columns["drive_position_m"] = record.position_m
     speed = seen.known.speed_mps if record.position_m is None else None
     run = RunTable(file=record.path.stem + ".parquet", drive_velocity_mps=speed)
     folder.mkdir(parents=True, exist_ok=True)
-    write_run(folder, columns, rig, [run], assumed)
+    write_run(folder, columns_of(record), rig, [run], assumed)
     return rig, assumed
 
 

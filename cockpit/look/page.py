@@ -7,11 +7,11 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 
 from bridge.files import write_whole
-from bridge.log.finding import Finding
 from bridge.pages import filled_page
 from bridge.provenance import provenance
+from cockpit.look.pieces import Looked
 from diagnosis.look.look import LookResult
-from diagnosis.look.words import TITLES, headline, limits_of_look, with_interval
+from diagnosis.look.words import TITLES, headline, limits_of_look, meaning_of, symbol_of, with_interval
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -87,6 +87,7 @@ def histograms(seen: LookResult) -> "Figure":
         axes.set_xlabel(label)
         axes.set_ylabel("slips")
         axes.yaxis.get_major_locator().set_params(integer=True)
+        axes.locator_params(axis="x", nbins=4)  # nearly equal values have labels of many digits
         _plain(axes)
     return figure
 
@@ -169,8 +170,9 @@ def _draw(axes: Any, x: Any, y: Any, alpha: float = 1.0) -> None:
     axes.margins(x=0.01)
 
 
-def write_page(seen: LookResult, source: Path, findings: list[Finding], out: Path) -> None:
-    """Write the offline page: numbers and pictures of a record, and findings on its reading. Raises OSError."""
+def write_page(result: Looked, source: Path, out: Path) -> None:
+    """Write the offline page: numbers and pictures of a record, its pieces, and findings on its reading. Raises OSError."""
+    seen = result.seen
     answer = headline(seen)
     text = filled_page(
         Path(__file__).with_name("page.html.j2"),
@@ -178,14 +180,17 @@ def write_page(seen: LookResult, source: Path, findings: list[Finding], out: Pat
         name=source.name,
         headline=answer,
         rows=[
-            (symbol, with_interval(seen.numbers[name]), meaning)
-            for name, (symbol, meaning) in TITLES.items()
+            (symbol_of(name, seen), with_interval(seen.numbers[name]), meaning_of(name, seen))
+            for name in TITLES
             if name in seen.numbers
         ],
         open=limits_of_look(seen),
         figures=[(title, caption, as_svg(figure)) for title, caption, figure in pictures(seen)],
-        findings=findings,
+        findings=result.findings,
         provenance=provenance([source]).in_words(),
         seen=seen,
+        result=result,
+        unit="" if seen.known.coefficient else seen.known.force_unit,
+        with_interval=with_interval,
     )
     write_whole(out, text)

@@ -13,21 +13,21 @@ from bridge.arrays import Bools, Floats
 from bridge.config import read_toml, validate
 from bridge.faults import Fault
 from bridge.log.finding import Finding
-from bridge.results import in_json
 from bridge.tables.kinds import kind_of
-from bridge.tables.readers import read_table
+from bridge.tables.readers import Dialect, read_table
 from bridge.tables.table import Table
-from bridge.tables.unit_words import in_brackets, known_unit, weight_unit
+from bridge.tables.unit_words import known_unit
 from cockpit.look.findings import of_time, of_values, tare_of
+from cockpit.look.units import counts, own_unit, quantity, si, unitless
 from diagnosis.evidence.import_table import ImportMap
 from diagnosis.evidence.manifest_keys import USUAL, ChannelMap, Columns
-from diagnosis.evidence.mapped import calendar_unit_s, has_time, mapped
+from diagnosis.evidence.mapped import has_time, mapped
 from diagnosis.evidence.run_log import LoggedRun, columns_of_log
-from diagnosis.look.guess import Guess, guess, no_time
+from diagnosis.look.guess import Guess, guess, no_time, unused
 from diagnosis.look.look import LookResult, RecordFacts, look
+from diagnosis.look.motion import lag_of
 from diagnosis.look.slips import FEWEST
 from diagnosis.look.sticks import is_of_slide
-from diagnosis.look.words import headline
 
 # Shortest stretch without vibration that is looked at. Shorter: stops and turns of the drive between two vibrations count as
 # swings, 1.5 s in docs/guides/describe-an-axis.md. Longer: the controller's trials without vibration, 5 s, are left out.
@@ -46,6 +46,15 @@ class LookOptions(NamedTuple):
     force: str = ""
     map: Path | None = None
     speed_turns: bool | None = None  # the given speed is angular; None: no speed is given
+    position: str = ""
+    piece: int | None = None  # from 1; None: all
+    encoding: str | None = None
+
+    @property
+    def channels(self) -> dict[str, ChannelMap]:
+        """The columns that the options name."""
+        named = {"t_s": self.time, "drive_force_N": self.force, "drive_position_m": self.position}
+        return {name: ChannelMap(column=column) for name, column in named.items() if column}
 
 
 class MeasuredRecord(NamedTuple):
@@ -60,6 +69,8 @@ class MeasuredRecord(NamedTuple):
     findings: list[Finding]
     rig: Mapping[str, float]  # numbers of [rig] that a run log describes; empty for another file
     map_text: str  # map that reproduces this reading; empty if a map was given, or for a run log
+    starts_s: tuple[float, ...] = ()  # start of each piece of a file whose time begins again
+    counts: str = ""  # column of the time, if it holds whole numbers without a unit, as of milliseconds
 
     @property
     def free(self) -> Bools:
@@ -74,6 +85,17 @@ class MeasuredRecord(NamedTuple):
         return free
 
 
+class _Reading(NamedTuple):
+    """The columns of a table that are the record, and the facts that the table states."""
+
+    columns: Columns
+    known: RecordFacts
+    findings: list[Finding]
+    starts_s: tuple[float, ...]
+    map_text: str = ""
+    counts: str = ""
+
+
 def read_record(path: Path, asked: LookOptions) -> MeasuredRecord:
     """Read a table or a run log. Raises Fault BAD_TABLE, BAD_LOG, CONFIG."""
     if path.is_file() and kind_of(path) == "mcap" and (logged := _logged(path)) is not None:
@@ -81,39 +103,76 @@ def read_record(path: Path, asked: LookOptions) -> MeasuredRecord:
         return _record(path, logged.columns, known, logged.findings, "", logged.rig)
     if asked.map is not None:
         wanted = validate(ImportMap, read_toml(asked.map), asked.map.name)
-        table = read_table(path, wanted.source.dialect, wanted.source.format)
-        columns, findings = mapped(table, wanted.channels, asked.rate_Hz or wanted.source.sample_rate_Hz)
-        speed = asked.speed_mps if asked.speed_mps is not None else wanted.run.drive_velocity_mps
-        mass = asked.mass_kg if asked.mass_kg is not None else wanted.rig.get("mass_kg")
-        findings += [
-            *of_values(table, _as_read(wanted.channels, columns), findings),
-            *of_time(columns["t_s"], f"{path.name}: t_s"),
-        ]
-        if asked.speed_mps is not None:
-            columns.pop("drive_position_m", None)
-        return _record(path, columns, RecordFacts(speed, asked.load_N, mass), findings, "")
-    table = read_table(path)
-    guessed = guess(table, {"time": asked.time, "force": asked.force})
-    channels = _channels(table, guessed)
+        read = _by_map(path, asked, overridden(wanted, asked))
+    else:
+        read = _by_names(read_table(path, Dialect(encoding=asked.encoding)), asked)
+    record = _record(path, read.columns, read.known, read.findings, read.map_text)
+    return _piece(record._replace(starts_s=read.starts_s, counts=read.counts), asked.piece)
+
+
+def overridden(wanted: ImportMap, asked: LookOptions) -> ImportMap:
+    """A map in which the options of the command line replace its keys."""
+    source, run, rig = wanted.source, wanted.run, wanted.rig
+    channels = wanted.channels | asked.channels
+    if asked.encoding:
+        source = source.model_copy(update={"encoding": asked.encoding})
+    if asked.rate_Hz:
+        source = source.model_copy(update={"sample_rate_Hz": asked.rate_Hz})
+    if asked.speed_mps is not None:
+        run = run.model_copy(update={"drive_velocity_mps": asked.speed_mps})
+    if asked.mass_kg is not None and rig:
+        rig = rig | {"mass_kg": asked.mass_kg}
+    return wanted.model_copy(update={"source": source, "channels": channels, "run": run, "rig": rig})
+
+
+def _by_map(path: Path, asked: LookOptions, wanted: ImportMap) -> _Reading:
+    """The record as a map describes it."""
+    table = read_table(path, wanted.source.dialect, wanted.source.format)
+    columns, findings, starts_s = mapped(table, wanted.channels, wanted.source.sample_rate_Hz)
+    findings += [
+        *of_values(table, _as_read(wanted.channels, columns), findings),
+        *of_time(columns["t_s"], f"{path.name}: t_s"),
+    ]
+    if asked.speed_mps is not None:
+        columns.pop("drive_position_m", None)
+    mass_kg = asked.mass_kg if asked.mass_kg is not None else wanted.rig.get("mass_kg")
+    return _Reading(columns, RecordFacts(wanted.run.drive_velocity_mps, asked.load_N, mass_kg), findings, starts_s)
+
+
+def _by_names(table: Table, asked: LookOptions) -> _Reading:
+    """The record by the names, units and values of the columns."""
+    path = table.path
+    guessed = guess(table, {"time": asked.time, "force": asked.force, "position": asked.position})
+    channels = _channels(table, guessed) | asked.channels
+    findings = [Finding("assumed", path.name, "; ".join(guessed.reasons))] if guessed.reasons else []
     if asked.rate_Hz is None and not has_time(table, channels):
-        known = ", ".join(f'"{name}"' for name in table.columns)
-        line = f"{path.name}: no time: {no_time(table)}which column is the time, or how many rows per second are there?"
-        raise Fault("CONFIG", f'{line} Add --time "NAME" or --rate 1kHz; columns here: {known}')
-    torsion = bool(guessed.force) and (known_unit(table.unit(guessed.force)) or ("",))[0] == "torque"
+        raise Fault("CONFIG", f"{path.name}: no time: {no_time(table)}")
+    unit = own_unit(table, guessed, channels, findings)
+    torsion = bool(guessed.force) and not unit and quantity(table, channels["drive_force_N"]) == "torque"
     if asked.speed_turns not in (None, torsion):
         kind, example = ("torque", "10mrad/s or 5rpm") if torsion else ("force", "0.5mm/s")
         raise Fault("CONFIG", f"--speed: {guessed.force!r} is a {kind}: must be a speed such as {example}")
-    if torsion and guessed.position and (known_unit(table.unit(guessed.position)) or ("",))[0] == "length":
-        del channels["drive_position_m"]  # on a turning rig a length is a displacement along the axis
-        guessed = guessed._replace(position="")
-    columns, findings = mapped(table, channels, asked.rate_Hz)
-    findings = [Finding("assumed", path.name, "; ".join(guessed.reasons)), *findings, *_unitless(table, channels)]
+    if column := guessed.position:
+        rows = len(table.columns[table.find(channels["drive_force_N"].column)])
+        if torsion and quantity(table, channels["drive_position_m"]) == "length":
+            del channels["drive_position_m"]  # on a turning rig a length is a displacement along the axis
+        elif asked.rate_Hz and len(table.columns[column]) != rows:
+            del channels["drive_position_m"]
+            text = "has another number of rows than the force, and --rate is the rate of the force: not used"
+            findings.append(Finding("unused", f"{path.name}: {column}", text))
+    guessed = guessed if "drive_position_m" in channels else guessed._replace(position="")
+    columns, of_columns, starts_s = mapped(table, channels, asked.rate_Hz)
+    findings += [*of_columns, *unitless(table, channels, bool(asked.rate_Hz))]
+    if guessed.stands_in == "a position":
+        columns["drive_force_N"] = lag_of(columns["t_s"], columns["drive_force_N"])
+        text = f"column {guessed.force} is a position: how far it lies behind an even motion is looked at"
+        findings.append(Finding("lag", path.name, text))
     if torsion:
         text = f"{guessed.force!r} is a torque: the rig turns, so positions are angles in rad"
         findings.append(Finding("assumed", path.name, text))
-    load_N, of_load = asked.load_N, not guessed.force and bool(guessed.coefficient)
-    if load_N is None and guessed.load and not torsion:
-        loads_N = _si(table, guessed.load, "N", findings)
+    load_N, of_load = None if unit else asked.load_N, not guessed.force and bool(guessed.coefficient)
+    if load_N is None and guessed.load and not torsion and not unit:
+        loads_N = si(table, guessed.load, "N", findings)
         findings += of_values(table, {guessed.load: loads_N}, table.findings)
         load_N = float(np.nanmean(np.abs(loads_N))) or None
         text = (
@@ -135,8 +194,10 @@ def read_record(path: Path, asked: LookOptions) -> MeasuredRecord:
         *of_values(table, _as_read(channels, columns), findings),
         *of_time(columns["t_s"], f"{path.name}: t_s"),
     ]
-    zero_N, tare_findings = tare_of(
-        columns["drive_force_N"], columns.get("drive_position_m"), f"{path.name}: drive_force_N"
+    zero_N, tare_findings = (
+        (0.0, [])
+        if unit
+        else tare_of(columns["drive_force_N"], columns.get("drive_position_m"), f"{path.name}: drive_force_N")
     )
     findings += tare_findings
     if zero_N:
@@ -158,11 +219,38 @@ def read_record(path: Path, asked: LookOptions) -> MeasuredRecord:
         and asked.speed_mps is None
         and len(table.columns[guessed.speed]) == len(columns["t_s"])
     ):
-        speed_mps = _si(table, guessed.speed, "rad/s" if torsion else "m/s", findings)
+        speed_mps = si(table, guessed.speed, "rad/s" if torsion else "m/s", findings)
         steps_m = 0.5 * (speed_mps[1:] + speed_mps[:-1]) * np.diff(columns["t_s"])
         columns["drive_position_m"] = np.concatenate([[0.0], np.nancumsum(steps_m)])
-    known = RecordFacts(asked.speed_mps, load_N, asked.mass_kg, of_load and load_N is None, torsion)
-    return _record(path, columns, known, findings, map_text(table, channels, asked))
+    if left := unused(table, guessed):
+        findings.append(Finding("unused", path.name, f"columns: {', '.join(map(repr, left))}"))
+    known = RecordFacts(asked.speed_mps, load_N, asked.mass_kg, of_load and load_N is None, torsion, unit)
+    return _Reading(
+        columns, known, findings, starts_s, "" if unit else map_text(table, channels, asked), counts(table, channels)
+    )
+
+
+def _piece(record: MeasuredRecord, piece: int | None) -> MeasuredRecord:
+    """The record of one piece, or of all. Raises Fault CONFIG for a number without a piece."""
+    if piece is None:
+        return record
+    starts_s = record.starts_s or (-np.inf,)
+    if not 1 <= piece <= len(starts_s):
+        raise Fault("CONFIG", f"--piece {piece}: must be from 1 to {len(starts_s)}, the pieces of {record.path.name}")
+    end_s = starts_s[piece] if piece < len(starts_s) else np.inf
+    inside = (record.t_s >= starts_s[piece - 1]) & (record.t_s < end_s)
+    return record._replace(
+        t_s=record.t_s[inside],
+        force_N=record.force_N[inside],
+        position_m=None if record.position_m is None else record.position_m[inside],
+        others={name: values[inside] for name, values in record.others.items()},
+        starts_s=(),
+    )
+
+
+def pieces_of(record: MeasuredRecord) -> list[MeasuredRecord]:
+    """The record of each piece; the record itself where its time does not begin again."""
+    return [_piece(record, number) for number in range(1, len(record.starts_s) + 1)] or [record]
 
 
 def looked_at(record: MeasuredRecord) -> LookResult:
@@ -244,42 +332,12 @@ def _as_read(channels: dict[str, ChannelMap], columns: dict[str, Floats]) -> dic
     return {str(channel.column): columns[name] for name, channel in channels.items()}
 
 
-def _si(table: Table, column: str, unit: str, findings: list[Finding]) -> Floats:
-    """A load or a speed in SI units; without a stated unit it is taken as SI, with a finding."""
-    known = (weight_unit if unit == "N" else known_unit)(table.unit(column))
-    if known is None:
-        add = "--load 94.5N" if unit == "N" else "--speed 0.5mm/s"
-        text = f"states no known unit: taken as {unit}; add {add} if it is not"
-        findings.append(Finding("assumed", f"{table.path.name}: {column}", text))
-    return table.column(column) * (known[1] if known else 1.0)
-
-
-def _unitless(table: Table, channels: dict[str, ChannelMap]) -> list[Finding]:
-    """A finding for each channel without a stated unit."""
-    assumed = {"t_s": "s", "drive_force_N": "N", "drive_position_m": "m"}
-    return [
-        Finding(
-            "assumed",
-            f"{table.path.name}: {channel.column}",
-            f"states no unit: taken as {assumed[name]}; set unit = ... in a map if it is not",
-        )
-        for name, channel in channels.items()
-        if channel.scale is None
-        and not (table.unit(channel.column) or in_brackets(channel.column))
-        and not (name == "t_s" and _is_time(table, channel))
-    ]
-
-
-def _is_time(table: Table, channel: ChannelMap) -> bool:
-    times_s, counted_already = table.seconds(channel.column)
-    return counted_already or calendar_unit_s(times_s) is not None
-
-
 def map_text(table: Table, channels: dict[str, ChannelMap], asked: LookOptions) -> str:
     """Map that reproduces the reading of the file, to correct and give to `--map`."""
     lines = [f"# columns of {table.path.name} as they were read; correct mistakes and give this file to --map"]
     source: dict[str, Any] = dict(table.written)
     source.pop("columns", None)
+    channels = {name: channel for name, channel in channels.items() if name != "t_s" or asked.rate_Hz is None}
     if "t_s" not in channels and (rate_Hz := asked.rate_Hz or table.sample_rate_Hz):
         source["sample_rate_Hz"] = float(rate_Hz)
     if source:
@@ -290,7 +348,7 @@ def map_text(table: Table, channels: dict[str, ChannelMap], asked: LookOptions) 
         ]
     lines.append("[channels]")
     for name, channel in channels.items():
-        unit = table.unit(channel.column)
+        unit = channel.unit or table.unit(channel.column)
         keys = [f"column = {json.dumps(channel.column, ensure_ascii=False)}"]
         if channel.scale is not None:
             keys.append(f"scale = {channel.scale!r}")
@@ -302,17 +360,3 @@ def map_text(table: Table, channels: dict[str, ChannelMap], asked: LookOptions) 
     if asked.speed_mps is not None:
         lines += ["", "[run]", f"drive_velocity_mps = {asked.speed_mps!r}"]
     return "\n".join(lines) + "\n"
-
-
-class Looked(NamedTuple):
-    """The numbers of a file, with findings on its data and the files that were written."""
-
-    seen: LookResult
-    findings: list[Finding]
-    written: list[Path]
-    JSON_MERGED = "seen"
-
-    @in_json
-    def headline(self) -> str:
-        """The answer in one line."""
-        return headline(self.seen)

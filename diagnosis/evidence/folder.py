@@ -208,7 +208,10 @@ def read_columns(path: Path, channels: dict[str, ChannelMap], rotary: bool = Fal
             has = ", ".join(wanted) or "no standard column"
             line = f"{path.name}: t_s: missing; the file has {has}; add the column or map it in [channels]"
             raise Fault("BAD_EVIDENCE", line)
-        standard, noted = mapped(table, wanted, rotary=rotary)
+        standard, noted, starts_s = mapped(table, wanted, rotary=rotary)
+        if starts_s:
+            line = f"{path.name}: t_s: begins again: holds {len(starts_s)} runs, and must hold one"
+            raise Fault("BAD_EVIDENCE", f"{line}; `stickslip log import {path.name} --out FOLDER` makes a run of each")
     except Fault as fault:
         line = fault.line if path.name in fault.line else f"{path.name}: {fault.line}"
         raise Fault("BAD_EVIDENCE", line) from None

@@ -21,7 +21,6 @@ from bridge.tables.export import CHANNELS
 from bridge.tables.kinds import Kind
 from bridge.tables.one_clock import gaps_of
 from bridge.tables.readers import Dialect, read_table
-from bridge.tables.table import Table
 from bridge.tables.unit_words import known_unit
 from bridge.units import counted, unit_of
 from bridge.wire.messages import sensor_block
@@ -31,7 +30,7 @@ from diagnosis.evidence.conversion import with_beside
 from diagnosis.evidence.folder import examine
 from diagnosis.evidence.manifest import MANIFEST, DriveVelocity, RigTable, RunTable, manifest_text, read_manifest
 from diagnosis.evidence.manifest_keys import USUAL, ChannelMap, Columns, check_channel_names
-from diagnosis.evidence.mapped import mapped
+from diagnosis.evidence.mapped import Mapped, mapped
 from diagnosis.evidence.unknown_mass import shown_mass_kg
 
 _AGAINST = 0.3  # share of all work that the drive receives, from which the sign is wrong; a loaded spring returns some
@@ -103,36 +102,85 @@ class Imported(NamedTuple):
     columns: list[str]
     missing: list[str]  # standard columns that the source does not have
     findings: list[Finding]
+    files: list[str]  # names of all written files: one for each piece of a file whose time begins again
 
 
 def import_file(path: Path, map_path: Path, out: Path) -> Imported:
-    """Import one file; `out` is an evidence folder, to which a run is added, or a .mcap file.
+    """Import one file by a map; see `import_columns`."""
+    return import_by_map(path, validate(ImportMap, read_toml(map_path), map_path.name), map_path.name, out)
+
+
+def import_by_map(path: Path, wanted: ImportMap, map_name: str, out: Path, piece: int | None = None) -> Imported:
+    """Import one file, or one piece of it, by a map; see `import_columns`."""
+    table = read_table(path, wanted.source.dialect, wanted.source.format)
+    rotary = wanted.rig["drive"] == "torsion" if "drive" in wanted.rig else None
+    read = mapped(table, wanted.channels, wanted.source.sample_rate_Hz, rotary)
+    if "drive_force_N" in wanted.channels and not wanted.channels["drive_force_N"].unit:
+        channel = wanted.channels["drive_force_N"]
+        unit = table.unit(channel.column) if channel.scale is None else ""
+        known = {"drive_force_N": channel.model_copy(update={"unit": unit if known_unit(unit) else ""})}
+        wanted = wanted.model_copy(update={"channels": wanted.channels | known})
+    return import_columns(path, read, wanted, map_name, out, piece)
+
+
+def import_columns(
+    path: Path, read: Mapped, wanted: ImportMap, map_name: str, out: Path, piece: int | None = None
+) -> Imported:
+    """Import the columns of a file; `out` is an evidence folder, to which a run is added, or a .mcap file.
+
+    A file whose time begins again becomes a run for each piece, `NAME-1`, `NAME-2`, ..., or the run of `piece` alone.
 
     Raises Fault CONFIG for the map, BAD_TABLE for the file, BAD_EVIDENCE for its content, LOG_WRITE. Nothing
     unfinished is left behind.
     """
-    wanted = validate(ImportMap, read_toml(map_path), map_path.name)
-    table = read_table(path, wanted.source.dialect, wanted.source.format)
+    starts_s = read.starts_s or (-np.inf,)
+    if piece is not None and not 1 <= piece <= len(starts_s):
+        raise Fault("CONFIG", f"--piece {piece}: must be from 1 to {len(starts_s)}, the pieces of {path.name}")
+    done: list[Imported] = []
+    findings, refused = list(read.findings), list[Fault]()
+    for number in range(1, len(starts_s) + 1) if piece is None else [piece]:
+        columns, name, target = read.columns, path, out
+        if len(starts_s) > 1:
+            t_s = columns["t_s"]
+            end_s = starts_s[number] if number < len(starts_s) else np.inf
+            columns = {key: values[(t_s >= starts_s[number - 1]) & (t_s < end_s)] for key, values in columns.items()}
+            name = path.with_name(f"{path.stem}-{number}{path.suffix}")
+            target = out.with_name(f"{out.stem}-{number}.mcap") if out.suffix == ".mcap" else out
+        try:
+            written = _written(name, columns, wanted, map_name, target)
+        except Fault as fault:
+            if len(starts_s) < 2:
+                raise
+            refused.append(fault)
+            findings.append(Finding("pieces", f"{path.name}: piece {number}", f"left out: {fault.line}"))
+            continue
+        done.append(written)
+        findings += [
+            finding for finding in _with_sign(written.findings, name.name, columns, wanted) if finding not in findings
+        ]
+    if not done:
+        raise refused[0]
+    rows, files = sum(part.rows for part in done), [part.file for part in done]
+    return done[0]._replace(rows=rows, findings=findings, files=files)
+
+
+def _written(path: Path, columns: Columns, wanted: ImportMap, map_name: str, out: Path) -> Imported:
     try:
-        rotary = wanted.rig["drive"] == "torsion" if "drive" in wanted.rig else None
-        columns, findings = mapped(table, wanted.channels, wanted.source.sample_rate_Hz, rotary)
         if out.suffix == ".mcap":
             _check_free(out)
-            done = _to_log(path, columns, out)
-        else:
-            done = _to_folder(path, columns, wanted, map_path.name, out)
-        return done._replace(findings=findings + _with_sign(done.findings, path.name, columns, wanted, table))
+            return _to_log(path, columns, out)
+        return _to_folder(path, columns, wanted, map_name, out)
     except OSError as error:
         raise Fault("LOG_WRITE", f"{out}: {error.strerror or error}; choose another --out") from None
 
 
-def _with_sign(findings: list[Finding], file: str, columns: Columns, wanted: ImportMap, table: Table) -> list[Finding]:
+def _with_sign(findings: list[Finding], file: str, columns: Columns, wanted: ImportMap) -> list[Finding]:
     """The findings, with a line to copy where the force has the wrong sign."""
     kept = [finding for finding in findings if finding.kind != "sign" or not finding.where.endswith("drive_force_N")]
     if len(kept) == len(findings) and not _pulls_back(columns):
         return findings
     channel = wanted.channels["drive_force_N"]
-    known = known_unit(channel.unit or table.unit(channel.column))
+    known = known_unit(channel.unit)
     scale = channel.scale if channel.scale is not None else known[1] if known is not None else 1.0
     offset = f", offset = {-channel.offset!r}" if channel.offset else ""
     line = (
@@ -203,7 +251,7 @@ def _to_folder(path: Path, columns: Columns, wanted: ImportMap, map_name: str, o
         if created and not any(out.iterdir()):
             out.rmdir()
     missing = [name for name in USUAL if name not in columns]
-    return Imported(out, run.file, len(columns["t_s"]), list(columns), missing, findings)
+    return Imported(out, run.file, len(columns["t_s"]), list(columns), missing, findings, [run.file])
 
 
 def write_run(folder: Path, columns: Columns, rig: RigTable, runs: list[RunTable], assumed: list[str]) -> None:
@@ -293,4 +341,4 @@ def _to_log(path: Path, columns: Columns, out: Path) -> Imported:
         log.path.replace(followed(out))
     remove_verdict(out)
     logged = [name for name in CHANNELS if name in columns]
-    return Imported(out, out.name, int((~lacking).sum()) * _BLOCK_SAMPLES, logged, missing, findings)
+    return Imported(out, out.name, int((~lacking).sum()) * _BLOCK_SAMPLES, logged, missing, findings, [out.name])

@@ -10,8 +10,9 @@ from bridge.arrays import Floats
 from bridge.faults import Fault
 from bridge.log.finding import Finding
 from bridge.tables.one_clock import Sampled, on_one_clock, own_rows, with_own_rows
+from bridge.tables.pieces import in_pieces
 from bridge.tables.table import Table
-from bridge.tables.unit_words import in_brackets, known_unit, si_unit, weight_unit
+from bridge.tables.unit_words import known_unit, si_unit, weight_unit
 from bridge.units import counted
 from diagnosis.evidence.manifest_keys import STANDARD, ChannelMap, Columns
 
@@ -33,6 +34,7 @@ class Mapped(NamedTuple):
 
     columns: Columns
     findings: list[Finding]
+    starts_s: tuple[float, ...] = ()  # start of each piece, where the time begins again; empty for a single piece
 
 
 def mapped(
@@ -40,7 +42,7 @@ def mapped(
 ) -> Mapped:
     """The standard columns that `channels` names.
 
-    The time is taken from its column, from `sample_rate_Hz`, or from the clock in the file. `rotary`: a rotary rig; None:
+    The time is taken from `sample_rate_Hz`, else from its column, else from the clock in the file. `rotary`: a rotary rig; None:
     unknown, so both N and N m are accepted.
 
     Raises Fault BAD_TABLE for a column that is missing, is of another length or of another quantity; CONFIG without a time.
@@ -52,13 +54,19 @@ def mapped(
         if name in channels and name != "t_s"
     }
     file = table.path.name
-    if "t_s" in channels:
-        t_s = _time(table, channels["t_s"], findings)
+    if "t_s" in channels and sample_rate_Hz is not None:
+        text = (
+            f"column {channels['t_s'].column} is not used as the time: the rate of {sample_rate_Hz:.9g} Hz replaces it"
+        )
+        findings.append(Finding("time", f"{file}: t_s", text))
+    elif "t_s" in channels:
+        t_s, starts_s, of_pieces = in_pieces(_time(table, channels["t_s"], findings), table.segments, f"{file}: t_s")
+        findings += of_pieces
         _same_length(table, channels, values, len(t_s), "the time")
         if with_own_rows(t_s, values):
             t_s, values, moved = on_one_clock(own_rows(t_s, values), file)
             findings += moved
-        return Mapped({"t_s": t_s} | values, table.findings + findings)
+        return Mapped({"t_s": t_s} | values, table.findings + findings, starts_s)
     clocks = {name: table.clocks.get(table.find(channels[name].column)) for name in values}
     if sample_rate_Hz is None and values and all(clock is not None for clock in clocks.values()):
         sampled = {
@@ -76,7 +84,10 @@ def mapped(
         findings.append(Finding("assumed", file, f"sample_rate_Hz = {rate_Hz:.9g}, as the file states"))
     rows = len(next(iter(values.values())))
     _same_length(table, channels, values, rows, "the first channel")
-    return Mapped({"t_s": np.arange(rows) / rate_Hz} | values, table.findings + findings)
+    begins = [segment.row for segment in table.segments] or [0]
+    t_s = (np.arange(rows) - np.repeat(begins, np.diff([*begins, rows]))) / rate_Hz
+    t_s, starts_s, of_pieces = in_pieces(t_s, table.segments, file)
+    return Mapped({"t_s": t_s} | values, table.findings + findings + of_pieces, starts_s)
 
 
 def _sampled(times_s: Floats, values: Floats) -> Sampled:
@@ -117,7 +128,7 @@ def _factor(table: Table, name: str, channel: ChannelMap, findings: list[Finding
     known = None if not unit else weight_unit(unit) if STANDARD[name].quantity == "force" else known_unit(unit)
     if known is None:
         column = table.find(channel.column)
-        stated = in_brackets(column)
+        stated = table.stated_unit(column)
         if stated and not unit:  # an unknown unit in a line of units is reported where that line is read
             text = f"column {column}: {stated!r} is not a known unit: the values are used unscaled; a map may give scale = ..."
             findings.append(Finding("units", f"{table.path.name}: {name}", text))

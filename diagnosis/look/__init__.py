@@ -6,6 +6,7 @@ laid_over    breakaway force, durations of slip and stick, from all slips of a r
 slip_shape   sliding friction and the swing's frequency from all falls laid over each other
 sticks       values of each slip and of the stick before it; whether a position belongs to the drive or to the slide
 numbers      numbers with intervals of 90 %
+motion       stick-slip in a following error, a motor current or a position, without a force
 speeds       friction over speed, and over the dwell before a slip; whether breakaway or speed drifts
 look         all numbers of one record
 words        a sentence for each number

@@ -11,7 +11,8 @@ from bridge.tables.table import Table
 from bridge.tables.unit_words import bare_name, known_unit, weight_unit
 
 _NAMES = {
-    "time": r"^(t|ts|time|zeit|x_value|timestamp|elapsed.*|.*\btime\b.*|.*zeit.*|__time|%time|.*stamp.*|sekunden|seconds)$",
+    "time": r"^(t|ts|time|zeit|x_value|timestamp|elapsed.*|.*\btime\b.*|.*zeit.*|__time|%time|.*stamp.*|sekunden"
+    r"|seconds?|m?sec|ms|us|(milli|micro|nano)s(ec(ond)?s?)?|temps|czas|tiempo|tempo|время|时间|時間)$",
     "coefficient": r"(^|[^a-z])(mu|µ|cof|c\.o\.f)([^a-z]|$)|coeff.*(fric|trac)|(fric|trac).*coeff"
     r"|reib(bei)?wert|reibungskoeff|reibzahl",
     "load": r"normal|(^|[^a-z])(fz|fn|f_n|f_z|load|last)([^a-z]|$)|auflast|anpress",
@@ -28,7 +29,14 @@ _QUANTITIES = {
     "position": ("length", "angle"),
     "speed": ("velocity", "angular velocity"),
     "coefficient": ("share",),
+    "frequency": ("frequency",),
 }
+# columns that show stick-slip where no force is measured, the clearest first
+_STAND_INS = {
+    "a following error": r"foll.*err|(^|[^a-z])f?_?err(or)?([^a-z]|$)|schlepp|nachlauf|(^|[^a-z])lag([^a-z]|$)|regelabw|contour",
+    "a motor current or torque": r"current|strom|torque|moment|(^|[^a-z])i_?[qa]?([^a-z]|$)|load ?%|auslastung|effort",
+}
+_FREQUENCY = r"^freq(uency|uenz)?s?$"  # first column of a spectrum
 _FEWEST_STEPS = 8
 # columns that are never used as force, load, speed or position, even if their name matches
 _OTHER = re.compile(r"acc|beschl|temp|humid|feucht|count|zyklus|cycle|voltage|current", re.IGNORECASE)
@@ -47,6 +55,9 @@ class Guess(NamedTuple):
     speed: str
     coefficient: str
     reasons: list[str]
+    stands_in: str = (
+        ""  # content of the column of the force, if it holds another quantity: an error, a current, a position
+    )
 
 
 def guess(table: Table, given: dict[str, str]) -> Guess:
@@ -72,8 +83,15 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
         reasons.append(f"force = {chosen['force']!r}, as no other column is one")
     left = [name for name in numeric if name not in chosen.values()]
     if "time" not in chosen and not table.clocks:
-        # with a column that numbers the rows, an evenly rising one may be the position of an even drive
-        clocks = [] if any(_numbers_rows(table, name) for name in left) else left
+        if spectrum := next((name for name in left if _is_frequency(table, name) and _rises(table, name)), ""):
+            line = f"column {spectrum!r} is a frequency, so this is a spectrum: must be a record over time"
+            raise Fault(
+                "CONFIG",
+                f"{table.path.name}: {line}; give the record that it was made from, or name another column by --time",
+            )
+        # with a column that numbers the rows, or one named as a time, an evenly rising one may be the position of an even drive
+        named = any(re.search(_NAMES["time"], bare_name(name), re.IGNORECASE) for name in table.columns)
+        clocks = [] if named or any(_numbers_rows(table, name) for name in left) else left
         clues = (
             ([name for name in table.columns if name not in numeric], _has_dates, "holds times"),
             (left, _rises_in_time, "rises evenly and has a unit of time"),
@@ -85,6 +103,13 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
                 reasons.append(f"time = {name!r}, which {why}")
                 break
     left = [name for name in numeric if name not in chosen.values()]
+    stands_in = ""
+    if "force" not in chosen and "coefficient" not in chosen and not any(_in(table, name, "force") for name in left):
+        stands_in, chosen["force"] = _stand_in(table, left, chosen.get("position", ""))
+        if stands_in:
+            reasons.append(f"no force: {stands_in} {chosen['force']!r} shows stick-slip in its place")
+        else:
+            del chosen["force"]
     if "force" not in chosen and "coefficient" not in chosen:
         by_unit = [name for name in left if _in(table, name, "force")]
         if len(by_unit) != 1:
@@ -106,7 +131,16 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
             reasons.append(f"no {what}, as column {empty!r} holds no number")
     kinds = ("time", "force", "load", "position", "speed", "coefficient")
     time, force, load, position, speed, coefficient = (chosen.get(what, "") for what in kinds)
-    return Guess(time, force, load, position, speed, coefficient, reasons)
+    return Guess(time, force, load, "" if position == force else position, speed, coefficient, reasons, stands_in)
+
+
+def _stand_in(table: Table, left: list[str], position: str) -> tuple[str, str]:
+    """The quantity that shows stick-slip where no column is a force, and its column; empty without such a column."""
+    moving = [name for name in left if not _flat(table, name)]
+    for what, pattern in _STAND_INS.items():
+        if name := next((name for name in moving if re.search(pattern, bare_name(name), re.IGNORECASE)), ""):
+            return what, name
+    return ("a position", position) if position and not _flat(table, position) else ("", "")
 
 
 def _in(table: Table, name: str, what: str) -> bool:
@@ -124,14 +158,31 @@ def _refuse_empty_force(table: Table, numeric: list[str]) -> None:
 
 
 def no_time(table: Table) -> str:
-    """A message for a column that is named as a time and holds unreadable text; empty without such a column."""
+    """The question for the time, with the reason why a column that is named as a time holds none."""
+    known = ", ".join(f'"{name}"' for name in table.columns)
+    ask = 'which column is the time, or how many rows per second are there? Add --time "NAME" or --rate 1kHz'
+    ask += f"; columns here: {known}"
     for name, values in table.columns.items():
         if re.search(_NAMES["time"], bare_name(name), re.IGNORECASE):
             try:
                 table.column(name)
             except Fault:
-                return f"column {name!r} begins with {str(values[0])[:40]!r}, which is not read as a number, date or clock time; "
-    return ""
+                begin = str(values[0])[:40]
+                return (
+                    f"column {name!r} begins with {begin!r}, which is not read as a number, date or clock time; {ask}"
+                )
+    return ask
+
+
+def unused(table: Table, guessed: Guess) -> list[str]:
+    """Columns with numbers that are not read, each once."""
+    used = {guessed.time, guessed.force, guessed.load, guessed.position, guessed.speed, guessed.coefficient}
+    same = {id(table.columns[name]) for name in used if name}
+    return [
+        name
+        for name in _numeric(table)
+        if name not in used and id(table.columns[name]) not in same and name not in table.own_times.values()
+    ]
 
 
 def _empty(table: Table, what: str, numeric: list[str]) -> str:
@@ -197,9 +248,15 @@ def _named(table: Table, what: str, names: list[str]) -> str:
         quantity = ((weight_unit if what in ("force", "load") else known_unit)(unit) or ("",))[0]
         if quantity and quantity not in _QUANTITIES[what]:
             continue
+        if what == "position" and not quantity and _numbers_rows(table, name):
+            continue
         if pattern.search(bare_name(name).lstrip("/").split("/")[-1]) or pattern.search(bare_name(name)):
             return name
     return ""
+
+
+def _is_frequency(table: Table, name: str) -> bool:
+    return re.search(_FREQUENCY, bare_name(name), re.IGNORECASE) is not None or _in(table, name, "frequency")
 
 
 def _has_times(table: Table, name: str) -> bool:

@@ -9,8 +9,9 @@ import numpy as np
 from bridge.arrays import Floats
 from bridge.results import in_json
 from diagnosis.look.laid_over import breakaway_of, with_slip_times
+from diagnosis.look.motion import StickSlip, best_way
 from diagnosis.look.numbers import Number, jackknifed, mean_of
-from diagnosis.look.slip_shape import Shape, falls_of, shape_of
+from diagnosis.look.slip_shape import Shape, falls_of, hidden_by_damping_N, shape_of
 from diagnosis.look.slips import OneWayPart, RecordSlips, find_slips, parts_of
 from diagnosis.look.speeds import AtSpeed, over_dwell, over_speed
 from diagnosis.look.sticks import Cycle, cycles_of
@@ -25,8 +26,23 @@ _MU = {
     "dwell_N_per_decade": "mu_dwell_per_decade",
 }
 
+_OF_SPRING = ("series_N_per_m", "stiffness_N_per_m", "mass_kg")  # numbers that only a force gives
+
 # unit of a linear rig -> unit of a rotary rig
 _TURNING = {"N": "N m", "N/s": "N m/s", "N/m": "N m/rad", "kg": "kg m²", "N per decade": "N m per decade"}
+
+# Errors that all slips of a record share, so that their scatter does not show them. From 16 axes of `bench.control.drawn` at 1
+# and 10 kHz and 43 rigs of `tests.look`, half with a damped drive, against the numbers of the friction law; 24 other axes are in
+# docs/guides/look.md. Larger: wider intervals, which hold more often.
+# F_s may be lower, in rises of the force until the slide is as fast as its drive (0 to 0.43 on the axes), and higher, as a share
+# of F_s - F_k (creep: 0.04 in the middle, 0.5 on the softest contact).
+_FALLS_SLOWLY, _CREEPS = 0.4, 0.06
+# Stiffness: shares by which the correction for the contact may be too large or small (0.46 and 0.82 at most, except on 2 rigs).
+_TOO_MUCH, _TOO_LITTLE = 0.5, 0.75
+# Fewest samples of a stick from which a stiffness comes. At 5 to 13 it was 8 to 33 % too small on 7 drawn axes, as the ring of a
+# re-stick fills the climb; from 17 on 0 to 4 % wrong. Larger: records of fast axes give none.
+_FEWEST_OF_STICK = 16
+_OF_A_SAMPLE = 0.25  # of a sample, by which a fall may last longer or shorter: 5 % of the mass for 10 samples
 
 
 class RecordFacts(NamedTuple):
@@ -37,11 +53,17 @@ class RecordFacts(NamedTuple):
     mass_kg: float | None = None  # mass of the slide
     coefficient: bool = False  # the record holds the force over an unknown load
     torsion: bool = False  # the rig is rotary: forces are torques, ways are angles
+    unit: str = ""  # unit of a record that holds no force: a motor current, a following error; empty for a force
 
     @property
     def force_unit(self) -> str:
         """Unit of the record's force or coefficient."""
-        return "1" if self.coefficient else "N m" if self.torsion else "N"
+        return self.unit or ("1" if self.coefficient else "N m" if self.torsion else "N")
+
+    @property
+    def follows(self) -> bool:
+        """Whether the record is a following error: its sign changes in each slip."""
+        return self.unit in ("m", "rad")
 
     @property
     def speed_unit(self) -> str:
@@ -62,7 +84,13 @@ class LookResult(NamedTuple):
     parts: list[OneWayPart]
     known: RecordFacts
     mean_force_N: float
-    JSON_HIDDEN = "cycles", "sticks", "parts", "known"
+    answer: StickSlip | None  # whether a record without a force shows stick-slip; None for a force
+    JSON_HIDDEN = "cycles", "sticks", "parts", "known", "answer"
+
+    @in_json
+    def stick_slip(self) -> str:
+        """Whether the record shows stick-slip."""
+        return self.answer.answer if self.answer is not None else "yes" if self.sticks else "no"
 
     @in_json
     def swings_without_stick(self) -> int:
@@ -80,14 +108,18 @@ def look(
 ) -> LookResult | None:
     """Look at a record: time, force and drive position, [samples] each, SI units. None where it is too short."""
     known = known or RecordFacts()
-    parts = parts_of(t_s, force_N, position_m)
+    parts = parts_of(t_s, force_N, position_m, not known.follows)
     if not parts:
         return None
     slips_of_parts = [slips for slips in (find_slips(part) for part in parts) if slips is not None]
+    answer = None
+    if known.unit:
+        parts, slips_of_parts, answer = best_way(parts, known.follows)
     cycles = [cycle for slips in slips_of_parts for cycle in cycles_of(slips, known.speed_mps)]
     weights = [len(slips.tops) for slips in slips_of_parts]
     straight = [slips.straight for slips in slips_of_parts]
     sticks = bool(slips_of_parts) and float(np.average(straight, weights=weights)) >= 0.5
+    sticks = sticks if answer is None else answer.answer == "yes"
     seconds = sum(float(part.t_s[-1] - part.t_s[0]) for part in parts)
     step_s = float(np.median([part.step_s for part in parts]))
     numbers: dict[str, Number] = {}
@@ -106,6 +138,14 @@ def look(
     mean_N = float(np.average([part.force_N.mean() for part in parts], weights=[len(part.t_s) for part in parts]))
     if known.coefficient:
         numbers = _of_coefficient(numbers)
+    elif known.unit:
+        numbers = {
+            name: number._replace(unit=re.sub(r"^N\b", known.unit, number.unit))
+            for name, number in numbers.items()
+            if name not in _OF_SPRING
+        }
+        if "period_s" in numbers:
+            numbers["frequency_Hz"] = _inverse(numbers["period_s"], "Hz")
     elif known.torsion:
         numbers = {
             name: number._replace(unit=_TURNING.get(number.unit, number.unit)) for name, number in numbers.items()
@@ -123,7 +163,12 @@ def look(
         parts,
         known,
         mean_N,
+        answer,
     )
+
+
+def _inverse(number: Number, unit: str) -> Number:
+    return Number(1.0 / number.value, 1.0 / number.high, 1.0 / number.low, unit)
 
 
 def _of_coefficient(numbers: dict[str, Number]) -> dict[str, Number]:
@@ -131,7 +176,7 @@ def _of_coefficient(numbers: dict[str, Number]) -> dict[str, Number]:
     return {
         _MU.get(name, name): number._replace(unit=re.sub(r"^N\b", "1", number.unit))
         for name, number in numbers.items()
-        if name not in ("series_N_per_m", "stiffness_N_per_m", "mass_kg")
+        if name not in _OF_SPRING
     }
 
 
@@ -151,18 +196,20 @@ def _of_cycles(slips_of_parts: list[RecordSlips], cycles: list[Cycle], step_s: f
         "dwell_s": mean_of([cycle.dwell_s for cycle in stuck], "s", 0.3 * step_s),
         "slip_s": mean_of(durations, "s", 0.3 * step_s),
         "slope_N_per_s": mean_of([cycle.slope_N_per_s for cycle in stuck], "N/s"),
-    } | _stiffness(stuck)
+    } | _stiffness(stuck, step_s)
     if numbers["static_force_N"] is not None:
         numbers["static_force_N"] = breakaway_of(slips_of_parts, numbers["static_force_N"])
     return with_slip_times({name: number for name, number in numbers.items() if number is not None}, slips_of_parts)
 
 
-def _stiffness(stuck: list[Cycle]) -> dict[str, Number | None]:
+def _stiffness(stuck: list[Cycle], step_s: float) -> dict[str, Number | None]:
     """Stiffness of the drive, and stiffness of drive and contact in series; the latter alone where sticks hide the contact.
 
-    The contact's compliance comes from a formula, so the interval is widened by all of it, both ways; where the sticks do not
-    resolve it, by the largest compliance that they allow.
+    The contact's compliance comes from a formula, so the interval is widened by shares of its correction; where the sticks do
+    not resolve it, by the largest compliance that they allow.
     """
+    if not float(np.median([cycle.dwell_s for cycle in stuck])) >= _FEWEST_OF_STICK * step_s:
+        return {}
     series = mean_of([cycle.stiffness_N_per_m for cycle in stuck], "N/m")
     drive = mean_of([cycle.drive_m_per_N for cycle in stuck], "m/N")
     if series is None or drive is None or not drive.low > 0.0:
@@ -171,8 +218,9 @@ def _stiffness(stuck: list[Cycle]) -> dict[str, Number | None]:
     if not 1.0 / series.value - drive.value > 2.0 * (drive.high - drive.value):
         return {"stiffness_N_per_m": series._replace(high=max(series.high, 1.0 / drive.low))}
     value = 1.0 / drive.value
-    more = abs(value - series.value)
-    stiffness = Number(value, 1.0 / drive.high - more, 1.0 / drive.low + more, "N/m")
+    correction = abs(value - series.value)
+    low, high = 1.0 / drive.high - _TOO_MUCH * correction, 1.0 / drive.low + _TOO_LITTLE * correction
+    stiffness = Number(value, low, high, "N/m")
     return {"series_N_per_m": series, "stiffness_N_per_m": stiffness}
 
 
@@ -198,8 +246,15 @@ def _of_falls(slips_of_parts: list[RecordSlips], numbers: dict[str, Number]) -> 
     if alternative is not None:
         kinetic = kinetic.wider(alternative.force_N - shape.force_N)
         omega = omega.wider(alternative.omega_rad_per_s - shape.omega_rad_per_s)
-    result = {"kinetic_force_N": kinetic, "omega_rad_per_s": omega, "static_force_N": _breakaway(shape, numbers)}
-    if "stiffness_N_per_m" in numbers:
+    kinetic = kinetic._replace(low=kinetic.low - hidden_by_damping_N(falls, shape))
+    step_s = max(slips.part.step_s for slips in slips_of_parts)
+    omega = omega.wider(_OF_A_SAMPLE * shape.omega_rad_per_s * step_s / falls.length_s)
+    result = {
+        "kinetic_force_N": kinetic,
+        "omega_rad_per_s": omega,
+        "static_force_N": _breakaway(shape, numbers, step_s),
+    }
+    if "stiffness_N_per_m" in numbers and shape.is_swing:
         stiffness = numbers["stiffness_N_per_m"]
         mass_kg = stiffness.value / omega.value**2
         share = math.hypot(
@@ -209,17 +264,19 @@ def _of_falls(slips_of_parts: list[RecordSlips], numbers: dict[str, Number]) -> 
     return result
 
 
-def _breakaway(shape: Shape, numbers: dict[str, Number]) -> Number:
-    """The mean force at breakaway; the interval reaches down to the lowest static friction that the record allows.
+def _breakaway(shape: Shape, numbers: dict[str, Number], step_s: float) -> Number:
+    """The mean force at breakaway; the interval holds the static friction of a friction law too.
 
     The force rises further until the slide is as fast as its drive. For friction that falls at once
-    (top - F_k)^2 = (F_s - F_k)^2 + (slope / w)^2; for friction that falls slowly F_s is lower.
+    (top - F_k)^2 = (F_s - F_k)^2 + (slope / w)^2; for friction that falls slowly, and where the drive damps, F_s is lower. It is
+    higher where the contact creeps before it breaks away, and where the peak lies between two samples.
     """
     top = numbers["static_force_N"]
     above = top.value - shape.force_N
     rise = numbers["slope_N_per_s"].value / shape.omega_rad_per_s if "slope_N_per_s" in numbers else 0.0
-    least = shape.force_N + math.sqrt(max(above**2 - rise**2, 0.0))
-    return top._replace(low=min(top.low, least - (top.value - top.low)))
+    least = shape.force_N + math.sqrt(max(above**2 - rise**2, 0.0)) - _FALLS_SLOWLY * rise
+    between = above * (shape.omega_rad_per_s * step_s) ** 2 / 8.0
+    return top._replace(low=min(top.low, least - (top.value - top.low)), high=top.high + _CREEPS * above + between)
 
 
 def _between_samples(numbers: dict[str, Number], step_s: float) -> dict[str, Number]:

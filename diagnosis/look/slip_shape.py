@@ -38,6 +38,7 @@ class Shape(NamedTuple):
     omega_rad_per_s: float  # angular frequency of the slide on the drive's spring
     ratio: float  # decay over frequency
     parameters: tuple[float, ...]  # solution of the fit; start of the fits of subsets
+    is_swing: bool = True  # False: no decay fits, as where friction and not the mass sets the speed of the fall
 
 
 class StackedFalls(NamedTuple):
@@ -98,7 +99,12 @@ def shape_of(falls: StackedFalls) -> tuple[Shape | None, list[Shape], Shape | No
         ratio = jackknifed(decaying.ratio, [partial.ratio for partial in partials], "1")
         if ratio.value > _SURE * (ratio.high - ratio.value):
             return decaying, partials, even
-    return even, even_partials, _even(falls, even, _LESS)
+    return even._replace(is_swing=decaying is not None), even_partials, _even(falls, even, _LESS)
+
+
+def hidden_by_damping_N(falls: StackedFalls, shape: Shape) -> float:
+    """By how much the sliding friction may be lower than the middle of a fall: a decay below `_LEAST_DECAY` is not seen."""
+    return 0.0 if shape.ratio else (0.5 - _level(_LEAST_DECAY)) * (falls.top_N - falls.bottom_N)
 
 
 def _decaying(falls: StackedFalls, near: Shape | None) -> Shape | None:

@@ -54,8 +54,11 @@ class OneWayPart(NamedTuple):
         return float(self.t_s[-1] - self.t_s[0]) / (len(self.t_s) - 1)
 
 
-def parts_of(t_s: Floats, force_N: Floats, position_m: Floats | None = None) -> list[OneWayPart]:
-    """The even parts of a record, [samples] each, without samples that hold no number or go back in time."""
+def parts_of(t_s: Floats, force_N: Floats, position_m: Floats | None = None, turns: bool = True) -> list[OneWayPart]:
+    """The even parts of a record, [samples] each, without samples that hold no number or go back in time.
+
+    `turns`: the force changes its sign where the drive turns.
+    """
     columns = [t_s, force_N] if position_m is None else [t_s, force_N, position_m]
     columns = [column[np.isfinite(columns).all(axis=0)] for column in columns]
     latest_s = np.maximum.accumulate(np.concatenate([[-np.inf], columns[0]]))
@@ -66,7 +69,7 @@ def parts_of(t_s: Floats, force_N: Floats, position_m: Floats | None = None) -> 
     step_s = float(np.median(np.diff(t_s)))
     gaps = np.flatnonzero(np.diff(t_s) > _GAP_STEPS * step_s) + 1
     edges = np.unique(np.concatenate([[0], gaps, [len(t_s)]]))
-    edges = np.unique(np.concatenate([edges, _turns(force_N)]))
+    edges = np.unique(np.concatenate([edges, _turns(force_N)])) if turns else edges
     parts: list[OneWayPart] = []
     for first, last in pairwise(edges.tolist()):
         if last - first < FEWEST:

@@ -8,10 +8,13 @@ from typing import NamedTuple
 from bridge.faults import Fault
 from bridge.log.finding import Finding
 from bridge.tables.text.dialect import BLANK, Dialect, TextLayout
-from bridge.tables.unit_words import is_unit_row, known_unit, unknown_units
+from bridge.tables.text.properties import properties_above, with_increment
+from bridge.tables.unit_words import in_brackets, is_unit_row, known_unit, unit_in_name, unknown_units
 
 COMMENTS = ("#", "%", "//", "!", "*", ";;", "'")
 _CONFIRMED = 5  # number of lines after the first row of which at least half must be rows too
+_SYMBOL = 2  # longest symbol of a quantity that may be a unit too, as in `t, m`
+_FIRST_ROWS = 20  # first rows that show the full number of columns
 _LABEL = "Y_Unit_Label"  # start of LabVIEW's line of units, each above its column
 _MOST_ABOVE = 6  # lines above the first row in which names are searched
 _RATE = re.compile(
@@ -21,8 +24,9 @@ _RATE = re.compile(
     re.IGNORECASE,
 )
 _STEP = re.compile(
-    r"(?:delta_?[xt]|dt|(?:sampl|abtast)\w*[ _\-]?(?:interval|intervall|period|time|zeit|schritt))[^\w+-]*(?:\[(?P<u1>\w+)\]\W*)?"
-    r"(?P<value>\d[\d.,]*(?:[eE][-+]?\d+)?)\s*(?P<unit>ms|µs|us|s)?\b",
+    r"(?:delta_?[xt]|dt|(?:sampl|abtast)\w*[ _\-]?(?:interval|intervall|period|time|zeit|schritt))[^\w+-]*(?:is\s+)?"
+    r"(?:\[(?P<u1>\w+)\]\W*)?"
+    r"(?P<value>\d[\d.,]*(?:[eE][-+]?\d+)?)\s*(?P<unit>ms|µs|us|ns|s)?\b",
     re.IGNORECASE,
 )
 
@@ -36,6 +40,12 @@ class Head(NamedTuple):
     units: list[str]  # as many as there are columns, or none
     units_line: int  # from 0; -1: missing
     step_s: float | None  # time between rows, if a line above them states it
+    numeric: list[bool]  # whether each column has values in most rows
+    comment: str | None
+
+    def is_row(self, line: str, form: TextLayout) -> bool:
+        """Whether a line may be a row of numbers."""
+        return _is_row(line, form, len(self.names), self.numeric, self.comment)
 
     @property
     def unit_of(self) -> dict[str, str]:
@@ -65,21 +75,47 @@ def read_head(lines: Sequence[str], body: Sequence[str], form: TextLayout, given
     Raises Fault BAD_TABLE without a row of numbers.
 
     """
-    width, numeric = _columns(body, form)
+    width, numeric = _columns(_first_values(lines, form), form)
+    usual, of_body = _columns(body, form)
+    if width <= usual or given.skip_rows is not None:
+        width, numeric = usual, of_body
     first = _first_row(lines, form, width, numeric, given)
     if first is None:
         line = f"{file}: no row of numbers with {width} cells, separated by {form.delimiter!r}, in the first {len(lines)} lines"
         raise Fault("BAD_TABLE", f"{line}; state source.delimiter and source.skip_rows")
-    names_line, units_line = _names_above(lines, first, form, width, given)
-    names = list(given.names or [])
-    if not names and names_line >= 0:
-        names = _named(lines[names_line], form, width)
+    above, step_s = with_increment(lines[:first], form)
+    block = None if given.names or given.skip_rows is not None else properties_above(above, form, width)
+    if block is not None:
+        names_line, units_line, names, units, of_block = block
+        step_s = step_s or of_block
+    else:
+        names_line, units_line = _names_above([*above, *lines[first : first + 2]], first, form, width, given)
+        names = list(given.names or [])
+        if not names and names_line >= 0:
+            names = _named(above[names_line], form, width)[:width]
+        if units_line < 0 and given.units_row is not False:
+            units_line = next((at for at in range(first - 1, -1, -1) if lines[at].startswith(_LABEL)), -1)
+        units = (
+            [unit.strip().strip("[]()") for unit in _named(above[units_line], form, width)] if units_line >= 0 else []
+        )
+        units = ["" if unit == _LABEL else unit for unit in (units + [""] * width)[:width]] if units else []
+    if not units and len(names) == width and all(map(known_unit, names)) and any(len(name) > _SYMBOL for name in names):
+        units = names  # `Second,Volt` is a line of units in the place of names
     names = _each_once([name.strip() for name in names], width)
-    if units_line < 0 and given.units_row is not False:
-        units_line = next((at for at in range(first - 1, -1, -1) if lines[at].startswith(_LABEL)), -1)
-    units = [unit.strip().strip("[]()") for unit in _named(lines[units_line], form, width)] if units_line >= 0 else []
-    units = ["" if unit == _LABEL else unit for unit in (units + [""] * width)[:width]] if units else []
-    return Head(first, names_line, names, units, units_line, _step_s(lines[:first]))
+    step_s = step_s or (_step_s(above) if block is None else None)
+    return Head(first, names_line, names, units, units_line, step_s, numeric, given.comment)
+
+
+def _first_values(lines: Sequence[str], form: TextLayout) -> list[str]:
+    """The first lines of values alone: where channels end sooner than others, later rows are shorter."""
+    values: list[str] = []
+    for line in lines:
+        cells = form.cells(line)
+        if len(cells) > 1 and form.is_number(cells[0]) and all(map(form.is_value, cells)):
+            values.append(line)
+            if len(values) == _FIRST_ROWS:
+                break
+    return values
 
 
 def _columns(body: Sequence[str], form: TextLayout) -> tuple[int, list[bool]]:
@@ -96,12 +132,7 @@ def _first_row(lines: Sequence[str], form: TextLayout, width: int, numeric: list
     """The number of the line that holds the first row, from 0; None without a row."""
 
     def is_row(line: str) -> bool:
-        if line.lstrip().startswith(given.comment or COMMENTS):
-            return False
-        cells = form.cells(line)
-        if abs(len(cells) - width) > 1 or not any(form.is_number(cell) for cell in cells):
-            return False
-        return all(form.is_value(cell) for cell, value in zip(cells, numeric, strict=False) if value)
+        return _is_row(line, form, width, numeric, given.comment)
 
     begin = 0 if given.skip_rows is None else given.skip_rows + (0 if given.names else 1)
     for at in range(begin, len(lines)):
@@ -111,6 +142,15 @@ def _first_row(lines: Sequence[str], form: TextLayout, width: int, numeric: list
         if 2 * sum(map(is_row, following)) >= len(following):
             return at
     return None
+
+
+def _is_row(line: str, form: TextLayout, width: int, numeric: list[bool], comment: str | None) -> bool:
+    if line.lstrip().startswith(comment or COMMENTS):
+        return False
+    cells = form.cells(line)
+    if abs(len(cells) - width) > 1 or not any(form.is_number(cell) for cell in cells):
+        return False
+    return all(form.is_value(cell) for cell, value in zip(cells, numeric, strict=False) if value)
 
 
 def _names_above(lines: Sequence[str], first: int, form: TextLayout, width: int, given: Dialect) -> tuple[int, int]:
@@ -127,6 +167,8 @@ def _names_above(lines: Sequence[str], first: int, form: TextLayout, width: int,
                 break
             continue
         cells = _named(lines[at], form, width)
+        if len(cells) == width + 1 and width > 1 and re.fullmatch(r"\W*|.*:\s*", cells[-1]):
+            cells = cells[:-1]  # a label behind the last name
         fits = len(cells) == width and any(cell.strip() and not form.is_number(cell) for cell in cells)
         if fits:
             fitting.append(at)
@@ -165,8 +207,9 @@ def _named(line: str, form: TextLayout, width: int) -> list[str]:
         cells = form.cells(text)
     while len(cells) > width and (not cells[-1].strip() or cells[-1].strip().lower() == "comment"):
         cells = cells[:-1]
-    if len(cells) == width - 1:
-        cells = [*cells, ""]  # rows may end in a delimiter
+    # rows may end in a delimiter; above rows of two cells a single one is a title, unless it has a unit
+    if len(cells) == width - 1 and (len(cells) > 1 or unit_in_name(text) or in_brackets(text)):
+        cells = [*cells, ""]
     return cells
 
 

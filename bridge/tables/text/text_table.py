@@ -10,11 +10,13 @@ import pyarrow.csv as pa_csv
 
 from bridge.faults import Fault
 from bridge.log.finding import Finding
-from bridge.tables.cells import texts_of
+from bridge.tables.cells import starts_of, texts_of
+from bridge.tables.pieces import Segment
 from bridge.tables.table import Table
 from bridge.tables.text.dialect import BLANK, Dialect, TextLayout, form_of
 from bridge.tables.text.encoding import decoded
 from bridge.tables.text.head import COMMENTS, Head, read_head
+from bridge.tables.text.labels import is_mixed, labels_of, without_labels
 from bridge.tables.text.unit_cells import units_apart
 from bridge.units import counted
 
@@ -34,6 +36,7 @@ _SHOWN = 60  # longest part of a line that a finding shows [characters]
 
 def read_text(path: Path, given: Dialect) -> Table:
     """Read a text table; properties missing in `given` are detected and reported as findings. Raises Fault BAD_TABLE."""
+    before = given
     text, encoding = decoded(path.read_bytes(), given.encoding, path.name)
     if any(minus in text for minus in _MINUS):
         text = _MINUS_OF_NUMBER.sub("-", text)
@@ -44,12 +47,21 @@ def read_text(path: Path, given: Dialect) -> Table:
     if not any(line.strip() for line in head_lines):
         raise Fault("BAD_TABLE", f"{path.name}: is empty; give a file with rows")
     body = _spread(text, head_lines, given)
+    if labels := labels_of(body):
+        text, names = without_labels(text, labels, body)
+        given = given._replace(delimiter="\t", names=given.names or names)
+    elif given.delimiter is None and is_mixed(body):
+        given = given._replace(delimiter=BLANK, decimal=".")
+    if given is not before:
+        head_lines = text[:_HEAD_CHARACTERS].splitlines()
+        body = _spread(text, head_lines, given)
     form = form_of(body, given, any('"' in line for line in (*head_lines, *body)), head_lines)
     head = read_head(head_lines, body, form, given, path.name)
-    rows, left_out, example = _rows(text, head, form, given)
+    rows, lost, segments = _pieces(text, head, form, given)
     columns: dict[str, Any] = {name: rows.column(i) for i, name in enumerate(head.names)}
-    findings = [*_assumed(path.name, head, form, encoding, given), *_lost(path.name, left_out, example, rows.num_rows)]
+    findings = [*_assumed(path.name, head, form, encoding, before), *_lost(path.name, lost, rows.num_rows)]
     units = head.unit_of
+    columns = _named_by_words(columns) if head.names_line < 0 and given.names is None else columns
     for name, column in columns.items():
         texts = texts_of(column.to_numpy()) if pa.types.is_string(column.type) else []
         if texts and (apart := units_apart(texts, form.decimal, form.thousands)):
@@ -67,6 +79,7 @@ def read_text(path: Path, given: Dialect) -> Table:
         thousands=form.thousands,
         findings=findings,
         written=written,
+        segments=segments,
     )
 
 
@@ -85,12 +98,40 @@ def _spread(text: str, head_lines: list[str], given: Dialect) -> list[str]:
     return lines
 
 
-def _rows(text: str, head: Head, form: TextLayout, given: Dialect) -> tuple[Any, int, str]:
-    """The rows as an Arrow table, the number of omitted rows, and the first of them."""
+def _pieces(text: str, head: Head, form: TextLayout, given: Dialect) -> tuple[Any, list[str], tuple[Segment, ...]]:
+    """The rows of all pieces as one Arrow table, the other lines, and the pieces where the line of names repeats."""
     # the lines of the head end as `read_text` splits them
-    rows = text[sum(map(len, text[:_HEAD_CHARACTERS].splitlines(keepends=True)[: head.lines])) :]
+    lines = text[:_HEAD_CHARACTERS].splitlines(keepends=True)
+    begin = sum(map(len, lines[: head.lines]))
+    names = lines[head.names_line].strip("\r\n") if head.names_line >= 0 else ""
+    # `find` is ten times as fast as a pattern, and most files have one head
+    again = text.find(f"\n{names}", begin) >= 0 if names else False
+    repeats = [match.start() for match in re.finditer(rf"^{re.escape(names)}\r?$", text[begin:], re.M)] if again else []
+    if not repeats or repeats[0] == 0:
+        rows, lost = _rows(text[begin:], head, form, given)
+        return rows, lost, ()
+    stamps, ends, begins = ["".join(lines[: head.lines])], [], [begin]
+    for repeat in repeats:
+        above = text[begins[-1] : begin + repeat].splitlines(keepends=True)
+        inner = next((n for n, line in enumerate(reversed(above)) if head.is_row(line, form)), len(above))
+        ends.append(begin + repeat - sum(map(len, above[len(above) - inner :])))
+        below = text[begin + repeat : begin + repeat + _HEAD_CHARACTERS].splitlines(keepends=True)
+        under = next((n for n, line in enumerate(below) if head.is_row(line, form)), len(below))
+        begins.append(begin + repeat + sum(map(len, below[:under])))
+        stamps.append(text[ends[-1] : begins[-1]])
+    read = [_rows(text[at:end], head, form, given) for at, end in zip(begins, [*ends, len(text)], strict=True)]
+    filled = [(*part, start_s) for part, start_s in zip(read, starts_of(stamps), strict=True) if part[0].num_rows]
+    tables = [table for table, _, _ in filled] or [read[0][0]]
+    first_rows = np.cumsum([0, *(table.num_rows for table in tables)]).tolist()
+    segments = tuple(Segment(row, start_s) for row, (_, _, start_s) in zip(first_rows, filled, strict=False))
+    whole = pa.concat_tables(tables, promote_options="permissive")
+    return whole, [line for _, lost in read for line in lost], segments
+
+
+def _rows(rows: str, head: Head, form: TextLayout, given: Dialect) -> tuple[Any, list[str]]:
+    """The rows as an Arrow table, and the lines with another number of cells, which are left out."""
     delimiter = form.delimiter
-    if given.comment or any(f"\n{mark}" in rows for mark in COMMENTS):
+    if given.comment or any(mark[0] in rows and f"\n{mark}" in rows for mark in COMMENTS):
         marks = tuple([given.comment] if given.comment else COMMENTS)
         rows = "\n".join(line for line in rows.splitlines() if not line.lstrip().startswith(marks))
     if delimiter == BLANK:
@@ -102,15 +143,37 @@ def _rows(text: str, head: Head, form: TextLayout, given: Dialect) -> tuple[Any,
         lost.append(row.text)
         return "skip"
 
-    table = pa_csv.read_csv(
-        pa.BufferReader(rows.encode()),
-        read_options=pa_csv.ReadOptions(column_names=head.names, use_threads=True),
-        parse_options=pa_csv.ParseOptions(
-            delimiter=delimiter, quote_char=form.quote or False, invalid_row_handler=skip
-        ),
-        convert_options=pa_csv.ConvertOptions(decimal_point=form.decimal, strings_can_be_null=True),
-    )
-    return table, len(lost), lost[0] if lost else ""
+    def read(text: str) -> Any:
+        return pa_csv.read_csv(
+            pa.BufferReader(text.encode()),
+            read_options=pa_csv.ReadOptions(column_names=head.names, use_threads=True),
+            parse_options=pa_csv.ParseOptions(
+                delimiter=delimiter, quote_char=form.quote or False, invalid_row_handler=skip
+            ),
+            convert_options=pa_csv.ConvertOptions(decimal_point=form.decimal, strings_can_be_null=True),
+        )
+
+    table = read(rows)
+    if len(lost) > _MOST_LEFT_OUT * (table.num_rows + len(lost)) and all(
+        line.count(delimiter) < len(head.names) and form.is_number(line.split(delimiter)[0]) for line in lost
+    ):  # channels that end sooner leave shorter rows
+        lost.clear()
+        cells = len(head.names) - 1
+        table = read(
+            "\n".join(line + delimiter * (cells - line.count(delimiter)) for line in rows.splitlines() if line.strip())
+        )
+    return table, lost
+
+
+def _named_by_words(columns: dict[str, Any]) -> dict[str, Any]:
+    """The columns, each named by a column of one repeated word before it: `force +14.1 position +3.2`."""
+    result: dict[str, Any] = {}
+    word = ""
+    for name, column in columns.items():
+        result[word if word and word not in columns and word not in result else name] = column
+        words = column.unique() if pa.types.is_string(column.type) else []
+        word = str(words[0]).strip(" :=") if len(words) == 1 and words[0].is_valid else ""
+    return result
 
 
 def _assumed(file: str, head: Head, form: TextLayout, encoding: str, given: Dialect) -> list[Finding]:
@@ -129,12 +192,12 @@ def _assumed(file: str, head: Head, form: TextLayout, encoding: str, given: Dial
     return findings + head.unit_findings(file)
 
 
-def _lost(file: str, left_out: int, example: str, rows: int) -> list[Finding]:
-    if not left_out:
+def _lost(file: str, lost: list[str], rows: int) -> list[Finding]:
+    if not lost:
         return []
-    text = f"{counted(left_out, 'line')} with another number of cells left out, first {example[:_SHOWN]!r}"
-    if left_out > _MOST_LEFT_OUT * (rows + left_out):
+    text = f"{counted(len(lost), 'line')} with another number of cells left out, first {lost[0][:_SHOWN]!r}"
+    if len(lost) > _MOST_LEFT_OUT * (rows + len(lost)):
         raise Fault(
-            "BAD_TABLE", f"{file}: {text}, of {rows + left_out}: must be few; cut the file, or state source.delimiter"
+            "BAD_TABLE", f"{file}: {text}, of {rows + len(lost)}: must be few; cut the file, or state source.delimiter"
         )
-    return [Finding("cut", file, text, left_out)]
+    return [Finding("cut", file, text, len(lost))]

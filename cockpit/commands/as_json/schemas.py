@@ -169,7 +169,7 @@ _RESULTS = {
     "replay": "cockpit.run.replay:ReplayResult",
     "plot": "cockpit.figures.run_figure:Plotted",
     "review": "cockpit.review.page:Reviewed",
-    "look": "cockpit.look.source:Looked",
+    "look": "cockpit.look.pieces:Looked",
     "map": "cockpit.figures.stability_map:MapResult",
     "reproduce": "cockpit.paper.page:ReproduceResult",
     "example": "cockpit.commands.example:Example",

@@ -69,10 +69,10 @@ def test_missing_information_is_asked_for(tmp_path: Path, words: list[str], expe
 
 
 def test_a_file_of_unnamed_columns_is_asked_about(tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text("t,p,q\n" + "".join(f"{i},{i % 7},{i % 5}\n" for i in range(100)))
+    (tmp_path / "a.csv").write_text("t [s],p,q\n" + "".join(f"{i},{i % 7},{i % 5}\n" for i in range(100)))
     result = CliRunner().invoke(app, ["look", str(tmp_path / "a.csv"), "--json"])
     assert (
-        'which column is the force? add --force "NAME"; columns here: "t", "p", "q"'
+        'which column is the force? add --force "NAME"; columns here: "t [s]", "p", "q"'
         in json.loads(result.stdout)["line"]
     )
     result = CliRunner().invoke(app, ["look", str(tmp_path / "a.csv"), "--force", "p", "--json"])
@@ -260,8 +260,9 @@ def test_rows_that_go_back_and_gaps_are_reported(tmp_path: Path) -> None:
     )
     assert "time-gap: 1 gap in time, first at 3.998 s, the longest 1 s" in findings_of(table)
     path = table_of(tmp_path / "b.csv", "Time (s),Force (N)", np.tile(t_s, 2), np.tile(force_N, 2))
-    result = CliRunner().invoke(app, ["look", str(path), "--json"])
-    assert "4000 rows not later than the rows before" in json.loads(result.stdout)["line"]
+    twice = seen_in(path)
+    assert "pieces: begins again in row 4001: 2 pieces" in findings_of(twice)
+    assert [piece["slips"] for piece in twice["pieces"]] == [table["slips"] + 1] * 2
 
 
 def test_a_torque_is_reported_as_a_torque(tmp_path: Path) -> None:
@@ -324,7 +325,7 @@ LVM = (
         ("labels.lvm", LVM + "X_Value\tFriction\tComment\n", "\t{kN:.8f}\t\n", "line 4 holds units: kN"),
         ("asked.csv", "t [s],F_soll [N],F_ist [N]\n", "{t:.4f},{ms:.0f},{N:.6f}\n", "force = 'F_ist [N]' by its name"),
         ("datenum.csv", "time,F\n", "{day:.10f},{N:.6f}\n", "is a calendar time in steps of 86400 s"),
-        ("french.csv", "Temps [ms];Effort [N]\n", "{ms:.0f};{N:.6f}\n", "rises evenly and has a unit of time"),
+        ("french.csv", "Durée [ms];Effort [N]\n", "{ms:.0f};{N:.6f}\n", "rises evenly and has a unit of time"),
         ("traction.tsv", "Test Time (s)\tTraction Coeff (-)\n", "{t:.4f}\t{N:.6f}\n", "is a coefficient"),
     ],
 )

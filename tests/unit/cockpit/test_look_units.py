@@ -12,16 +12,20 @@ from cockpit.cli import app
 from tests.unit.cockpit.test_look_command import findings_of, saw_teeth, seen_in, table_of
 
 
-def test_an_unknown_unit_in_a_name_is_reported_with_a_map_too(tmp_path: Path) -> None:
+def test_a_force_in_an_unknown_unit_keeps_it_and_a_map_reports_it(tmp_path: Path) -> None:
     t_s, force_N, _ = saw_teeth()
-    path = table_of(tmp_path / "a.csv", "Time [shake],Fx [ozf]", t_s, force_N)
+    path = table_of(tmp_path / "a.csv", "Time [shake],Fx [pond]", t_s, force_N)
     given = tmp_path / "map.toml"
     given.write_text("[channels]\nt_s = 'Time'\ndrive_force_N = 'Fx'\n")
-    for more in ([], ["--map", str(given)]):
-        message = findings_of(seen_in(path, *more))
-        for unit, column in (("shake", "Time [shake]"), ("ozf", "Fx [ozf]")):
-            assert f"units: column {column}: {unit!r} is not a known unit: the values are used unscaled" in message
-        assert "states no unit" not in message
+    message = findings_of(seen_in(path, "--map", str(given)))
+    for unit, column in (("shake", "Time [shake]"), ("pond", "Fx [pond]")):
+        assert f"units: column {column}: {unit!r} is not a known unit: the values are used unscaled" in message
+    assert "states no unit" not in message
+    refused = CliRunner().invoke(app, ["look", str(path), "--json"])
+    assert "'shake' is not a known unit of time; add --rate 1kHz" in json.loads(refused.stdout)["line"]
+    seen = seen_in(path, "--rate", "500Hz", "--speed", "0.5mm/s", "--load", "9N")
+    assert seen["numbers"]["static_force_N"]["unit"] == "pond"
+    assert not {"stiffness_N_per_m", "mass_kg", "mu_s"} & seen["numbers"].keys()
 
 
 @pytest.mark.parametrize(

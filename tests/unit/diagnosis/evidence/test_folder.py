@@ -170,7 +170,7 @@ def in_micronewton(data: Columns) -> None:
         (words, "run-01.parquet: column drive_force_N: row 1 = 'overload': must be a number"),
         (
             starts_again,
-            "run-01.parquet: t_s: 2000 rows are not later than the row before, first row 2001: 0 s after 0.9995 s",
+            "run-01.parquet: t_s: begins again: holds 2 runs, and must hold one",
         ),
         (half_is_nan, "run-01.parquet: t_s: 1334 samples are no finite number, first row 1"),
         (half_a_second, "run-01.parquet: t_s: 0.5 s long: must be 1 s at least; give a longer run"),

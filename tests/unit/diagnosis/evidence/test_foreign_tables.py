@@ -108,7 +108,7 @@ def test_arrays_of_numpy_are_named_with_the_way_to_columns(tmp_path: Path, name:
 
 def test_a_packed_file_is_named_as_one(tmp_path: Path) -> None:
     (tmp_path / "a.csv.gz").write_bytes(gzip.compress(b"t,F\n0,1\n"))
-    with pytest.raises(Fault, match=r"a.csv.gz: is packed by gzip; unpack it, and give the unpacked file"):
+    with pytest.raises(Fault, match=r"a.csv.gz: is packed by gzip, which is not read; convert it: gunzip --keep "):
         import_file(tmp_path / "a.csv.gz", channel_map(tmp_path, t_s="t", drive_force_N="F"), tmp_path / "out")
 
 

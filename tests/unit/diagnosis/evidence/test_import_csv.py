@@ -47,7 +47,7 @@ def test_a_map_that_contradicts_its_file_is_refused_with_the_place(tmp_path: Pat
     with pytest.raises(Fault, match=r"source.encoding = 'utf-9': unknown to Python"):
         read_table(tmp_path / "a.csv", Dialect(";", ",", encoding="utf-9"))
     (tmp_path / "words.csv").write_text("a;b\n" + "x;y\n" * 40)
-    with pytest.raises(Fault, match=r"words.csv: no row of numbers .*state source.delimiter"):
+    with pytest.raises(Fault, match=r"words.csv: is a text with numbers in 0 % of its lines: no row of numbers"):
         read_table(tmp_path / "words.csv")
 
 
