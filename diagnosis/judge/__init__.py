@@ -4,4 +4,5 @@ witnesses   relations, latent friction, fits and held-out runs of an evidence, a
 relations   the log evidence of the relations for an explanation
 ledger      the rows of all witnesses
 judge       the answer to a ledger, without state
+outcome     the verdict of the format from this answer; described numbers that were wrong
 """

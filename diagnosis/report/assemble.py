@@ -23,10 +23,10 @@ from diagnosis.gap.prepare import Prepared
 from diagnosis.gap.problem import Problem
 from diagnosis.judge.judge import NONE, Judged
 from diagnosis.judge.ledger import Ledger
+from diagnosis.judge.outcome import Model, verdict_of, wrong_numbers
 from diagnosis.judge.witnesses import NO_FIT, Witnesses
 from diagnosis.latent.naming import named_by
 from diagnosis.pictures.choice import pictures
-from diagnosis.report.outcome import Model, verdict_of, wrong_numbers
 from diagnosis.result import PARAMETERS, Candidate, Cell, Diagnosis, Experiment, Gap, Shrinkage, WrongNumber
 from plant.effects.library import EFFECTS
 

@@ -9,8 +9,8 @@ from bridge import units
 from bridge.files import write_whole
 from bridge.pages import filled_page
 from bridge.provenance import provenance
+from diagnosis.judge.outcome import BEYOND
 from diagnosis.report import words
-from diagnosis.report.outcome import BEYOND
 from diagnosis.report.page_plots import draw
 from diagnosis.result import Cell, Diagnosis, Gap, RigNumber
 

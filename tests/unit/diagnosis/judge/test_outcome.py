@@ -13,7 +13,7 @@ from diagnosis.fits.fit import Fit
 from diagnosis.hypotheses.hypothesis import Coordinate, Hypothesis
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.judge.judge import Judged
-from diagnosis.report.outcome import Model, verdict_of, wrong_numbers
+from diagnosis.judge.outcome import Model, verdict_of, wrong_numbers
 from diagnosis.result import Gap, WrongNumber
 from tests import made_up
 
