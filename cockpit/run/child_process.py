@@ -29,7 +29,8 @@ _LONGEST_NAME = 255  # characters of the longest file name; of a longer text onl
 # modules of `stickslip[all]` that a plain installation lacks
 EXTRA_MODULES = frozenset(
     {
-        "chardet", "clevercsv", "h5py", "jinja2", "joblib", "mcap_protobuf", "mcap_ros2", "nptdms", "pyarrow", "python_calamine", "threadpoolctl",
+        "chardet", "clevercsv", "h5py", "jinja2", "joblib", "mcap_protobuf", "mcap_ros2", "nptdms", "pyarrow",
+        "python_calamine", "threadpoolctl",
         "xlsxwriter",
     }
 )  # fmt: skip
