@@ -65,7 +65,7 @@ def keep(path: Path, seed: int) -> None:
         write_json(path, {})
         return
     with one_thread():
-        ledger = ledger_of(with_fits(before_fits(rig.evidence, 1, math.inf), lambda *_: None))
+        ledger = ledger_of(with_fits(before_fits(rig.evidence, 1, math.inf), _no_report))
     write_json(path, {"effects": rig.effects, "ledger": strict_json(ledger)})
 
 
@@ -88,10 +88,9 @@ def numbers_of(examples: list[Example]) -> Numbers:
     """The numbers of the highest likelihood."""
     explained = [explained_by(example.ledger) for example in examples]
     targets = [_target(each, example.effects) for each, example in zip(explained, examples, strict=True)]
-    shown = [(each.columns, target) for each, target in zip(explained, targets, strict=True) if target is not None]
 
     def loss(numbers: Floats) -> float:
-        of_rigs = [-float(target @ log_softmax(columns @ numbers)) for columns, target in shown]
+        of_rigs = [-float(t @ log_softmax(each.columns @ numbers)) for each, t in zip(explained, targets, strict=True)]
         return float(np.mean(of_rigs)) + 0.5 * _HELD * float(numbers @ numbers)
 
     numbers = minimize(loss, np.array([1.0, 0.0, 0.0, 0.0])).x
@@ -131,6 +130,10 @@ def _without_its_effect(example: Example, explained: Explained, numbers: Floats)
         return None
     ledger = example.ledger
     return ledger._replace(rows=tuple(row for row in ledger.rows if leading not in row.causes))
+
+
+def _no_report(_line: str, _share: float) -> None:
+    """Drop the progress within a rig."""
 
 
 if __name__ == "__main__":

@@ -70,7 +70,7 @@ def assembled(seen: Witnesses, ledger: Ledger, judged: Judged) -> Diagnosis:
     shown = Problem(evidence.rig, seen.runs)
     shown.until_s = seen.until_s
     nuisances = fitter.nuisances
-    points = [nuisances.point(at, {}) for at in (np.zeros(len(nuisances)), baseline.deviations)]
+    described, refitted = (nuisances.point(at, {}) for at in (np.zeros(len(nuisances)), baseline.deviations))
     of_named = nuisances.point(best.deviations, best.effects) if named is not None and named.effects else None
     return Diagnosis(
         verdict=kind,
@@ -84,7 +84,7 @@ def assembled(seen: Witnesses, ledger: Ledger, judged: Judged) -> Diagnosis:
         next_experiment=_next(seen, search, [best, *([] if rival is None else [rival])]),
         rig=nuisances.parameters(best.deviations),
         findings=(*evidence.findings, *_changing(seen.runs)),
-        pictures=_in_time(lambda: pictures(shown, *points, of_named, effects), ()),
+        pictures=_in_time(lambda: pictures(shown, described, refitted, of_named, effects), ()),
         compared_features=len(baseline.residual),
         elapsed_s=0.0,
         numbers=numbers,
