@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).parents[1]
-_ROOMS = ("gap", "hypotheses", "fits", "relations", "latent", "verdict")  # of diagnosis/, in the order of the work
+_ROOMS = ("gap", "hypotheses", "fits", "relations", "latent", "judge")  # of diagnosis/, in the order of the work
 _LONGEST = 60  # of a value that is written out: a longer expression is a table and not a number
 _COUNTED = re.compile(r"docs/method/([a-z-]+)\.md")
 
