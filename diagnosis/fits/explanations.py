@@ -13,7 +13,7 @@ from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.fits.refits import Start, best_of_each, each_beside, refits
 from diagnosis.fits.screening import Screened, Screening, beside, of_changes
-from diagnosis.hypotheses.hypothesis import NOTHING
+from diagnosis.hypotheses.hypothesis import LEVELS, NOTHING
 from diagnosis.hypotheses.starts import Trial
 from diagnosis.processes import spread
 
@@ -21,6 +21,14 @@ Names = frozenset[str]
 # Effects that get two steps of a refit, and how many go on to the end. Fewer: a right effect is passed over, as the promise of a
 # trial is linear. More: 0.5 s and 2 s of CPU each.
 _QUICK, _FULL, _FULL_PAIRS = 6, 2, 1
+_SIZES = (
+    -2.0,
+    -1.0,
+    -0.5,
+    0.5,
+    1.0,
+    2.0,
+)  # of a level's scale, at which a refit may begin, with the other numbers as described
 _LARGER = (3.0, 10.0)  # times the promised size, that a refit may begin with as well: one prediction each
 # Second effects on top of the best one, and pairs by the columns of the rig without effects, that get two steps.
 _SECOND, _PAIRS = 3, 1
@@ -63,7 +71,8 @@ class Search:
         self.promised = {frozenset(start.hypothesis.effects): start for start in of_each}
         progress("every effect was tried once; the leading ones are fitted", 0.45)
         best = best_of_each(promises.singles)
-        starts = best[:_QUICK] + [start for start in best[_QUICK:] if set(start.hypothesis.effects) <= shown]
+        asked = shown | LEVELS.keys()
+        starts = best[:_QUICK] + [start for start in best[_QUICK:] if asked.issuperset(start.hypothesis.effects)]
         singles = refitted(self.rig.fitter, starts, _FULL, self._jobs)
         self._improve_baseline(singles)
         self.fits = [self.rig.fit, *singles]
@@ -143,13 +152,14 @@ def refitted(fitter: Fitter, starts: Sequence[Screened], full: int, jobs: int = 
 
 
 def _quick(fitter: Fitter, start: Screened) -> Work[Fit]:
-    """Two steps from the best of the promised start and of larger sizes, from where the rig is described.
+    """Two steps from the best of the promised start and of further sizes, from where the rig is described.
 
-    A large effect is not linear, and the refitted rig has taken up a part of it.
+    A large effect is not linear, and the refitted rig has taken up a part of it; of a level it has taken up most.
     """
-    described = np.zeros_like(start.deviations)
-    larger = [(described, _times(start, factor)) for factor in _LARGER] if len(start.hypothesis.effects) == 1 else []
-    return fitter.quick(start.hypothesis, ((start.deviations, start.w), *start.others, *larger))
+    effects = set(start.hypothesis.effects)
+    sizes = [np.array([size]) for size in _SIZES] if effects <= LEVELS.keys() else [_times(start, x) for x in _LARGER]
+    further = [(np.zeros_like(start.deviations), w) for w in sizes] if len(effects) == 1 else []
+    return fitter.quick(start.hypothesis, ((start.deviations, start.w), *start.others, *further))
 
 
 def _times(start: Screened, factor: float) -> Floats:
