@@ -20,11 +20,12 @@ _CHAIN = {
     "position_delay_s": (1e-4, 1e-4),
     "position_scale": (1.0, 0.004),
     "drive_slope": (0.0, 0.006),
-    "drive_bow_per_m": (0.0, BOW),  # over the travel
+    # Over the travel, 0.2 %. Half of it: two of five cases of the bench whose fits end elsewhere lose their effect
+    "drive_bow_per_m": (0.0, 2.0 * BOW),
     "accel_lowest_Hz": (0.25, 0.25),
     "accel_rolled_off": (0.5, 0.5),
 }
-_PAPER_TRAVEL_M = 5e-3  # of the drive in the paper's runs
+_PAPER_TRAVEL_M = 1e-2  # of the drive in the runs of the paper's rig
 # Standard deviation of the tail of the Stribeck curve: a table states two friction levels and a velocity, and the curve between
 # them is not exactly the Gaussian of tail 0.
 _TAIL = 0.4

@@ -42,7 +42,7 @@ def test_a_bent_displacement_sensor_causes_no_gap(evidence_and_runs, straight):
     slope, bow = (bent_rig.fitter.nuisances.names.index(name) for name in ("drive_slope", "drive_bow_per_m"))
     change = bent_rig.fit.deviations - straight.fit.deviations
     at_m = float(np.mean([run.signals["drive_position_m"].mean() for run in runs]))
-    bow_per_m = 2.0 * change[bow] * BOW / problem.travel_m
+    bow_per_m = 4.0 * change[bow] * BOW / problem.travel_m
     assert change[slope] * 0.006 + bow_per_m * at_m == pytest.approx(0.008 - 0.8 * at_m, abs=0.002)
     assert bent_rig.fit.chi2 < straight.fit.chi2 + 30.0
 
