@@ -56,8 +56,8 @@ class FitStage(NamedTuple):
 FAR_KNEE = 60.0
 _FAR = FitStage(4, 1, FAR_KNEE)
 _NEAR = FitStage(6, 1, KNEE)
-# Of the baseline: more steps and renewals than other fits, as every fit is compared with it. On seven cases of the bench six steps
-# and one renewal leave up to 11 % more chi2; a third renewal changes nothing.
+# Of the baseline: more steps and renewals than other fits, as every fit is compared with it. On seven cases of the bench six
+# steps and one renewal leave up to 11 % more chi2; a third renewal changes nothing.
 _RETUNE = FitStage(9, 2, KNEE, worth=0.0)
 _QUICK = FitStage(2, 0, FAR_KNEE, columns=False)
 # Largest difference, in noise floors, from which a refit begins with the far stage. Too small: fits that are near lose time

@@ -15,7 +15,7 @@ from bridge.arrays import Floats
 from diagnosis.judge.ledger import Ledger, Names
 
 NONE: Final = "none"
-# Log evidence up to which it counts in full: a formula that is not quite the rig's makes thousands. Cross-validated log loss of 98
+# Log evidence that counts in full: a formula that is not quite the rig's makes thousands. Cross-validated log loss of 98
 # simulated rigs: 1.86; with 10 1.88, with 100 2.07; of 104 rigs 1.95, with 1 1.97.
 KNEE: Final = 3.0
 # The following numbers maximise the likelihood of the truth of simulated rigs: `python -m bench.judge.training`.

@@ -11,7 +11,6 @@ import pytest
 from typer.testing import CliRunner
 
 from bridge.faults import FAULTS
-from bridge.files import write_whole
 from bridge.results import strict_json
 from cockpit.cli import app
 from cockpit.fleet import work
