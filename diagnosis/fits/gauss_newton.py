@@ -103,7 +103,8 @@ class Fitter:
         rig_numbers = len(nuisances.rig_names)
         # bounds of the nuisances, the same in both directions [nuisances]
         self.most = np.where(np.arange(len(nuisances)) < rig_numbers, _MOST_TOLERANCES, _MOST_OF_CHAIN)
-        self._rates = np.zeros((int(floor.compared.sum()), len(nuisances)))
+        # places where the derivatives of all nuisances are known, in tolerances, and these derivatives
+        self._known = [(np.zeros(len(nuisances)), np.zeros((int(floor.compared.sum()), len(nuisances))))]
 
     def predicted(self, deviations: Floats, effects: Effects) -> Floats:
         """Features of the model without noise [features], for nuisances in tolerances [nuisances] and tables of effects."""
@@ -125,14 +126,27 @@ class Fitter:
         return self.floor.whitening @ np.where(np.isfinite(z), z, 0.0)
 
     def retuning(self, deviations: Floats) -> Work[Fit]:
-        """Fit the baseline; later fits start with the derivatives that the nuisances have there."""
+        """Fit the baseline; later fits start with the derivatives of the nuisances there, or where the rig is described."""
         fit = yield from self.refitting(NOTHING, deviations, np.zeros(0))
         fit = yield from self.fitting(NOTHING, fit.deviations, fit.w, _RETUNE)
-        (base,) = yield Question([(fit.deviations, {})])
-        aside = self._aside(fit.deviations, _STEPS[0])
-        moved = yield Question([(deviations, {}) for deviations in aside])
-        self._rates = self._nuisance_rates(fit.deviations, base, aside, moved)
+        known: list[tuple[Floats, Floats]] = []
+        for at in (fit.deviations, np.zeros(len(deviations))):
+            aside = self._aside(at, _STEPS[0])
+            base, *moved = yield Question([(at, {}), *((deviations, {}) for deviations in aside)])
+            known.append((at, self._nuisance_rates(at, base, aside, moved)))
+        self._known = known
         return fit
+
+    def rates_near(self, deviations: Floats) -> Floats:
+        """Derivatives of the nuisances [compared, nuisances] at the nearest place where they are known."""
+        return min(self._known, key=lambda place: float(np.sum((place[0] - deviations) ** 2)))[1]
+
+    def bare(self, deviations: Floats, predicted: Floats, knee: float) -> Fit:
+        """The rig without effects at some deviations, unfitted, from its prediction [features]."""
+        residual, slope = self.whitened(predicted, knee)
+        columns = self.floor.whitening @ (self.rates_near(deviations) * slope[:, None])
+        chi2 = self._chi2(prior_of(NOTHING, deviations), residual, deviations)
+        return Fit(NOTHING, deviations, np.zeros(0), chi2, residual, columns)
 
     def refit(self, hypothesis: Hypothesis, deviations: Floats, w: Floats) -> Fit:
         """Fit a hypothesis to the end, from a start that may be far from the runs.
@@ -145,11 +159,9 @@ class Fitter:
         """
         return together(self.predicted_many, [self.refitting(hypothesis, deviations, w)])[0]
 
-    def quick(self, hypothesis: Hypothesis, starts: Sequence[tuple[Floats, Floats]]) -> Work[Fit]:
-        """Fit a hypothesis in two steps, from the best of some starts; chi2 is under the compression of the gap."""
-        predicted = yield Question([(deviations, hypothesis.tables(w)) for deviations, w in starts])
-        far = [self.far_chi2(hypothesis, *start) for start in zip(starts, predicted, strict=True)]
-        fit = yield from self.fitting(hypothesis, *starts[far.index(min(far))], _QUICK)
+    def quick(self, hypothesis: Hypothesis, deviations: Floats, w: Floats) -> Work[Fit]:
+        """Fit a hypothesis in two steps; chi2 is under the compression of the gap."""
+        fit = yield from self.fitting(hypothesis, deviations, w, _QUICK)
         return (yield from self._judging(fit))
 
     def _judging(self, fit: Fit) -> Work[Fit]:
@@ -157,11 +169,6 @@ class Fitter:
         residual, _ = self.whitened(predicted)
         chi2 = self._chi2(prior_of(fit.hypothesis, fit.deviations), residual, np.concatenate([fit.deviations, fit.w]))
         return fit._replace(chi2=chi2, residual=residual)
-
-    def far_chi2(self, hypothesis: Hypothesis, at: tuple[Floats, Floats], predicted: Floats) -> float:
-        """chi2 of a prediction [features] for nuisances and coordinates `at`, under the knee of a far start."""
-        residual, _ = self.whitened(predicted, FAR_KNEE)
-        return self._chi2(prior_of(hypothesis, at[0]), residual, np.concatenate(at))
 
     def refitting(self, hypothesis: Hypothesis, deviations: Floats, w: Floats) -> Work[Fit]:
         """As `refit`, as a work that proceeds with others."""
@@ -190,7 +197,7 @@ class Fitter:
         most = np.concatenate([self.most, np.full(len(w), np.inf)])
         (predicted,) = yield Question([(deviations, hypothesis.tables(w))], _beside(hypothesis, deviations, w))
         place = self._placed(hypothesis, np.concatenate([deviations, w]), predicted, stage.knee)
-        nuisance_rates = self._rates
+        nuisance_rates = self.rates_near(deviations)
         renewed = without_gain = 0
         finished = False
         columns = np.zeros((len(place.residual), len(place.at)))

@@ -81,6 +81,7 @@ def by_fits(explanations: Sequence[Names], search: Search, kept: Sequence[float]
     noise = max(min(fit.chi2 for fit in search.fits) / compared, NOISE)
     fits = {frozenset(fit.effects): fit for fit in search.fits}
     of_kept = dict(zip(fits, kept, strict=False))
+    fits = {names: fit for names, fit in fits.items() if fit.chi2 <= none.chi2}  # a worse one proves nothing
     for names in (frozenset[str](), *explanations):
         # a pair without a fit or a promise is worth as much as the better of its effects
         alone = [part for name in names if (part := frozenset((name,))) in left]
@@ -91,7 +92,7 @@ def by_fits(explanations: Sequence[Names], search: Search, kept: Sequence[float]
         causes, fitted = tuple(sorted(names)), names in fits
         remainder = _excess(left[known], compared) if fitted else None
         yield LedgerRow(causes, _FEATURES, "fit" if fitted else "simulation", gained + freedom, left=remainder)
-        if known in of_kept:
+        if known in fits and known in of_kept:
             chi2 = of_kept[known] if _foretells(fit) else min(of_kept[known], kept[0])
             gained = of_remainder(chi2, features) - of_remainder(kept[0], features)
             remainder = _excess(chi2, features) if fitted else None

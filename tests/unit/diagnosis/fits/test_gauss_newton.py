@@ -7,7 +7,7 @@ import pytest
 
 from diagnosis.fits.batch import together
 from diagnosis.fits.fit import step_within
-from diagnosis.fits.gauss_newton import Fitter
+from diagnosis.fits.gauss_newton import FAR_KNEE, Fitter
 from diagnosis.gap.measure import floor_of, replicates
 from diagnosis.gap.problem import OutOfTimeError, Problem
 from diagnosis.hypotheses.catalogue import trials
@@ -66,10 +66,8 @@ def test_a_rig_that_cannot_be_is_further_off_than_any_other(fitter):
     rough = np.array([30.0])
     impossible = fitter.predicted(described, yielding.hypothesis.tables(weightless))
     assert not np.isfinite(impossible).any()
-    even = fitter.far_chi2(
-        sliding.hypothesis, (described, rough), fitter.predicted(described, sliding.hypothesis.tables(rough))
-    )
-    assert fitter.far_chi2(yielding.hypothesis, (described, weightless), impossible) > even > 1e3
+    even = fitter.bare(described, fitter.predicted(described, sliding.hypothesis.tables(rough)), FAR_KNEE).chi2
+    assert fitter.bare(described, impossible, FAR_KNEE).chi2 > even > 1e3
 
 
 @pytest.mark.slow
