@@ -12,10 +12,11 @@ from diagnosis.fits.evidence import NOISE, cost_of_freedom, of_remainder
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import FAR_KNEE, Fitter
 from diagnosis.fits.refits import best_of_each, each_beside, refits
-from diagnosis.fits.screening import Screened, eased, of_changes
+from diagnosis.fits.screening import Screened, Screening
 from diagnosis.gap.measure import KNEE
 from diagnosis.hypotheses.hypothesis import NOTHING, Hypothesis
 from diagnosis.hypotheses.starts import Trial
+from diagnosis.model.per_run import is_phase
 from diagnosis.processes import spread
 
 Names = frozenset[str]
@@ -30,12 +31,12 @@ _CLOSES = 0.8  # and has a relation that shows it, or leaves less than this shar
 
 
 class Place(NamedTuple):
-    """A rig without effects, and every trial predicted there."""
+    """A rig without effects, and trials predicted there."""
 
     fit: Fit
     knee: float  # of the compression
     base: Floats  # features of the rig [features]
-    moved: list[Floats]  # the same with each trial
+    moved: list[tuple[Trial, Floats]]  # the same with each trial
 
 
 class Search:
@@ -102,40 +103,46 @@ class Search:
     def _predict(self) -> None:
         """Predict the rig without effects, and every trial, as refitted and as described.
 
-        A large effect has moved the refitted rig away, where the same effect, added, no longer helps.
+        A large effect has moved the refitted rig away, where the same effect, added, no longer helps. A wave moves no number.
         """
         fitter, near = self.rig.fitter, self.rig.fit.deviations
         described = np.zeros_like(near)
-        tables = [{}, *(trial.hypothesis.tables(trial.w) for trial in self._trials)]
-        points = [(at, table) for at in (near, described) for table in tables]
-        predicted = spread(self._jobs, Fitter.predicted_many, fitter, points)
-        (base, *moved), (far, *far_moved) = predicted[: len(tables)], predicted[len(tables) :]
-        self._places = [
-            Place(self.rig.fit, KNEE, base, moved),
-            Place(fitter.bare(described, far, FAR_KNEE), FAR_KNEE, far, far_moved),
+        steady = [
+            trial for trial in self._trials if not any(is_phase(axis.name) for axis in trial.hypothesis.coordinates)
         ]
+        places = [(near, self._trials), (described, steady)]
+        points = [
+            (at, table)
+            for at, trials in places
+            for table in ({}, *(trial.hypothesis.tables(trial.w) for trial in trials))
+        ]
+        predicted = spread(self._jobs, Fitter.predicted_many, fitter, points)
+        base, far = predicted[0], predicted[1 + len(self._trials)]
+        self._places = [
+            Place(self.rig.fit, KNEE, base, list(zip(self._trials, predicted[1:], strict=False))),
+            Place(
+                fitter.bare(described, far, FAR_KNEE), FAR_KNEE, far,
+                list(zip(steady, predicted[2 + len(self._trials) :], strict=True)),
+            ),
+        ]  # fmt: skip
 
     def _promises(self, fit: Fit, place: Place) -> list[Screened]:
         """The best start of every effect on top of a fit, the most promising first, by the trials at a place."""
-        fitter = self.rig.fitter
+        fitter, screening = self.rig.fitter, Screening(fit)
 
         def left(start: tuple[Hypothesis, Floats, Floats], features: Floats) -> Screened:
-            return eased(fit, start[0], start[1:], fitter.whitened(features, place.knee)[0])
+            return screening.eased(*start, fitter.whitened(features, place.knee)[0])
 
-        known = [
-            (trial, features)
-            for trial, features in zip(self._trials, place.moved, strict=True)
-            if not set(trial.hypothesis.effects) & set(fit.effects)
-        ]
+        known = [tried for tried in place.moved if not set(tried[0].hypothesis.effects) & set(fit.effects)]
         here = place.base if fit is place.fit else fitter.predicted(fit.deviations, fit.effects)
         slope = fitter.whitened(here, place.knee)[1]
-        changes = [fitter.column(place.base, features, slope) for _, features in known]
-        linear = best_of_each(of_changes(fitter, fit, [trial for trial, _ in known], changes))
+        promised = [screening.promised(trial, fitter.column(place.base, moved, slope)) for trial, moved in known]
+        linear = best_of_each(sorted((start for start in promised if start), key=lambda start: start.chi2))
         points = [(start.deviations, start.hypothesis.tables(start.w)) for start in linear]
         predicted = spread(self._jobs, Fitter.predicted_many, fitter, points)
         starts = [left(start[:3], features) for start, features in zip(linear, predicted, strict=True)]
         if fit is place.fit:
-            starts += [left((trial.hypothesis, fit.deviations, trial.w), features) for trial, features in known]
+            starts += [left((trial.hypothesis, fit.deviations, trial.w), moved) for trial, moved in known]
         return best_of_each(sorted(starts, key=lambda start: start.chi2))
 
     def _beside(self, names: Names) -> Screened | None:

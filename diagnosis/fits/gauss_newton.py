@@ -127,8 +127,7 @@ class Fitter:
 
     def retuning(self, deviations: Floats) -> Work[Fit]:
         """Fit the baseline; later fits start with the derivatives of the nuisances there, or where the rig is described."""
-        fit = yield from self.refitting(NOTHING, deviations, np.zeros(0))
-        fit = yield from self.fitting(NOTHING, fit.deviations, fit.w, _RETUNE)
+        fit = yield from self.fitting(NOTHING, deviations, np.zeros(0), _RETUNE)
         known: list[tuple[Floats, Floats]] = []
         for at in (fit.deviations, np.zeros(len(deviations))):
             aside = self._aside(at, _STEPS[0])
