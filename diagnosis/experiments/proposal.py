@@ -17,8 +17,9 @@ from diagnosis.features.feature import Feature
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.surface import ROUGHNESS
 from diagnosis.gap.measure import Floor, compress, floor_of, replicates, slope_of_compress
-from diagnosis.gap.problem import Point, Problem
+from diagnosis.gap.problem import PIEZO_EFFECTS, Point, Problem
 from diagnosis.hypotheses.catalogue import CATALOGUE, FRAME, SPEEDS, SWEEP, TAP, TRACK, WEIGHT
+from diagnosis.hypotheses.hypothesis import MASS
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.result import Experiment
 from plant.effects.library import EFFECTS
@@ -42,6 +43,7 @@ _STEP, _STEP_OF_EFFECT = 0.5, 0.15
 # Difference, in floors, of a feature that only one explanation shows, such as a slip. Larger: slips at the edge decide.
 _MISSING = 4.0
 UNCOUPLE = "Uncouple the drive from the mass and vibrate: any vibration left in the force signal is not force."
+WEIGH = "Weigh the slide with everything that moves with it."
 SINE = "Halve the piezo's voltage, then tighten its mount: harmonics of a drive too hard or loose fall faster than the vibration."
 _FORCES = "Move the axis to and fro at 0.2, 1 and 5 times the present speeds, from other positions, with rests of 1, 10 and 60 s."
 _BY_PLACE: Final = {"sensor": WEIGHT, "drive": TAP, "structure": FRAME, "piezo": SWEEP, "friction": SPEEDS}
@@ -99,7 +101,7 @@ def _best(problem: Problem, nuisances: Nuisances, first: Fit, second: Fit) -> _L
     left: list[_Look] = []
     judged: list[_Look] = []
     possible = sorted(plans(problem), key=lambda plan: plan.effort_s)
-    if any(EFFECTS[name].acts_on == "piezo" for fit in (first, second) for name in fit.hypothesis.effects):
+    if any(name in PIEZO_EFFECTS for fit in (first, second) for name in fit.hypothesis.effects):
         # without vibration an effect of the piezo acts only through other numbers that the fit has changed
         possible = [plan for plan in possible if any(step.frequency_Hz > 0.0 for step in plan.steps)]
     for plan in possible:
@@ -215,6 +217,8 @@ def _in_words(feature: Feature) -> str:
 
 def advice(effects: tuple[str, ...], drive: str) -> str:
     """A physical check that separates these effects; with `drive` "force" other motions separate effects of friction."""
+    if MASS in effects:
+        return WEIGH
     for a in effects:
         for b in effects:
             check = CATALOGUE[a].check_against.get(b) or CATALOGUE[b].check_against.get(a)

@@ -1,4 +1,4 @@
-"""Fits of one effect and of two: the few that the linear model of the rig promises most, refitted."""
+"""Fits of one effect and of two: of every effect the best start, and refits of the starts that promise most."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -20,8 +20,8 @@ from diagnosis.model.per_run import is_phase
 from diagnosis.processes import spread
 
 Names = frozenset[str]
-# Effects that get two steps of a refit, of each place, and how many go on to the end. Fewer: a right effect is passed over, as
-# the promise of a trial is rough. More: 0.3 s and 1 s of CPU each.
+# Starts that get two steps of a refit, of the rig as refitted and as described, and fits that go on to the end. Fewer: a right
+# effect is passed over, as a promise is rough. More: 0.3 s and 1 s of CPU each.
 _QUICK, _FULL, _FULL_PAIRS = (5, 4), 2, 1
 _SECOND = 4  # second effects on top of the best one that get two steps
 _NEAR = 0.6  # of the remainder without effects: an effect that leaves more may win by a better valley of a jagged chi2
@@ -45,7 +45,7 @@ class Search:
     Attributes:
         rig: the rig without effects; it may be found better on the way.
         fits: the best fit of each set of effects; the first is the rig without effects.
-        promised: the best start of each set of effects by the linear model of the rig.
+        promised: the best start of each effect.
 
     """
 
@@ -59,7 +59,7 @@ class Search:
 
     @property
     def left(self) -> dict[Names, float]:
-        """chi2 of every set of effects; by the linear model of the rig where it has no fit."""
+        """chi2 of every set of effects; by its start where it has no fit."""
         promised = {names: start.chi2 for names, start in self.promised.items()}
         found = promised | {frozenset(fit.effects): fit.chi2 for fit in self.fits}
         return {names: min(chi2, self.rig.fit.chi2) for names, chi2 in found.items()}  # an effect may have no size

@@ -9,14 +9,13 @@ from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.fits.screening import Screened
 from diagnosis.hypotheses.hypothesis import Hypothesis
-from diagnosis.hypotheses.starts import Trial
 from diagnosis.processes import spread
 
 # start of a refit: the hypothesis, its nuisances in tolerances [nuisances], its coordinates [coordinates]
 Start = tuple[Hypothesis, Floats, Floats]
 
 
-_Formed = TypeVar("_Formed", Fit, Screened, Trial)
+_Formed = TypeVar("_Formed", Fit, Screened)
 T = TypeVar("T")
 
 
@@ -39,13 +38,9 @@ def _fitted(shared: tuple[Fitter, Callable[[Fitter, T], Work[Fit]]], items: list
     return together(fitter.predicted_many, [work(fitter, item) for item in items])
 
 
-def best_of_each(formed: list[_Formed], by_form: bool = False) -> list[_Formed]:
-    """The first of every set of effects, in the order of `formed`; with `by_form`, the first of every form of the effects."""
-    seen: set[frozenset[tuple[str, str]]] = set()
-    result: list[_Formed] = []
+def best_of_each(formed: list[_Formed]) -> list[_Formed]:
+    """The first of every set of effects, in the order of `formed`."""
+    seen: dict[frozenset[str], _Formed] = {}
     for candidate in formed:
-        key = frozenset((name, form if by_form else "") for name, form in candidate.hypothesis.forms.items())
-        if key not in seen:
-            seen.add(key)
-            result.append(candidate)
-    return result
+        seen.setdefault(frozenset(candidate.hypothesis.effects), candidate)
+    return list(seen.values())

@@ -13,7 +13,7 @@ import numpy as np
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.gap.prepare import Prepared
 from diagnosis.gap.problem import Problem
-from diagnosis.hypotheses.hypothesis import LEVELS, Scale, Sizes, sizes
+from diagnosis.hypotheses.hypothesis import LEVELS, MASS, Coordinate, Hypothesis, Scale, Sizes, sizes
 from diagnosis.hypotheses.starts import (
     Starts,
     Trial,
@@ -359,7 +359,7 @@ CATALOGUE: Final[dict[str, EffectRow]] = {
 
 
 def trials(problem: Problem) -> list[Trial]:
-    """Every form of every effect that this rig can have and these runs could show."""
+    """Every form of every effect that this rig can have and these runs could show, and another mass."""
     rig, runs = problem.rig, problem.runs
     frequencies = np.concatenate([run.commands.frequency_Hz for run in runs])
     highest_Hz = float(frequencies.max())
@@ -372,13 +372,16 @@ def trials(problem: Problem) -> list[Trial]:
             tried = CATALOGUE[name].forms.get(form)
             if tried is not None:
                 result += tried.starts(TrialRequest(name, form, tried.scale(of_rig), problem, highest_Hz))
-    return result
+    (scale, logarithmic, prior) = _level(of_rig)["ratio"]
+    mass = Coordinate(MASS, "ratio", scale, logarithmic, prior, -0.9, 9.0)
+    return [*result, Trial(Hypothesis({MASS: ""}, (mass,)), np.array([0.5]))]
 
 
 def cannot_show(rig: RigTable, runs: Sequence[Prepared], assumed: Sequence[str]) -> tuple[str, ...]:
     """Effects that this kind of drive cannot have, that need a missing vibration, or that change an assumed rig number."""
     highest_Hz = max(float(run.commands.frequency_Hz.max()) for run in runs)
-    return tuple(name for name in EFFECTS if not _shows(name, rig, highest_Hz) or LEVELS.get(name) in assumed)
+    unseen = (name for name in EFFECTS if not _shows(name, rig, highest_Hz) or LEVELS.get(name) in assumed)
+    return (*unseen, *((MASS,) if LEVELS[MASS] in assumed else ()))
 
 
 def _shows(name: str, rig: RigTable, highest_Hz: float) -> bool:

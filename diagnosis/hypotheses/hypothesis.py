@@ -1,7 +1,7 @@
 """A model to be fitted: effects in given formulas, and their free parameters as coordinates with scales that fit a rig."""
 
 import math
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -13,13 +13,16 @@ from diagnosis.model.per_run import is_phase
 from diagnosis.model.rig import Effects
 from plant.effects.library import EFFECTS
 
-# Effect -> number of the rig table that it changes. Both are one direction of the fit and share a derivative: with a derivative
-# for each, the number stays at its bound, the effect stays too small, and another effect is named.
+# An explanation that is no effect of the library: the described mass is wrong. Its probability is one of no effect.
+MASS: Final = "mass"
+# Explanation -> number of the rig table that it changes. Both are one direction of the fit and share a derivative: with a
+# derivative for each, the number stays at its bound, the effect stays too small, and another effect is named.
 LEVELS = {
     "coulomb-level": "coulomb_force_N",
     "static-level": "static_force_N",
     "stribeck-velocity": "stribeck_velocity_mps",
     "drive-stiffness": "drive_stiffness_N_per_m",
+    MASS: "mass_kg",
 }
 
 
@@ -59,6 +62,8 @@ class Hypothesis(NamedTuple):
         for coordinate, value in zip(self.coordinates, w.tolist(), strict=True):
             tables[coordinate.effect][coordinate.name] = coordinate.value(value)
         for name, form in self.forms.items():
+            if name == MASS:
+                continue
             for parameter in EFFECTS[name].forms[form].parameters:
                 tables[name].setdefault(parameter.name, parameter.default)
         return tables

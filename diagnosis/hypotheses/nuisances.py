@@ -8,6 +8,7 @@ from bridge.arrays import Floats
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.feature import BOW
 from diagnosis.gap.problem import Point
+from diagnosis.hypotheses.hypothesis import LEVELS, MASS
 from diagnosis.model.rig import Effects
 from diagnosis.model.sensor_chain import SensorChain
 from diagnosis.result import RigNumber
@@ -70,7 +71,7 @@ class Nuisances:
         return (*numbers, RigNumber("stribeck_tail", 0.0, _TAIL * float(deviations[count]), _TAIL))
 
     def point(self, deviations: Floats, effects: Effects) -> Point:
-        """The model at these deviations, with these effects."""
+        """The model at these deviations, with these effects, and with another mass."""
         count = len(self.rig_names)
         values = self._values(deviations)
         values["stribeck_tail"] = _TAIL * float(deviations[count])
@@ -81,4 +82,8 @@ class Nuisances:
             chain[name] = mean + spread * deviation
             if name in _NOT_NEGATIVE:
                 chain[name] = max(chain[name], 0.0)
-        return Point(values, SensorChain(**chain), effects)
+        acting = {name: table for name, table in effects.items() if name != MASS}
+        if MASS in effects:
+            number = LEVELS[MASS]
+            values[number] = values.get(number, self.described[number]) * (1.0 + float(effects[MASS]["ratio"]))
+        return Point(values, SensorChain(**chain), acting)

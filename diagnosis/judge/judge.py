@@ -12,6 +12,7 @@ import numpy as np
 from scipy.special import expit, softmax
 
 from bridge.arrays import Floats
+from diagnosis.hypotheses.hypothesis import MASS
 from diagnosis.judge.ledger import Ledger, Names
 
 NONE: Final = "none"
@@ -55,10 +56,11 @@ def judge(ledger: Ledger) -> Judged:
     names, columns = explained_by(ledger)
     probabilities = softmax(columns @ np.array([_STEEP, _REFITTED, *_PRIOR])).tolist()
     explanations = dict(sorted(zip(names, probabilities, strict=True), key=lambda item: -item[1]))
-    effects = dict.fromkeys((NONE, *ledger.possible), 0.0)
-    for effects_of_one, probability in explanations.items():
-        for name in effects_of_one or {NONE}:
-            effects[name] += probability / max(len(effects_of_one), 1)
+    effects = dict.fromkeys((NONE, *(name for name in ledger.possible if name != MASS)), 0.0)
+    for names_of_one, probability in explanations.items():
+        acting = names_of_one - {MASS} or {NONE}
+        for name in acting:
+            effects[name] += probability / len(acting)
     left, left_of_kept = remainders(ledger)
     acts = float(expit(_ELSE + _LEFT * left + _LEFT_OF_KEPT * left_of_kept))
     complete = (1.0 - acts) * (1.0 - ledger.beyond) * (1.0 - (_FOREIGN if ledger.foreign else 0.0))

@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.held_out import FAR_FOR_NO_GAP, HeldOut
-from diagnosis.hypotheses.hypothesis import LEVELS, Hypothesis
+from diagnosis.hypotheses.hypothesis import LEVELS, MASS, Hypothesis
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.judge.judge import Judged
 from diagnosis.result import Gap, Kind, WrongNumber
@@ -44,14 +44,14 @@ def verdict_of(judged: Judged, model: Model, latent: tuple[str, ...]) -> tuple[K
         latent: effects that the latent friction shows, for runs that no formula explains.
 
     """
-    names = tuple(sorted(judged.names, key=lambda name: -judged.effects[name]))
+    names = tuple(sorted(judged.names - {MASS}, key=lambda name: -judged.effects[name]))
     kind = _kind(judged, model)
-    if kind == "effect" and LEVELS.keys() >= set(names):
+    if kind == "effect" and LEVELS.keys() >= judged.names:
         return "described", names
     least = {"unexplained": BEYOND, "no-gap": _FAR}.get(kind, math.inf)
     closing = {number.name for number in model.numbers if (number.share or 0.0) > _MOST and (number.off or 0.0) > least}
     if closing and model.gap.retuned <= FAR_FOR_NO_GAP and not model.outside:
-        return "described", tuple(effect for effect, number in LEVELS.items() if number in closing)
+        return "described", tuple(effect for effect, number in LEVELS.items() if number in closing and effect != MASS)
     hidden = kind == "no-gap" and model.gap.retuned > FAR_FOR_NO_GAP  # a gap that only the held-out runs show
     if (kind == "unexplained" or hidden) and latent and not model.outside:
         return "partly", latent[:1]

@@ -14,6 +14,7 @@ from diagnosis.fits.held_out import HeldOut
 from diagnosis.gap.prepare import Prepared, prepare
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.catalogue import cannot_show, trials
+from diagnosis.hypotheses.hypothesis import MASS
 from diagnosis.judge.judge import judge
 from diagnosis.judge.ledger import Ledger, by_fits, by_latent, by_relations, explanations_of
 from diagnosis.judge.relations import beyond_library, evidence_of, shown, speaking
@@ -106,7 +107,7 @@ def with_fits(seen: Witnesses, progress: Progress) -> Witnesses:
 def ledger_of(seen: Witnesses) -> Ledger:
     """The rows of all witnesses."""
     rig, search, held_out = seen.evidence.rig, seen.search, seen.held_out
-    possible = tuple(name for name in EFFECTS if name not in seen.hidden)
+    possible = tuple(name for name in (*EFFECTS, MASS) if name not in seen.hidden)
     answered = speaking(seen.relations.answered, rig)
     explanations = explanations_of(possible, search, answered)
     rows = [*by_relations(explanations, answered), *by_latent(seen.latent)]

@@ -9,6 +9,7 @@ from bridge.faults import Fault
 from bridge.files import write_whole
 from diagnosis.evidence.folder import Evidence
 from diagnosis.evidence.manifest import rig_file_tables
+from diagnosis.hypotheses.hypothesis import LEVELS, MASS
 from diagnosis.model.per_run import as_in_rig_file
 from diagnosis.report.words import headline
 from diagnosis.result import Diagnosis
@@ -56,11 +57,11 @@ def rig_table(diagnosis: Diagnosis, evidence: Evidence) -> dict[str, Any]:
     """The corrected rig as the tables of a rig file, named after the evidence's folder."""
     # The two forces are refitted independently and may cross.
     values = evidence.rig.values() | {parameter.name: parameter.retuned for parameter in diagnosis.rig}
-    if diagnosis.verdict == "described":  # these numbers include the level effects
-        values |= {number.name: number.found for number in diagnosis.numbers}
+    described = diagnosis.verdict == "described"  # these numbers include the level effects; none includes the mass
+    values |= {number.name: number.found for number in diagnosis.numbers if described or number.name == LEVELS[MASS]}
     table: dict[str, Any] = {"name": f"{_word(evidence.folder.name)}-diagnosed", **rig_file_tables(values)}
     effects: dict[str, dict[str, float | str]] = {}
-    for name in diagnosis.effects if diagnosis.verdict != "described" else ():
+    for name in diagnosis.effects if not described else ():
         candidate = next(candidate for candidate in diagnosis.candidates if candidate.effect == name)
         effects[name] = {"form": candidate.form} if candidate.form else {}
         effects[name] |= as_in_rig_file({key: estimate.value for key, estimate in candidate.parameters.items()})
