@@ -11,20 +11,22 @@ import numpy as np
 import typer
 from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableType]
 from scipy.optimize import minimize
-from scipy.special import log_softmax
+from scipy.special import expit
 
 from bench.judge.rigs import drawn_rig
 from bridge.arrays import Floats
 from bridge.files import read_json
 from bridge.results import strict_json, write_json
-from diagnosis.judge.judge import KNEE, Explained, explained_by, remainders
-from diagnosis.judge.ledger import Ledger
+from diagnosis.judge.judge import Explained, explained_by, probabilities, remainders
+from diagnosis.judge.ledger import Ledger, Names
 from diagnosis.judge.witnesses import before_fits, ledger_of, with_fits
 from diagnosis.processes import one_thread
 from diagnosis.result import LedgerRow
 
-_HELD = 1e-2  # penalty on squares of the numbers. Larger: they stay near 0. Smaller: chance is learned from few rigs
+_HELD = 1e-3  # penalty on squares of the numbers. Larger: they stay near 0. Smaller: chance is learned from few rigs
 _KNOWN = 0.5  # probability of its effect from which a rig without this effect in the library counts as outside
+# Evidence of the truth from which an effect is visible, and of anything else from which a rig misleads and is kept.
+_SEEN, _MISLEADS = 2.0, 10.0
 _BEYOND = 0.15  # of the rigs have an effect that the library lacks. More: known effects are called unknown
 
 
@@ -38,7 +40,8 @@ class Example(NamedTuple):
 class Numbers(NamedTuple):
     """The numbers of the judge."""
 
-    explanations: Floats  # _STEEP, _REFITTED, and _PRIOR of one and two effects
+    explanations: Floats  # _WEIGHT, _REFITTED, and _PRIOR of one and two effects
+    misled: float  # _MISLED
     something_else: Floats  # _ELSE, _LEFT, _LEFT_OF_KEPT
 
 
@@ -53,8 +56,9 @@ def train(
     Parallel(n_jobs=jobs)(delayed(keep)(kept / f"{seed}.json", seed) for seed in missing)
     examples = read(kept)
     numbers = numbers_of(examples)
-    typer.echo(f"{len(examples)} rigs, knee {KNEE:g}")
-    typer.echo("_STEEP, _REFITTED, _PRIOR[1:] = " + ", ".join(f"{value:.2f}" for value in numbers.explanations))
+    typer.echo(f"{len(examples)} rigs with a visible effect or none")
+    typer.echo("_WEIGHT, _REFITTED, _PRIOR = " + ", ".join(f"{value:.2f}" for value in numbers.explanations))
+    typer.echo(f"_MISLED = {numbers.misled:.3f}")
     typer.echo("_ELSE, _LEFT, _LEFT_OF_KEPT = " + ", ".join(f"{value:.2f}" for value in numbers.something_else))
 
 
@@ -70,9 +74,10 @@ def keep(path: Path, seed: int) -> None:
 
 
 def read(kept: Path) -> list[Example]:
-    """The kept rigs."""
+    """The kept rigs whose effect, if any, is visible."""
     tables = [read_json(path) for path in sorted(kept.glob("*.json"))]
-    return [Example(from_json(table["ledger"]), frozenset(table["effects"])) for table in tables if table]
+    examples = [Example(from_json(table["ledger"]), frozenset(table["effects"])) for table in tables if table]
+    return [example for example in examples if _visible(example)]
 
 
 def from_json(table: dict[str, Any]) -> Ledger:
@@ -89,15 +94,21 @@ def numbers_of(examples: list[Example]) -> Numbers:
     explained = [explained_by(example.ledger) for example in examples]
     targets = [_target(each, example.effects) for each, example in zip(explained, examples, strict=True)]
 
-    def loss(numbers: Floats) -> float:
-        of_rigs = [-float(t @ log_softmax(each.columns @ numbers)) for each, t in zip(explained, targets, strict=True)]
-        return float(np.mean(of_rigs)) + 0.5 * _HELD * float(numbers @ numbers)
+    def loss(at: Floats) -> float:
+        misled = float(expit(at[-1]))
+        of_rigs = [
+            -math.log(max(float(target @ probabilities(each.columns, at[:-1], misled)), 1e-300))
+            for each, target in zip(explained, targets, strict=True)
+        ]
+        return float(np.mean(of_rigs)) + 0.5 * _HELD * float(at[:-1] @ at[:-1])
 
-    numbers = minimize(loss, np.array([1.0, 0.0, 0.0, 0.0])).x
+    at = minimize(loss, np.array([0.3, 1.0, -1.0, -3.0, -2.5])).x
+    numbers, misled = at[:-1], float(expit(at[-1]))
     lacks = [
         without
         for example, each in zip(examples, explained, strict=True)
-        if (without := _without_its_effect(example, each, numbers)) is not None
+        if (without := _without_its_effect(example, each.names, probabilities(each.columns, numbers, misled)))
+        is not None
     ]
     rows = np.array([(1.0, *remainders(ledger)) for ledger in (*(example.ledger for example in examples), *lacks)])
     outside = np.repeat([0.0, 1.0], [len(examples), len(lacks)])
@@ -108,7 +119,7 @@ def numbers_of(examples: list[Example]) -> Numbers:
         scores = rows @ odds
         return float(counts @ (np.logaddexp(0.0, scores) - outside * scores)) + 0.5 * _HELD * float(odds[1:] @ odds[1:])
 
-    return Numbers(numbers, minimize(loss_of_else, np.zeros(3)).x)
+    return Numbers(numbers, misled, minimize(loss_of_else, np.zeros(3)).x)
 
 
 def _target(explained: Explained, effects: frozenset[str]) -> Floats:
@@ -118,11 +129,22 @@ def _target(explained: Explained, effects: frozenset[str]) -> Floats:
     return most / most.sum()
 
 
-def _without_its_effect(example: Example, explained: Explained, numbers: Floats) -> Ledger | None:
+def _visible(example: Example) -> bool:
+    """Whether the rig has no effect, or any witness shows one.
+
+    An effect below its detection limit is no effect to every witness, and `none` the right answer.
+    """
+    names, columns = explained_by(example.ledger)
+    own = max(
+        (column[0] for effects, column in zip(names, columns, strict=True) if effects <= example.effects), default=0.0
+    )
+    return not example.effects or own > _SEEN or columns[:, 0].max() > _MISLEADS
+
+
+def _without_its_effect(example: Example, names: list[Names], values: Floats) -> Ledger | None:
     """The ledger of a library that lacks the effect that leads; None where the library did not show it."""
-    probabilities = np.exp(log_softmax(explained.columns @ numbers))
     by_name = {
-        name: sum(p for p, names in zip(probabilities, explained.names, strict=True) if name in names)
+        name: sum(value for value, effects in zip(values.tolist(), names, strict=True) if name in effects)
         for name in example.effects
     }
     leading = max(by_name, key=lambda name: by_name[name], default="")

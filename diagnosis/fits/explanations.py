@@ -11,10 +11,10 @@ from diagnosis.fits.batch import Work, together
 from diagnosis.fits.evidence import NOISE, cost_of_freedom, of_remainder
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import FAR_KNEE, Fitter
-from diagnosis.fits.refits import best_of_each, each_beside, refits
+from diagnosis.fits.refits import Start, best_of_each, each_beside, refits
 from diagnosis.fits.screening import Screened, Screening
 from diagnosis.gap.measure import KNEE
-from diagnosis.hypotheses.hypothesis import NOTHING, Hypothesis
+from diagnosis.hypotheses.hypothesis import LEVELS, NOTHING, Hypothesis
 from diagnosis.hypotheses.starts import Trial
 from diagnosis.model.per_run import is_phase
 from diagnosis.processes import spread
@@ -79,7 +79,9 @@ class Search:
             founded = lead.chi2 < _CLOSES * self.rig.fit.chi2 or self._related(frozenset(lead.effects)) > 0.0
             if founded and lead.chi2 > _MUCH_LEFT * NOISE * len(lead.residual):
                 progress(f"best single effect: {', '.join(lead.effects)}; looking for a second", 0.65)
-                self.fits += self._pairs(lead, shown)
+                pairs = self._pairs(lead, shown)
+                singles = best_of_each(sorted([*singles, *self._within(pairs[:1])], key=lambda fit: fit.chi2))
+                self.fits = [self.rig.fit, *singles, *pairs]
 
     def fitted(self, names: Names) -> Fit | None:
         """The fit of these effects; None without one."""
@@ -167,6 +169,28 @@ class Search:
         promised = self._promises(best, self._places[0])
         others = [start for start in promised if set(start.hypothesis.effects) & (shown - set(best.effects))]
         return refitted(self.rig.fitter, best_of_each([*others, *promised[:_SECOND]]), _FULL_PAIRS, self._jobs)
+
+    def _within(self, pairs: Sequence[Fit]) -> list[Fit]:
+        """Each effect of two alone, refitted from their fit, which may have found a deeper valley of chi2."""
+        nuisances, starts = self.rig.fitter.nuisances, list[Start]()
+        for fit in pairs:
+            axes = list(zip(fit.hypothesis.coordinates, fit.w.tolist(), strict=True))
+            for name, form in fit.hypothesis.forms.items():
+                deviations = fit.deviations.copy()
+                for axis, w in axes:
+                    number = LEVELS.get(axis.effect)
+                    if axis.effect != name and number in nuisances.rig_names:  # the number can move instead
+                        deviations[nuisances.rig_names.index(number)] += axis.value(w) / nuisances.tolerance[number]
+                own = [(axis, w) for axis, w in axes if axis.effect == name]
+                hypothesis = Hypothesis({name: form}, tuple(axis for axis, _ in own))
+                starts.append(
+                    (
+                        hypothesis,
+                        np.clip(deviations, -self.rig.fitter.most, self.rig.fitter.most),
+                        np.array([w for _, w in own]),
+                    )
+                )
+        return refits(self.rig.fitter, starts, self._jobs)
 
 
 def refitted(fitter: Fitter, starts: Sequence[Screened], full: int, jobs: int = 1) -> list[Fit]:

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from diagnosis.hypotheses.hypothesis import MASS
 from diagnosis.judge.judge import NONE, judge
 from diagnosis.judge.ledger import Ledger
 from diagnosis.result import LedgerRow
@@ -45,6 +46,16 @@ def test_two_effects_share_the_probability_of_their_explanation() -> None:
     assert answer.names == {LAG, DRIFT}
     assert answer.explanations[answer.names] > 0.6
     assert answer.effects[DRIFT] == pytest.approx(0.5 * answer.explanations[answer.names], abs=0.02)
+
+
+def test_a_wrong_mass_is_an_explanation_without_an_effect() -> None:
+    possible = (LAG, GAIN, DRIFT, MASS)
+    rows = NOTHING, row(MASS, "fit", 80.0, 0.0), row(GAIN, "fit", 20.0, 1.0), row(f"{GAIN} {MASS}", "fit", 80.0, 0.0)
+    answer = judge(Ledger(rows, possible, 0.0, foreign=False))
+    assert answer.names == {MASS}
+    assert MASS not in answer.effects
+    assert answer.effects[NONE] > 0.6
+    assert sum(answer.effects.values()) == pytest.approx(1.0)
 
 
 def test_a_second_effect_has_to_earn_its_prior() -> None:

@@ -47,6 +47,8 @@ def judged(names: tuple[str, ...], complete: float) -> Judged:
         ((), 0.9, Model(True, (), CLOSED, False), ("no-gap", ())),
         ((), 0.1, Model(True, (), OPEN, False), ("unexplained", ())),
         (("static-level",), 0.9, Model(True, (STATIC,), CLOSED, False), ("described", ("static-level",))),
+        (("mass",), 0.9, Model(True, (MASS,), CLOSED, False), ("described", ())),
+        (("mass", "friction-drift"), 0.9, Model(True, (MASS,), NAMED, False), ("effect", ("friction-drift",))),
         (("static-level",), 0.1, Model(True, (STATIC,), CLOSED, False), ("partly", ("static-level",))),
         ((), 0.1, Model(True, (STATIC, IDLE), CLOSED, False), ("described", ("static-level",))),
         ((), 0.1, Model(True, (MASS,), CLOSED, False), ("described", ())),
@@ -113,6 +115,14 @@ def test_a_level_and_the_refitted_number_are_one_number_and_its_share_is_that_of
     exact = Nuisances(RigTable(**RIG))
     (number,) = wrong_numbers(exact, fitted(exact, {}, -0.2), None)
     assert (number.found, number.off) == (pytest.approx(14.0 * 0.8), None)
+
+
+def test_another_mass_changes_the_number_and_no_effect_acts() -> None:
+    nuisances = Nuisances(RigTable(**RIG, tolerance={"mass_kg": 0.01}))
+    heavier = np.array([1.0, *(0.0 for _ in nuisances.names[1:])])
+    point = nuisances.point(heavier, {"mass": {"form": "", "ratio": 0.2}, "friction-drift": {"form": "linear"}})
+    assert point.values["mass_kg"] == pytest.approx(1.5 * 1.01 * 1.2)
+    assert set(point.effects) == {"friction-drift"}
 
 
 def test_the_bench_reads_diagnoses_of_both_formats():
