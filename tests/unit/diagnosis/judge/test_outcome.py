@@ -29,6 +29,7 @@ RIG: Any = {
 
 
 NAMED = Gap("", nominal=12.6, retuned=5.0, with_effect=1.1, shrinkage=0.97)
+PART = NAMED._replace(with_effect=3.9, shrinkage=0.3)
 USELESS = NAMED._replace(with_effect=5.5, shrinkage=-0.1)
 
 
@@ -46,6 +47,9 @@ def judged(names: tuple[str, ...], complete: float) -> Judged:
         (("drive-damping",), 0.9, Model(False, (), CLOSED, False), ("partly", ("drive-damping",))),
         ((), 0.9, Model(True, (), CLOSED, False), ("no-gap", ())),
         ((), 0.1, Model(True, (), OPEN, False), ("unexplained", ())),
+        ((), 0.9, Model(True, (), OPEN, False), ("unexplained", ())),
+        (("drive-damping",), 0.9, Model(True, (), PART, False), ("partly", ("drive-damping",))),
+        (("mass",), 0.9, Model(True, (MASS,), PART, False), ("unexplained", ())),
         (("static-level",), 0.9, Model(True, (STATIC,), CLOSED, False), ("described", ("static-level",))),
         (("mass",), 0.9, Model(True, (MASS,), CLOSED, False), ("described", ())),
         (("mass", "friction-drift"), 0.9, Model(True, (MASS,), NAMED, False), ("effect", ("friction-drift",))),
