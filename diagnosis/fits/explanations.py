@@ -1,5 +1,6 @@
 """Fits of one effect and of two: of every effect the best start, and refits of the starts that promise most."""
 
+import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -11,7 +12,7 @@ from diagnosis.fits.batch import Work, together
 from diagnosis.fits.evidence import NOISE, cost_of_freedom, of_remainder
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import FAR_KNEE, Fitter
-from diagnosis.fits.refits import Start, best_of_each, each_beside, refits
+from diagnosis.fits.refits import best_of_each, each_beside, refits
 from diagnosis.fits.screening import Screened, Screening
 from diagnosis.gap.measure import KNEE
 from diagnosis.hypotheses.hypothesis import LEVELS, NOTHING, Hypothesis
@@ -80,7 +81,7 @@ class Search:
             if founded and lead.chi2 > _MUCH_LEFT * NOISE * len(lead.residual):
                 progress(f"best single effect: {', '.join(lead.effects)}; looking for a second", 0.65)
                 pairs = self._pairs(lead, shown)
-                singles = best_of_each(sorted([*singles, *self._within(pairs[:1])], key=lambda fit: fit.chi2))
+                singles = best_of_each(sorted([*singles, *self._within(pairs[:1], singles)], key=lambda fit: fit.chi2))
                 self.fits = [self.rig.fit, *singles, *pairs]
 
     def fitted(self, names: Names) -> Fit | None:
@@ -170,9 +171,9 @@ class Search:
         others = [start for start in promised if set(start.hypothesis.effects) & (shown - set(best.effects))]
         return refitted(self.rig.fitter, best_of_each([*others, *promised[:_SECOND]]), _FULL_PAIRS, self._jobs)
 
-    def _within(self, pairs: Sequence[Fit]) -> list[Fit]:
-        """Each effect of two alone, refitted from their fit, which may have found a deeper valley of chi2."""
-        nuisances, starts = self.rig.fitter.nuisances, list[Start]()
+    def _within(self, pairs: Sequence[Fit], singles: Sequence[Fit]) -> list[Fit]:
+        """Each effect of two alone, refitted from their fit where that leaves less than its own fit."""
+        nuisances, starts = self.rig.fitter.nuisances, list[Screened]()
         for fit in pairs:
             axes = list(zip(fit.hypothesis.coordinates, fit.w.tolist(), strict=True))
             for name, form in fit.hypothesis.forms.items():
@@ -183,14 +184,12 @@ class Search:
                         deviations[nuisances.rig_names.index(number)] += axis.value(w) / nuisances.tolerance[number]
                 own = [(axis, w) for axis, w in axes if axis.effect == name]
                 hypothesis = Hypothesis({name: form}, tuple(axis for axis, _ in own))
-                starts.append(
-                    (
-                        hypothesis,
-                        np.clip(deviations, -self.rig.fitter.most, self.rig.fitter.most),
-                        np.array([w for _, w in own]),
-                    )
-                )
-        return refits(self.rig.fitter, starts, self._jobs)
+                deviations = np.clip(deviations, -self.rig.fitter.most, self.rig.fitter.most)
+                starts.append(Screened(hypothesis, deviations, np.array([w for _, w in own]), fit.chi2))
+        left = {frozenset(fit.effects): fit.chi2 for fit in singles}
+        quick = each_beside(self._jobs, _quick, self.rig.fitter, starts)
+        better = [fit for fit in quick if fit.chi2 < left.get(frozenset(fit.effects), math.inf)]
+        return each_beside(self._jobs, Fitter.going_further, self.rig.fitter, better)
 
 
 def refitted(fitter: Fitter, starts: Sequence[Screened], full: int, jobs: int = 1) -> list[Fit]:
