@@ -1,5 +1,6 @@
 """Shares of what a relation shows on the held-out runs, from fits to the others, with intervals and what chance would show."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -62,7 +63,7 @@ def interval_90(parts: Floats, squares: Floats) -> tuple[float, float]:
     """90 % interval of sum(parts) over sum(squares), [pieces] each, by the jackknife over the pieces."""
     without = (parts.sum() - parts) / np.maximum(squares.sum() - squares, 1e-30)
     share = float(parts.sum()) / max(float(squares.sum()), 1e-30)
-    half = _TWO_SIDED_90 * float(np.sqrt((len(parts) - 1) * np.var(without)))
+    half = _TWO_SIDED_90 * math.sqrt((len(parts) - 1) * float(np.var(without)))
     return share - half, share + half
 
 
@@ -92,5 +93,5 @@ def _null(products: Products, runs: tuple[list[int], list[int]], noise: BandNois
     covariance = (inverse[:, -len(mine) :] - inverse @ inverse.T) * np.outer(spread, spread)
     inner = products.values[held_out].sum(axis=0)[:, mine][:, :, mine]
     across, square = np.tensordot(noise.variance, inner, axes=1), inner.sum(axis=0)
-    most = 2.0 * _ONE_SIDED_90 * np.sqrt(max(float(np.trace(across @ covariance)), 0.0))
+    most = 2.0 * _ONE_SIDED_90 * math.sqrt(max(float(np.trace(across @ covariance)), 0.0))
     return max(most - float(np.trace(square @ covariance)), 0.0) / noise.square(products, held_out)
