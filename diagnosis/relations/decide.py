@@ -7,8 +7,8 @@ from diagnosis.evidence.manifest import RigTable
 from diagnosis.relations.answer import Answered, Relations
 from diagnosis.relations.relation import OUTSIDE
 
-# Log evidence from which a relation names a cause, or shows a pattern, and within which another cause is tried by a fit as well. Of
-# 138 cases with known answers, 8 shows no pattern more; a cause with less is named by the judge, from all rows.
+# Log evidence from which a relation names a cause or shows a pattern, and within which another cause is tried by a fit as well.
+# With 8 none of 138 cases with known answers shows a pattern more; a cause with less is named by the judge, from all rows.
 _SURE = 25.0
 # Size of a pattern, in noise and in the size of what the chosen causes take, from which it counts: a formula that is not quite
 # the rig's leaves up to 0.11. Smaller: such formulas are outside. Larger: at 0.8 a yawing guide is not.
