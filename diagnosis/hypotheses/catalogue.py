@@ -54,9 +54,7 @@ class EffectRow(NamedTuple):
     forms: dict[str, Tried]
     check: str = ""  # check by hand; empty: the check for the part on which it acts
     check_against: dict[str, str] = {}  # check by hand that separates it from another effect, stated in one of the rows
-    shown_twice: bool = (
-        False  # whether the first two of `shown_by` are drawn, as its forms show over different variables
-    )
+    shown_twice: bool = False  # whether two of `shown_by` are drawn, as its forms show over different variables
 
 
 BREAKAWAY: Final = "breakaway"

@@ -34,7 +34,7 @@ from plant.effects.library import EFFECTS
 _WAVES = 4  # ranges of periods that are searched
 # Ranges of periods that are searched for waves with a harmonic: sines explain less than half of the variance of bumps.
 _STEEP_WAVES = 2
-# Starts of bumps in shares of the spread of a pitch: a fit from one that is off by half a percent may end in a local minimum.
+# Starts of bumps in shares of the spread of a pitch: with half a percent of error a fit may end in a local minimum.
 _BESIDE = (-0.25, 0.0, 0.25)
 _STUCK = (1.05, 1.13)  # natural frequency of a base over the frequency at which it rings with the slide stuck to it
 _AGE_LIMITS_S = (1e-3, 1e5)  # bounds of the contact's age: one block, one day
