@@ -76,8 +76,8 @@ def _blocks(relation: Relation, terms: tuple[Term, ...], runs: list[int]) -> Flo
         for piece in relation.pieces[run]:
             rows = in_time(relation, terms, run, piece, None)
             # the other runs do not give the coefficients of the run's own columns
-            own, _ = np.linalg.qr(rows[:, mask & rows.any(axis=0)])
-            rows -= own @ (own.T @ rows)
+            basis, _ = np.linalg.qr(rows[:, mask & rows.any(axis=0)])
+            rows -= basis @ (basis.T @ rows)
             blocks += [block.T @ block for block in np.array_split(rows, max(round(len(rows) / length), 1))]
     return np.array(blocks)
 
