@@ -9,8 +9,7 @@ from diagnosis.judge.judge import judge
 from diagnosis.judge.witnesses import before_fits, ledger_of, with_fits
 from diagnosis.processes import one_thread
 from diagnosis.report.assemble import assembled
-from diagnosis.report.relations_block import in_a_line, with_relations
-from diagnosis.report.words import latent_line
+from diagnosis.report.relations_block import with_relations
 from diagnosis.result import Diagnosis
 
 
@@ -29,9 +28,6 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1, budget_s: fl
     began = time.monotonic()
     with one_thread():
         seen = before_fits(evidence, jobs, math.inf if budget_s is None else began + budget_s)
-        for line in (in_a_line(seen.decision), latent_line(seen.latent)):
-            if line:
-                progress(line, 0.02)
         if seen.comparable:
             seen = with_fits(seen, progress)
         ledger = ledger_of(seen)

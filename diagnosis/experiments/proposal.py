@@ -16,7 +16,7 @@ from diagnosis.experiments.candidate_runs import Plan, as_run, plans
 from diagnosis.features.feature import Feature
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.surface import ROUGHNESS
-from diagnosis.gap.measure import Floor, compress, floor_of, replicates, slope_of_compress
+from diagnosis.gap.measure import LACKING, Floor, compress, floor_of, replicates, slope_of_compress
 from diagnosis.gap.problem import PIEZO_EFFECTS, Point, Problem
 from diagnosis.hypotheses.catalogue import CATALOGUE, FRAME, SPEEDS, SWEEP, TAP, TRACK, WEIGHT
 from diagnosis.hypotheses.hypothesis import MASS
@@ -40,8 +40,6 @@ _SEPARATES = 2.0
 _CERTAIN = 0.05
 # Steps for derivatives: of nuisances in tolerances, of an effect's coordinates in their units. Small against curvature.
 _STEP, _STEP_OF_EFFECT = 0.5, 0.15
-# Difference, in floors, of a feature that only one explanation shows, such as a slip. Larger: slips at the edge decide.
-_MISSING = 4.0
 UNCOUPLE = "Uncouple the drive from the mass and vibrate: any vibration left in the force signal is not force."
 WEIGH = "Weigh the slide with everything that moves with it."
 SINE = "Halve the piezo's voltage, then tighten its mount: harmonics of a drive too hard or loose fall faster than the vibration."
@@ -134,7 +132,7 @@ class _Imagined:
         self.floor: Floor = floor_of(self.problem, first_point, drawn)
         first_expected, second_expected = self._expected([first_point, second_point])
         apart = second_expected - first_expected
-        self.apart = np.where(np.isfinite(apart), apart, _MISSING)
+        self.apart = np.where(np.isfinite(apart), apart, LACKING)
         """Second explanation minus first, in floors [compared]."""
 
     def _expected(self, points: list[Point]) -> list[Floats]:

@@ -17,7 +17,7 @@ from diagnosis.features.grid import BLOCK_S
 
 # Blocks over which a cubic smooths the position. Too small: noise of the encoder; too large: reversals are smeared.
 # With 31 blocks, 0.2 um of encoder noise give 1e-5 m/s and 1e-3 m/s^2.
-_WINDOW = 31
+WINDOW = 31
 _EVERY = 5  # the search for zero and speed uses every fifth block; more blocks only cost time
 
 
@@ -48,8 +48,8 @@ def motion_of(signals: dict[str, Floats], samples_per_block: float, rig: RigTabl
     elif samples_per_block >= 2.0:
         at = np.arange(len(position), dtype=np.float64)
         position = np.interp(at - 0.5, at, position)
-    velocity = np.asarray(savgol_filter(position, _WINDOW, 3, deriv=1, delta=BLOCK_S), np.float64)
-    accel = np.asarray(savgol_filter(position, _WINDOW, 3, deriv=2, delta=BLOCK_S), np.float64)
+    velocity = np.asarray(savgol_filter(position, WINDOW, 3, deriv=1, delta=BLOCK_S), np.float64)
+    accel = np.asarray(savgol_filter(position, WINDOW, 3, deriv=2, delta=BLOCK_S), np.float64)
     return SlideMotion(position, velocity, accel, rig.mass_kg * accel)
 
 

@@ -19,7 +19,7 @@ _FEWEST = 500  # fewest blocks of a piece; a shorter piece would repeat too ofte
 _FEWEST_STILL = 100  # fewest blocks of a piece of acceleration: a short piece is better than remains of a vibration
 # Drift of the force sensor in a replicate, as a share of the static friction: 5 mN on the paper's rig, the drift of a strain
 # gauge within 10 s. Too small: a good sensor's drift is a gap; too large: small effects on the level of the force are hidden.
-_SLOW_SHARE = 3e-4
+SLOW_SHARE = 3e-4
 _SLOW_WAVES = 6  # number of half waves over a run in the drift
 _POSITION_WINDOW, _FORCE_WINDOW = 41, 5  # blocks of the cubic that is subtracted, with a force drive
 
@@ -72,7 +72,7 @@ def noise_of(signals: Signals, commands: CommandedRun, scales: Scales) -> RunNoi
             pieces[name] = values[still]
         else:
             pieces[name] = rest * (_WINDOW / (_WINDOW - 1.0)) ** 0.5
-    return RunNoise(pieces, shake, _SLOW_SHARE * scales.force_N)
+    return RunNoise(pieces, shake, SLOW_SHARE * scales.force_N)
 
 
 def _axis_noise(signals: Signals, scales: Scales) -> RunNoise:
@@ -92,4 +92,4 @@ def _axis_noise(signals: Signals, scales: Scales) -> RunNoise:
         calm[:_POSITION_WINDOW] = calm[-_POSITION_WINDOW:] = False
         pieces[name] = rest[calm] if calm.sum() >= _FEWEST else rest
     shake = {name: float(np.median(values)) for name, values in signals.items() if name.endswith("shake_mps2")}
-    return RunNoise(pieces, shake, _SLOW_SHARE * scales.force_N)
+    return RunNoise(pieces, shake, SLOW_SHARE * scales.force_N)

@@ -30,12 +30,12 @@ _SLOWEST, _STILL = 0.01, 1e-7
 # Deviation of a window from the velocity of its piece, as a share of the change of speed, up to which the speed is reached.
 # Too small: noise and ripple count as a change of speed. Too large: the end of a ramp counts as constant speed.
 _ON_THE_WAY = 0.1
-_QUICK = 2  # longest change of speed that counts as a step [windows]; `_SETTLING` covers half of it
+_QUICK = 2  # longest change of speed that counts as a step [windows]; `SETTLING` covers half of it
 _LONGEST_RAMP = 20  # longest rise of speed that counts as a change [windows]; a longer rise is a piece with a gap
 _RATE_WINDOW = 41  # blocks over which the velocity during a change is measured: 1 um of noise gives 13 um/s
 # Blocks (0.1 s) left out after a change of command and at the start of a run, while drive and piezo settle.
 # Too small: the settling shows as a gap; too large: short segments lose their slips. Counted: docs/method/diagnosis.md.
-_SETTLING = 100
+SETTLING = 100
 
 
 class Segment(NamedTuple):
@@ -108,7 +108,7 @@ def commands_of(run: MeasuredRun, rig: RigTable, reduced: dict[str, Floats]) -> 
     edges = [0, *(np.flatnonzero(change) + 1).tolist(), blocks]
     f_Hz, u0_m = frequency_Hz, amplitude_m
     segments = tuple(
-        Segment(first + _SETTLING, last, float(drive[first]), float(f_Hz[first]), float(u0_m[first]))
+        Segment(first + SETTLING, last, float(drive[first]), float(f_Hz[first]), float(u0_m[first]))
         for first, last in pairwise(edges)
         if (last - first) * BLOCK_S >= SHORTEST_S
     )

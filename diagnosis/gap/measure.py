@@ -26,16 +26,13 @@ from bridge.arrays import Floats
 from diagnosis.features.feature import DRIVE_WAVES, POWERS, Feature
 from diagnosis.gap.problem import Draw, Point, Problem
 from diagnosis.model.rig import Roughness
+from diagnosis.model.sensor_chain import BEND_S2
 from diagnosis.processes import spread
 
 # Difference, in noise floors, up to which it counts in full; beyond, it counts as its logarithm.
 # Too small: large differences, which identify the effect, count little. Too large: a signal that is far off hides all others.
 KNEE = 6.0
 _LEAST_POWER = 1e-30  # squared unit of the signal: keeps the logarithm of a power finite; far below any sensor's noise
-# Smallest scatter of "spring bend" [s2 x stiffness]: the bend of the force over the extension due to sensors.
-# Too small: rigs without a gap show a bend. Too large: a slow and a delayed force sensor are not separated.
-# Counted on 20 rigs without a gap (docs/method/diagnosis.md).
-_SENSORS_BEND_S2 = 1e-7
 _SHORT_WAVES = frozenset(f"wave {number}" for number in range(5, DRIVE_WAVES + 1))  # shorter than a sensor's bow
 # Share of the replicates in which a feature must be finite to be compared.
 # Too small: its scatter comes from few replicates. Too large: features of segments with few slips are lost.
@@ -49,13 +46,10 @@ DEFINITION = (
 # Difference, in noise floors, of every feature of a rig that cannot be simulated: larger than any other difference.
 # Too small: an impossible rig, which has no features to differ in, beats possible rigs (docs/method/diagnosis.md).
 _IMPOSSIBLE = 1e4
-# Difference, in noise floors, of a feature that the rig shows and the model does not; only for the reported gap.
-# Too small: a model without slips seems good. Too large: it has little effect, as T is a logarithm there.
-_LACKING = 8.0
-# Penalty, in noise floors, for a measured slip that the model does not show (after whitening, so each slip counts once).
+# Difference, in noise floors, of a feature that the rig shows and the model does not; in a fit, of each slip (after whitening).
 # Too small: models that lose slips win. Too large: a fit that starts with late slips cannot recover.
 # Counted on one late slip (docs/method/diagnosis.md).
-_LACKING_SLIP = 5.0
+LACKING = 5.0
 
 
 class Floor(NamedTuple):
@@ -241,35 +235,33 @@ def _least(label: Feature, problem: Problem) -> float:
     if problem.rig.drive == "force":
         return _least_of_axis(label, force_N, problem.force_peak_N)
     drop_m = 0.3 * force_N / stiffness  # length of a slip when friction falls by a sixth
-    if label.name == "rest":
-        return 1.5  # noise of a displacement sensor between 5 and 24 Hz cannot be estimated from the run
-    if label.name in {"scatter", "ripple"}:
-        return 0.6  # small powers: hum, slow noise and the roughness of a track are as large
-    if label.name in {"ring", "spring rest"}:
-        return 0.25
-    if label.name == "spring cube":
-        return 8e-3 * force_N  # over a short stretch the bow of a displacement sensor looks like a stiffening spring
-    if label.name == "spring bend":
-        return _SENSORS_BEND_S2 * stiffness
-    if label.name.startswith("spring"):
-        return 2e-3 * force_N  # a bow of 0.2 % in a displacement sensor changes the slope along the track
-    if label.name.startswith("vibration"):
-        return 0.006 if label.signal == "base_accel_mps2" else 0.04
-    if label.name == "period":
-        return 0.003
-    if label.name.startswith("rate"):
-        return 0.003 * force_N
-    if label.signal == "drive_force_N":
-        return 3e-4 * force_N
-    if label.signal.endswith("accel_mps2"):
-        if label.name in {"shape -0.5", "shape 0.5"}:  # the acceleration jumps where a slip begins and where it ends
-            return 0.1 * drop_m * (np.pi / slip_s) ** 2
-        return 4e-3 * drop_m * (np.pi / slip_s) ** 2
-    if (
-        label.signal == "drive_position_m"
-    ):  # a sensor's bow appears in the long waves; over a short way its error is small
-        return (4e-4 if label.name in _SHORT_WAVES else 2e-3) * drop_m
-    return 1e-3 * drop_m
+    accel_mps2 = drop_m * (np.pi / slip_s) ** 2
+    jumps = label.name in {"shape -0.5", "shape 0.5"}  # the acceleration jumps where a slip begins and where it ends
+    by_name = {
+        "rest": 1.5,  # noise of a displacement sensor between 5 and 24 Hz cannot be estimated from the run
+        "scatter": 0.6,  # small powers: hum, slow noise and the roughness of a track are as large
+        "ripple": 0.6,
+        "ring": 0.25,
+        "spring rest": 0.25,
+        "spring cube": 8e-3
+        * force_N,  # over a short stretch the bow of a displacement sensor looks like a stiffening spring
+        "spring bend": BEND_S2 * stiffness,
+        "period": 0.003,
+    }
+    by_first_word = {
+        "spring": 2e-3 * force_N,  # a bow of 0.2 % in a displacement sensor changes the slope along the track
+        "vibration": 0.006 if label.signal == "base_accel_mps2" else 0.04,
+        "rate": 0.003 * force_N,
+    }
+    by_signal = {
+        "drive_force_N": 3e-4 * force_N,
+        "mass_accel_mps2": (0.1 if jumps else 4e-3) * accel_mps2,
+        "base_accel_mps2": (0.1 if jumps else 4e-3) * accel_mps2,
+        # a sensor's bow appears in the long waves; over a short way its error is small
+        "drive_position_m": (4e-4 if label.name in _SHORT_WAVES else 2e-3) * drop_m,
+        "mass_position_m": 1e-3 * drop_m,
+    }
+    return by_name.get(label.name) or by_first_word.get(label.name.split()[0]) or by_signal[label.signal]
 
 
 def _least_of_axis(label: Feature, force_N: float, peak_N: float) -> float:
@@ -292,16 +284,16 @@ def chi2_of(left: Floats) -> float:
 def differences(floor: Floor, problem: Problem, predicted: Floats) -> Floats:
     """Measured less predicted features, in noise floors, [compared], not compressed.
 
-    `predicted` is [features]; a measured feature without a prediction counts as `_LACKING`.
+    `predicted` is [features]; a measured feature without a prediction counts as `LACKING`.
     """
     z = between(floor, predicted, problem.measured)
-    return np.where(np.isfinite(z), z, _LACKING)
+    return np.where(np.isfinite(z), z, LACKING)
 
 
 def whitened(floor: Floor, problem: Problem, predicted: Floats, knee: float = KNEE) -> tuple[Floats, Floats]:
     """Differences of measured and predicted features, compressed and made independent; and the derivative of the compression.
 
-    Both are [compared]. Slips that the prediction lacks are penalised by segment, see `_LACKING_SLIP`.
+    Both are [compared]. Slips that the prediction lacks are penalised by segment, see `LACKING`.
 
     Args:
         floor: the noise floor of `problem`.
@@ -320,7 +312,7 @@ def whitened(floor: Floor, problem: Problem, predicted: Floats, knee: float = KN
         for place in np.unique(places[lacking]).tolist():
             mask = lacking & (places == place)
             slips = max(problem.slips[place], 1)
-            z[mask] = _LACKING_SLIP * slips**0.5 / np.linalg.norm(floor.whitening[:, mask].sum(axis=1))
+            z[mask] = LACKING * slips**0.5 / np.linalg.norm(floor.whitening[:, mask].sum(axis=1))
     return floor.whitening @ compress(z, knee), slope_of_compress(z, knee)
 
 

@@ -22,20 +22,23 @@ from diagnosis.model.per_run import in_run, of_run
 from diagnosis.model.predict import predict_many
 from diagnosis.model.rig import AGE_BEFORE_S, AGE_SPREAD, Effects, Roughness, Start, StartState, rig_config
 from diagnosis.model.segment_starts import misread
-from diagnosis.model.sensor_chain import SENSOR_EFFECTS, SensorChain, relative, sensed, true_commands, true_force_N
+from diagnosis.model.sensor_chain import (
+    ORDINARY,
+    SENSOR_EFFECTS,
+    SensorChain,
+    relative,
+    sensed,
+    true_commands,
+    true_force_N,
+)
 from plant.config import RigConfig
 from plant.effects.library import EFFECTS
 from plant.four_rigs_step import LANES, NARROW
 
 AGEING, AGE_BEFORE = "static-friction-ageing", "age_before_s"  # an effect, and the contact's age when a run begins
 PIEZO_EFFECTS = frozenset(name for name, effect in EFFECTS.items() if effect.acts_on == "piezo")
-# Spread of the position channels' scale from one piece of track to another (relative, standard deviation of the replicates).
-# Too small: the bow of a good sensor looks like a spring. Too large: a changed stiffness is hidden.
-# A linearity of 0.2 % of the range is up to 0.8 % in slope.
-_SCALE_SPREAD = 0.004
 # Simulated runs that are kept, of 0.6 MB each. Fewer: trials simulate their common start again. More: memory.
 _KEPT = 64
-_DIVERGED = 1e100  # a larger feature counts as missing, as its square would overflow
 
 
 class Point(NamedTuple):
@@ -129,7 +132,8 @@ class Problem:
         result: list[Floats] = []
         for part in parts:
             features = np.array(part) if len(part) == len(self.measured) else np.full(len(self.measured), np.nan)
-            result.append(np.where(np.abs(features) < _DIVERGED, features, np.nan))
+            with np.errstate(over="ignore"):  # a feature whose square overflows counts as missing
+                result.append(np.where(np.isfinite(features * features), features, np.nan))
         return result
 
     def signals(self, run: Prepared, point: Point) -> Signals:
@@ -265,7 +269,9 @@ def _request(run: Prepared, point: Point, draw: Draw | None) -> _Request:
     )
     chain = point.chain
     if draw is not None:
-        chain = chain._replace(position_scale=chain.position_scale + _SCALE_SPREAD * float(draw.random.normal()))
+        # from one piece of track to another
+        scale = ORDINARY["position_scale"][1] * float(draw.random.normal())
+        chain = chain._replace(position_scale=chain.position_scale + scale)
         entries = tuple(misread(entry, run.noise, draw.random) for entry in entries)
     return _Request(point, draw, _rig_effects(run, point.effects, draw), start, entries, chain)
 

@@ -53,11 +53,8 @@ class EffectRow(NamedTuple):
     shown_by: tuple[Over, ...]  # residuals that show the effect, the best first; the next if channels are missing
     forms: dict[str, Tried]
     check: str = ""  # check by hand; empty: the check for the part on which it acts
-    check_against: dict[
-        str, str
-    ] = {}  # check by hand that separates it from another effect; stated in one of the two rows
-    # whether the first two of `shown_by` are drawn, as its forms show over different variables
-    shown_twice: bool = False
+    check_against: dict[str, str] = {}  # check by hand that separates it from another effect, stated in one of the rows
+    shown_twice: bool = False  # whether two of `shown_by` are drawn, as its forms show over different variables
 
 
 BREAKAWAY: Final = "breakaway"

@@ -6,25 +6,12 @@ missing nuisance in another way.
 
 from bridge.arrays import Floats
 from diagnosis.evidence.manifest import RigTable
-from diagnosis.features.feature import BOW
 from diagnosis.gap.problem import Point
 from diagnosis.hypotheses.hypothesis import LEVELS, MASS
 from diagnosis.model.rig import Effects
-from diagnosis.model.sensor_chain import SensorChain
+from diagnosis.model.sensor_chain import ORDINARY, SensorChain
 from diagnosis.result import RigNumber
 
-# Mean and standard deviation of sensor numbers that no manifest states. A 2 kHz force channel lags by 80 us, an 800 Hz
-# displacement channel by 200 us, an unfiltered channel by 0; displacement sensors are linear to 0.2 % of their range: up to 0.8 %
-# in slope; common accelerometers begin at 0 to 0.5 Hz and end at 10 kHz or above.
-_CHAIN = {
-    "force_delay_s": (4e-5, 4e-5),
-    "position_delay_s": (1e-4, 1e-4),
-    "position_scale": (1.0, 0.004),
-    "drive_slope": (0.0, 0.006),
-    "drive_bow_per_m": (0.0, 2.0 * BOW),  # over the travel: 0.2 %, the linearity above
-    "accel_lowest_Hz": (0.25, 0.25),
-    "accel_rolled_off": (0.5, 0.5),
-}
 _PAPER_TRAVEL_M = 1e-2  # of the drive in the runs of the paper's rig
 # Standard deviation of the tail of the Stribeck curve: a table states two friction levels and a velocity, and the curve between
 # them is not exactly the Gaussian of tail 0.
@@ -44,7 +31,7 @@ class Nuisances:
         self.rig_names = tuple(name for name, share in rig.tolerance.items() if share > 0.0 and known[name] > 0.0)
         self.described = known
         self.tolerance = rig.tolerance
-        self._chain = _CHAIN | {"drive_bow_per_m": (0.0, _CHAIN["drive_bow_per_m"][1] / travel_m)}
+        self._chain = ORDINARY | {"drive_bow_per_m": (0.0, ORDINARY["drive_bow_per_m"][1] / travel_m)}
         self.names = (*self.rig_names, "stribeck_tail", *self._chain)
 
     def __len__(self) -> int:

@@ -14,6 +14,8 @@ from bridge.arrays import Floats
 from diagnosis.gap.problem import AGE_BEFORE, Problem
 from diagnosis.hypotheses.hypothesis import Coordinate, Hypothesis, Scale, longest_run_s
 from diagnosis.hypotheses.waves import (
+    LOBES,
+    MOST,
     Wave,
     WaveSeries,
     axis_waves,
@@ -32,12 +34,10 @@ from plant.effects.library import EFFECTS
 _WAVES = 4  # ranges of periods that are searched
 # Ranges of periods that are searched for waves with a harmonic: sines explain less than half of the variance of bumps.
 _STEEP_WAVES = 2
-# Bumps: number of the longest pitches that are tried, and further starts in shares of their spread: a fit from a pitch that is
-# off by half a percent may end in a local minimum.
-_LOBES_OF_BUMPS, _BESIDE = 2, (-0.25, 0.0, 0.25)
+# Starts of bumps in shares of the spread of a pitch: with half a percent of error a fit may end in a local minimum.
+_BESIDE = (-0.25, 0.0, 0.25)
 _STUCK = (1.05, 1.13)  # natural frequency of a base over the frequency at which it rings with the slide stuck to it
 _AGE_LIMITS_S = (1e-3, 1e5)  # bounds of the contact's age: one block, one day
-_AXIS_WAVES = 3  # waves that are tried on a force-driven axis, where strong waves are clear lines
 
 
 class Trial(NamedTuple):
@@ -116,7 +116,7 @@ def where_the_base_rings(asked: TrialRequest) -> list[Trial]:
 def waves_of_track(asked: TrialRequest) -> list[Trial]:
     """Waves of the friction along the track."""
     if asked.problem.rig.drive == "force":
-        return _waves(asked, axis_waves(asked.problem.runs, "position", _AXIS_WAVES))
+        return _waves(asked, axis_waves(asked.problem.runs, "position", MOST))
     series = _friction(asked, "position")
     return _waves(asked, strongest_waves(series, _WAVES) + strongest_waves(series, _STEEP_WAVES, 2))
 
@@ -124,7 +124,7 @@ def waves_of_track(asked: TrialRequest) -> list[Trial]:
 def waves_of_time(asked: TrialRequest) -> list[Trial]:
     """Waves of the friction over time, with one phase for all runs or a phase for each run."""
     if asked.problem.rig.drive == "force":
-        return _waves(asked, axis_waves(asked.problem.runs, "time", _AXIS_WAVES))
+        return _waves(asked, axis_waves(asked.problem.runs, "time", MOST))
     series = _friction(asked, "time")
     return _waves(asked, strongest_waves(series, _WAVES) + waves_apart(series, asked.problem.runs, _WAVES))
 
@@ -144,7 +144,7 @@ def waves_of_motor(asked: TrialRequest) -> list[Trial]:
 def two_waves_of_track(asked: TrialRequest) -> list[Trial]:
     """Pairs of waves of the friction along the track."""
     if asked.problem.rig.drive == "force":
-        pairs = list(combinations(axis_waves(asked.problem.runs, "position", _AXIS_WAVES), 2))
+        pairs = list(combinations(axis_waves(asked.problem.runs, "position", MOST), 2))
     else:
         pairs = two_waves(_friction(asked, "position"), _WAVES)
     return [_two_waves_trial(asked.name, *pair) for pair in pairs]
@@ -153,10 +153,10 @@ def two_waves_of_track(asked: TrialRequest) -> list[Trial]:
 def bumps_of_track(asked: TrialRequest) -> list[Trial]:
     """Bumps and dips where the friction along the track has its longest waves."""
     if asked.problem.rig.drive == "force":
-        waves = axis_waves(asked.problem.runs, "position", _AXIS_WAVES)
+        waves = axis_waves(asked.problem.runs, "position", MOST)
     else:
         series = _friction(asked, "position")
-        waves = waves_beside(series, strongest_waves(series, _STEEP_WAVES, 2)[-_LOBES_OF_BUMPS:], _BESIDE)
+        waves = waves_beside(series, strongest_waves(series, _STEEP_WAVES, 2)[-LOBES:], _BESIDE)
     return [_bumps_trial(asked.name, wave, sign) for wave in waves for sign in (1.0, -1.0)]
 
 

@@ -21,9 +21,9 @@ from diagnosis.model.per_run import PHASE, of_run
 from diagnosis.slips import turning_points
 
 _GRID = 1500  # number of periods that are tried for a wave
-_LOBES = 2  # peaks that are tried in each range: separate pieces of track leave the period ambiguous
+LOBES = 2  # peaks that are tried in each range: separate pieces of track leave the period ambiguous
 _LOBE = 10  # least distance of two peaks, in grid points
-_TWO_WAVES = 3  # pairs of waves that are tried
+MOST = 3  # pairs of waves that are tried, and waves of a force-driven axis, where strong waves are clear lines
 _STEEPEST = 0.8  # largest second harmonic, relative to the first
 _EVERY = 8  # blocks for each sample of a force-driven axis
 _MOST_TURNS = 200  # most turns of a wave within the longest run
@@ -43,9 +43,8 @@ class Wave(NamedTuple):
     second_sin: float = 0.0
     second_cos: float = 0.0
     spread: float = 0.2  # relative standard deviation of the period
-    phases_of: Mapping[str, float] = MappingProxyType(
-        {}
-    )  # phases in the runs after the first; empty: one phase for all runs
+    # phases in the runs after the first; empty: one phase for all runs
+    phases_of: Mapping[str, float] = MappingProxyType({})
 
 
 class WaveSeries(NamedTuple):
@@ -73,7 +72,7 @@ def two_waves(series: list[WaveSeries], most: int) -> list[tuple[Wave, Wave]]:
     """Pairs of the strongest waves, those that explain most together first."""
     together = [_fitted_pair(series, *two) for two in combinations(strongest_waves(series, most), 2)]
     together.sort(key=lambda pair: -pair[0])
-    return [two for _, two in together[:_TWO_WAVES]]
+    return [two for _, two in together[:MOST]]
 
 
 def _fitted_pair(series: list[WaveSeries], first: Wave, second: Wave) -> tuple[float, tuple[Wave, Wave]]:
@@ -187,7 +186,7 @@ def strongest_waves(series: list[WaveSeries], most: int, harmonics: int = 1, apa
     best: list[int] = []
     for first, last in pairwise(edges.tolist()):
         peaks = [i for i in range(first, last) if power[i] == power[max(0, i - _LOBE) : i + _LOBE + 1].max()]
-        best += sorted(peaks, key=lambda i: -power[i])[:_LOBES]
+        best += sorted(peaks, key=lambda i: -power[i])[:LOBES]
     waves = [wave_of(float(periods[i]), shares[i]) for i in best if power[i] > 0.0]
     return [wave._replace(spread=min(0.5 * wave.period / reach, 0.2)) for wave in waves]
 

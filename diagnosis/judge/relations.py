@@ -88,12 +88,12 @@ def _lead(answered: Answered) -> str:
 
 
 def _refuted(answered: Answered) -> Names:
-    """Chosen causes that the kept runs would show and do not; without kept runs, that have another size in each run.
+    """Chosen causes that the kept runs would show and do not, or contradict; without kept runs, of another size in each run.
 
     A number beyond its tolerance is never refuted so: the refitted rig follows it, and it closes no further part.
     """
     shares = () if answered.shares is None else answered.shares.causes
-    idle = {share.cause for share in shares if share.expected > share.null_90}
+    idle = {share.cause for share in shares if share.expected > share.null_90 + min(share.share, 0.0)}
     idle -= {share.cause for share in shares if share.share > max(share.null_90, _LEAST)}
     if not shares:
         sizes = zip(answered.chosen.causes, answered.agreement, strict=True)

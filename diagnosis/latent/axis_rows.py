@@ -4,18 +4,17 @@ import numpy as np
 from scipy.signal import savgol_filter
 
 from diagnosis.evidence.manifest import RigTable
+from diagnosis.features.axis_motion import WINDOW
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.gap.prepare import Prepared
-from diagnosis.latent.rows import MOST_ROWS, SLIDING, ExcessRows, Floats, noise_of_force_N
+from diagnosis.latent.rows import MOST_ROWS, SLIDING, STANDS, ExcessRows, Floats, noise_of_force_N
 from diagnosis.relations.relation import pieces_of
 
-_WINDOW = 31  # blocks: the window that smooths the motion, so force and inertia are filtered alike
-# Speeds below which the friction turns, in Stribeck velocities and as a share of the fastest.
-_SLOW_STRIBECK, _SLOW_SHARE = 2.0, 0.02
+_SLOW_STRIBECK = 2.0  # Stribeck velocities below which the friction turns
 # Blocks of a row. At 20 the encoder's noise in the inertia takes 45 % of a measured axis, and direction 55 % (86 % at 50, 95 % at
 # 100). At 100 a wrong mass is named as a matter of place on one of 37 development cases, and a gear's wave is shorter than a row.
 _SHORTEST_CELL = 50
-_BOTH_ENDS = 16  # blocks left out at the ends of a stretch: half the window
+_BOTH_ENDS = WINDOW // 2 + 1  # blocks left out at the ends of a stretch
 
 
 def axis_rows(rig: RigTable, runs: list[Prepared]) -> list[ExcessRows]:
@@ -40,7 +39,7 @@ def _stretches(rig: RigTable, run: Prepared) -> list[tuple[int, int]]:
     motion = run.commands.motion
     assert motion is not None, "a force drive has a motion"  # noqa: S101
     speed = np.abs(motion.velocity_mps)
-    slowest = max(_SLOW_STRIBECK * rig.stribeck_velocity_mps, _SLOW_SHARE * float(speed.max()))
+    slowest = max(_SLOW_STRIBECK * rig.stribeck_velocity_mps, STANDS * float(speed.max()))
     slowest = min(slowest, 0.5 * float(speed.max()))
     moves = speed > slowest
     pieces: list[tuple[int, int]] = []
@@ -53,8 +52,9 @@ def _of_stretch(rig: RigTable, run: Prepared, number: int, piece: list[int], cel
     motion = run.commands.motion
     assert motion is not None, "a force drive has a motion"  # noqa: S101
     force_N = run.signals["drive_force_N"]
-    smooth_N = np.asarray(savgol_filter(force_N, _WINDOW, 3))
-    rate = np.asarray(savgol_filter(force_N, _WINDOW, 3, deriv=1, delta=BLOCK_S))
+    # in the window that smooths the motion, so force and inertia are filtered alike
+    smooth_N = np.asarray(savgol_filter(force_N, WINDOW, 3))
+    rate = np.asarray(savgol_filter(force_N, WINDOW, 3, deriv=1, delta=BLOCK_S))
     first, last = piece
     cells = max(round((last - first) / cell), 1)
     edges = np.linspace(first, last, cells + 1).astype(np.int64)

@@ -12,6 +12,7 @@ from scipy.stats import rankdata
 
 from bridge.arrays import Floats, Indices
 from diagnosis.latent.rows import ExcessRows
+from diagnosis.relations.relation import SETTLES
 
 PLACE, FORCE_PLACE = "position-dependent-friction", "place-dependent force"
 DIRECTION, TIME, LOAD = "direction-dependent-friction", "friction-drift", "load-dependent friction"
@@ -21,9 +22,6 @@ SCATTER, NOISE = "scatter", "noise"
 # Rank correlation of place and time from which they are one variable. At 0.5 four further signals of the development sets count
 # as passed once and lose their shares of time; 0.99 changes nothing there.
 _ONE_VARIABLE = 0.9
-# Time constants of a drift, in lengths of the record. With 0.25 alone a drift that predicts all of a record predicts 59 % of it.
-_SETTLES = (0.5, 0.125, 0.03125)
-
 # Half waves of a law of the speed. With three powers alone, 16 % of made records without a dependence on place show one beyond
 # chance, as the speed of a harmonic motion goes with the place; with 8 half waves 4 %, with 16 8 %.
 _BENDS = 8
@@ -86,7 +84,7 @@ def causes_of(rows: ExcessRows, fit: Indices) -> Causes:
     if not one_pass:
         for time in (rows.t_s, in_run_s):
             long_s = max(float(np.ptp(time[fit])), 1e-12)
-            columns += [(TIME, time), *((TIME, np.exp(-time / share / long_s)) for share in _SETTLES)]
+            columns += [(TIME, time), *((TIME, np.exp(-time / share / long_s)) for share in SETTLES)]
     for what, values in ((LOAD, rows.load_N), (MASS, rows.pull_N), (CLOCKS, rows.rate_N_per_s)):
         if values is not None:
             columns.append((what, values))

@@ -12,6 +12,7 @@ BREAKAWAY, SLIDING = "breakaway level", "sliding friction"
 # Rows of one signal that are kept, evenly spread; the work grows with them: 5000 with four causes take 3 s of CPU, 10 000 6 s. At
 # 240 the waves of a gear are shorter than a row.
 MOST_ROWS = 5000
+STANDS = 0.02  # share of its fastest velocity below which a slide or a drive turns
 
 
 class ExcessRows(NamedTuple):

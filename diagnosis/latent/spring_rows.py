@@ -5,22 +5,18 @@ trough is the sliding friction in a slip; no acceleration is needed, and no cons
 """
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from bridge.arrays import Indices
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.feature import Signals, scales_of
 from diagnosis.features.grid import BLOCK_S
+from diagnosis.features.segments import SETTLING
 from diagnosis.features.slips import find_slips
 from diagnosis.gap.prepare import Prepared
-from diagnosis.latent.rows import BREAKAWAY, SLIDING, ExcessRows, Floats, noise_of_force_N
+from diagnosis.latent.rows import BREAKAWAY, SLIDING, STANDS, ExcessRows, Floats, noise_of_force_N
 from diagnosis.relations.relation import pieces_of
 
-_SETTLED = 50  # blocks left out at the ends of a stretch in one direction
 _CELL = 200  # blocks of a row of even sliding
-_RATE_WINDOW = 201  # blocks over which the velocity of a drive is read that changes it all the time
-_STANDS = 0.02  # share of its fastest velocity below which it is at rest
-_SHORTEST = 300  # blocks of a stretch in one direction
 _OVER_NOISE = 4.0  # standard deviations of the noise by which the force falls in a slip; a smaller fall may be noise
 
 
@@ -32,7 +28,8 @@ def spring_rows(rig: RigTable, runs: list[Prepared]) -> list[ExcessRows]:
         force_N = run.signals.get("drive_force_N")
         if force_N is None:
             continue
-        drive_mps = _drive_mps(run)
+        drive_mps = run.commands.drive
+        drive_mps = np.where(np.abs(drive_mps) > STANDS * np.abs(drive_mps).max(), drive_mps, 0.0)
         place_m = gone_m + _place_m(rig, run.signals, drive_mps, force_N)
         if not {"mass_position_m", "drive_position_m"} & run.signals.keys():
             gone_m += float(np.abs(drive_mps).sum()) * BLOCK_S
@@ -41,22 +38,13 @@ def spring_rows(rig: RigTable, runs: list[Prepared]) -> list[ExcessRows]:
     return result
 
 
-def _drive_mps(run: Prepared) -> Floats:
-    """Velocity of the drive, [blocks]: as commanded, or as measured where no command lasts."""
-    position_m = run.signals.get("drive_position_m")
-    if run.commands.segments or position_m is None or len(position_m) <= _RATE_WINDOW:
-        return run.commands.drive
-    rate = np.asarray(savgol_filter(position_m, _RATE_WINDOW, 2, deriv=1, delta=BLOCK_S))
-    return np.where(np.abs(rate) > _STANDS * np.abs(rate).max(), rate, 0.0)
-
-
 def _stretches(run: Prepared, drive_mps: Floats) -> list[tuple[int, int]]:
     """Blocks [first, last) of one direction without vibration."""
     sign = np.sign(drive_mps)
     still = run.commands.frequency_Hz == 0.0
     pieces: list[tuple[int, int]] = []
     for way in (-1.0, 1.0):
-        pieces += pieces_of((sign == way) & still, _SHORTEST)
+        pieces += pieces_of((sign == way) & still)
     return sorted(pieces)
 
 
@@ -92,7 +80,7 @@ def _of_stretch(
         ]
     if len(slips.tops):
         return []
-    inner = np.arange(_SETTLED, stretch.stop - stretch.start - _SETTLED)
+    inner = np.arange(SETTLING, stretch.stop - stretch.start - SETTLING)
     cells = len(inner) // _CELL
     if cells == 0:
         return []

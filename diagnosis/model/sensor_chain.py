@@ -12,6 +12,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
 
 from bridge.arrays import Floats
+from diagnosis.features.feature import BOW
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.features.segments import CommandedRun
 from diagnosis.model.rig import Effects
@@ -20,6 +21,23 @@ from plant.effects.sensors import LAG_ORDERS
 
 Signals = dict[str, Floats]
 SENSOR_EFFECTS = tuple(name for name, effect in EFFECTS.items() if effect.acts_on == "sensor")
+# Mean and standard deviation of sensor numbers that no manifest states, by field of `SensorChain`. A 2 kHz force channel lags by
+# 80 us, an 800 Hz displacement channel by 200 us, an unfiltered channel by 0; displacement sensors are linear to 0.2 % of their
+# range: up to 0.8 % in slope; common accelerometers begin at 0 to 0.5 Hz and end at 10 kHz or above.
+ORDINARY = {
+    "force_delay_s": (4e-5, 4e-5),
+    "position_delay_s": (1e-4, 1e-4),
+    "position_scale": (1.0, 0.004),
+    "drive_slope": (0.0, 0.006),
+    "drive_bow_per_m": (0.0, 2.0 * BOW),  # over the travel: 0.2 %, the linearity above
+    "accel_lowest_Hz": (0.25, 0.25),
+    "accel_rolled_off": (0.5, 0.5),
+}
+ACCEL_GAIN = 0.01  # relative standard deviation of an ordinary accelerometer's gain, and of its cross sensitivity
+# Bend of the force over the extension, and of an acceleration over a displacement, that the low-passes of two sensors make.
+# Smaller: rigs without a gap show a bend. Larger: a slow and a delayed force sensor are not separated. Counted on 20 rigs without
+# a gap (docs/method/diagnosis.md).
+BEND_S2 = 1e-7
 # Standard deviation of the smoothing of the rate that inverts a low-pass. Too small: noise; too large: smeared reversals.
 _DERIVATIVE_S = 2e-3
 

@@ -12,29 +12,25 @@ from diagnosis.relations.base import base_relation
 from diagnosis.relations.drive import drive_relation
 from diagnosis.relations.exciter import exciter_relation
 from diagnosis.relations.motion import motion_relation
-from diagnosis.relations.outside import Pattern, burst_ratio, patterns_of, whitened_rows
+from diagnosis.relations.outside import Pattern, bursts_of, patterns_of
 from diagnosis.relations.products import (
     BandNoise,
     Products,
-    band_edges_Hz,
-    band_of_rows,
+    in_time,
     model_columns,
     noise_of,
     products_of,
+    sizes_of,
     spreads_of,
     square_left,
-    turned_back,
-    turned_piece,
 )
 from diagnosis.relations.relation import Floats, Missing, Relation, thinned
 from diagnosis.relations.search import NOTHING, Found, Ranking, chosen_of, ranked, reduced, without_each
-from diagnosis.relations.shares import Shares, shares_of, sizes_of
+from diagnosis.relations.shares import Shares, shares_of
 from diagnosis.relations.spring import spring_relation
 
 _FREE = 30.0  # spread of a pattern's coefficients, in rms of what is left: as good as free
 _SAME_SIZE = 0.1  # relative scatter of a size between runs that a formula a little beside the rig's makes
-# Information on a size, in inverse squares of it, from which a run is asked: a relative error of a half
-_INFORMED = 4.0
 
 
 class Trace(NamedTuple):
@@ -56,15 +52,12 @@ class Answered(NamedTuple):
     refitted: float  # that the rig without effects leaves, refitted
     left: float  # with the chosen causes
     chosen: Found
-    agreement: tuple[
-        float, ...
-    ]  # of each chosen cause: chance that its sizes in the runs differ as much where they are one
+    agreement: tuple[float, ...]  # of each chosen cause: chance of sizes in the runs as far apart, if they are one size
     lost: tuple[float, ...]  # of each chosen cause: log evidence by which the set is worse without it
     tried: int  # columns of effects
     ranking: Ranking
     patterns: tuple[Pattern, ...]
     bursts: float  # mean over median of the local variance of what is left
-    nuisances: tuple[tuple[str, float, float], ...]  # sizes of those of one column, with their standard deviations
     shares: Shares | None
     trace: Trace
 
@@ -115,9 +108,9 @@ def answered_of(relation: Relation, fitted: list[int]) -> Answered:
         ranking = ranked(data)
         chosen = chosen_of(ranking, cost)
         lost = without_each(data, chosen)
-    size, deviation = sizes_of(products, fitted, noise, chosen.terms)
+    size = sizes_of(products, fitted, noise, chosen.terms)
     without, every = np.zeros(width), np.zeros(width)
-    without[model_columns(products, ())[0]] = sizes_of(products, fitted, noise, ())[0]
+    without[model_columns(products, ())[0]] = sizes_of(products, fitted, noise, ())
     every[model_columns(products, chosen.terms)[0]] = size
     return Answered(
         name=relation.name,
@@ -131,13 +124,8 @@ def answered_of(relation: Relation, fitted: list[int]) -> Answered:
         lost=lost,
         tried=len(relation.effects),
         ranking=ranking,
-        patterns=patterns_of(products, fitted, held_out, noise, chosen),
-        bursts=burst_ratio(whitened_rows(products, fitted, free, products.terms, every), relation.row_s),
-        nuisances=tuple(
-            (term.cause, float(size[place.start]), float(deviation[place.start]))
-            for term, place in zip(relation.nuisances, products.places, strict=False)
-            if place.stop - place.start == 1
-        ),
+        patterns=patterns_of(products, fitted, noise, chosen),
+        bursts=bursts_of(products, fitted, free, every),
         shares=shares_of(products, fitted, held_out, noise, chosen),
         trace=_trace(products, (held_out or fitted)[0], without, every),
     )
@@ -150,7 +138,7 @@ def _rms(bare: Floats, size: Floats, rows: float) -> float:
 def _agreement(products: Products, runs: list[int], noise: BandNoise, chosen: Found, number: int) -> float:
     """Chance that the sizes of one chosen cause in each run alone differ as much as they do where they are one size."""
     columns, _ = model_columns(products, chosen.terms)
-    size, _ = sizes_of(products, runs, noise, chosen.terms)
+    size = sizes_of(products, runs, noise, chosen.terms)
     first = len(size) - sum(len(size) for size in chosen.sizes[number:])
     term_columns = slice(first, first + len(chosen.sizes[number]))
     others = size.copy()
@@ -162,7 +150,7 @@ def _agreement(products: Products, runs: list[int], noise: BandNoise, chosen: Fo
         inner = over[columns[:, None], columns]
         information = float(mine @ inner @ mine)
         towards = float(mine @ (over[columns, -1] - inner @ others))
-        if information > _INFORMED:
+        if information > 0.0:
             intervals.append((towards / information, 1.0 / information))
     if len(intervals) < 2:
         return 1.0
@@ -175,9 +163,6 @@ def _agreement(products: Products, runs: list[int], noise: BandNoise, chosen: Fo
 def _trace(products: Products, run: int, without: Floats, with_causes: Floats) -> Trace:
     relation = products.relation
     piece = max(relation.pieces[run], key=lambda piece: piece[1] - piece[0])
-    length = piece[1] - piece[0]
-    band = band_of_rows(relation, length, band_edges_Hz(relation))
-    turned = turned_piece(relation, products.terms, run, piece, len(band)) * (band >= 0)[:, None]
-    left = np.stack([turned[:, -1] - turned[:, :-1] @ sizes for sizes in (without, with_causes)], axis=1)
-    rows = turned_back(left, length)
+    left = np.stack([np.append(-sizes, 1.0) for sizes in (without, with_causes)], axis=1)
+    rows = in_time(relation, products.terms, run, piece, None, left)
     return Trace(run, (np.arange(*piece) + 0.5) * relation.row_s, rows[:, 0], rows[:, 1])

@@ -1,20 +1,14 @@
 """The base relation: a base that rests shows no acceleration when the slide breaks away and comes to rest."""
 
-import numpy as np
-
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.feature import scales_of
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.gap.prepare import Prepared
-from diagnosis.relations.relation import Missing, Relation, pieces_without_vibration, term
-from diagnosis.relations.shapes import bend, free, mode, rate, slip_phase
+from diagnosis.model.sensor_chain import ACCEL_GAIN
+from diagnosis.relations.relation import LARGE, RESOLUTION, Missing, Relation, pieces_without_vibration, term
+from diagnosis.relations.shapes import MODES_HZ, bend, free, mode, rate, slip_phase
 
 NEEDED = ("base_accel_mps2", "drive_force_N", "mass_accel_mps2")
-_HIGHEST_HZ = 320.0  # of a mode of the base
-_RESOLUTION = 1e-5  # least noise of a row, as a share of the acceleration that the static friction gives the slide
-_MODES_HZ = np.geomspace(45.0, 300.0, 28)  # that a mode may have: steps of 7 %
-_CROSS = 0.01  # share of the slide's acceleration that an ordinary accelerometer on the base shows
-_COMPLIANCE = 0.02  # of a large effect, as a share of the drive's
 
 
 def base_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
@@ -31,16 +25,16 @@ def base_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
     modes = tuple(
         term(
             "base-compliance", f"{each_Hz:.3g} Hz", [bend(mode(force, each_Hz, 0.02)) for force in friction],
-            _COMPLIANCE / stiffness, 1, "compliance_m_per_N",
+            LARGE / stiffness, 1, "compliance_m_per_N",
         )
-        for each_Hz in _MODES_HZ.tolist()
+        for each_Hz in MODES_HZ.tolist()
     )  # fmt: skip
     return Relation(
-        name="base", unit="m/s2", row_s=BLOCK_S, highest_Hz=_HIGHEST_HZ,
+        name="base", unit="m/s2", row_s=BLOCK_S, highest_Hz=float(MODES_HZ[-1]),
         left=tuple(run.signals["base_accel_mps2"] for run in runs),
         pieces=pieces,
-        nuisances=(term("cross sensitivity", "", accel, _CROSS),),
+        nuisances=(term("cross sensitivity", "", accel, ACCEL_GAIN),),
         effects=modes,
         patterns=(free("the time since a slip", since, 14),),
-        resolution=_RESOLUTION * rig.static_force_N / rig.mass_kg,
+        resolution=RESOLUTION * rig.static_force_N / rig.mass_kg,
     )  # fmt: skip

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 from scipy.fft import next_fast_len, rfft, rfftfreq
@@ -11,18 +10,26 @@ from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.feature import RESOLVED
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.gap.prepare import Prepared
-from diagnosis.relations.relation import Floats, Missing, Piece, Relation, Term, kept_blocks, pieces_of, wander
+from diagnosis.relations.relation import (
+    LARGE,
+    POSITION_HZ,
+    Floats,
+    Missing,
+    Piece,
+    Relation,
+    Term,
+    kept_blocks,
+    pieces_of,
+    wander,
+)
 from diagnosis.relations.shapes import hats, knots_of
 
-_HIGHEST_HZ = 60.0  # of the unevenness that is compared
-_DEPTH = 0.1  # typical share by which an uneven drive's speed swings
-_WAVES = 2  # strongest waves over the place, and over time, that become columns
-_FASTEST_HZ = (
-    30.0  # of a wave, at the mean speed: half the highest compared frequency, as each wave has a second harmonic
-)
+# Waves up to half a line beside the strongest that become columns: far above the noise, a wave shows its period to a part of a
+# line. With 1 a period of 1.033 mm is read as 1.04 mm, which does not predict the held-out run. With 17 relations take 1.3 times
+# as long.
+_NEARBY = 7
 _WANDER = 5e-5  # slow drift of a displacement sensor, as a share of the travel
 _FEWEST_TURNS = 2.0  # of a wave in the longest piece; a slower one is a wander of the sensor
-_APART_TURNS = 1.2  # in the longest piece, by which two waves differ: a line is a turn wide
 # Bins of the shortest wave, of which they keep 97 %, and lines for each turn. Fewer: a wave between two is lost. More: time.
 _BINS, _LINES = 8, 4
 
@@ -51,17 +58,17 @@ def drive_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
     effects: list[Term] = []
     for per_m in _strongest(place, left, rows):
         angles = [2.0 * math.pi * per_m * s for s in place]
-        amplitude_m = _DEPTH / (2.0 * math.pi * per_m)
+        amplitude_m = LARGE / (2.0 * math.pi * per_m)
         effects.append(_wave("drive-speed-ripple", f"every {1e3 / per_m:.3g} mm", angles, None, pieces, amplitude_m))
     for each_Hz in _strongest(own_s, left, rows):
         angles = [2.0 * math.pi * each_Hz * t for t in own_s]
         effects.append(
-            _wave("drive-speed-ripple", f"{each_Hz:.3g} Hz", angles, speed, pieces, _DEPTH / (2.0 * math.pi * each_Hz))
+            _wave("drive-speed-ripple", f"{each_Hz:.3g} Hz", angles, speed, pieces, LARGE / (2.0 * math.pi * each_Hz))
         )
     knots = knots_of(np.concatenate(place), 60)
     slow = wander([len(s) for s in place], _WANDER * travel_m)
     return Relation(
-        name="drive", unit="m", row_s=BLOCK_S, highest_Hz=_HIGHEST_HZ, left=tuple(left), pieces=pieces,
+        name="drive", unit="m", row_s=BLOCK_S, highest_Hz=POSITION_HZ, left=tuple(left), pieces=pieces,
         nuisances=(
             slow._replace(values=tuple(_without_parabola(s, parts) for s, parts in zip(slow.values, pieces, strict=True))),
         ),
@@ -79,12 +86,7 @@ def _even(run: Prepared) -> tuple[Piece, ...]:
     even = np.zeros(len(kept), np.bool_)
     for segment in run.commands.segments:
         even[segment.first : segment.last] = segment.drive_velocity_mps != 0.0
-    joints = {segment.first for segment in run.commands.segments}
-    stretches: list[Piece] = []
-    for first, last in pieces_of(kept & even):
-        cuts = sorted({first, last, *(joint for joint in joints if first < joint < last)})
-        stretches += [(a, b) for a, b in pairwise(cuts) if b - a >= 300]
-    return tuple(stretches)
+    return pieces_of(kept & even)
 
 
 def _without_parabola(values: Floats, pieces: tuple[Piece, ...]) -> Floats:
@@ -99,7 +101,7 @@ def _without_parabola(values: Floats, pieces: tuple[Piece, ...]) -> Floats:
 
 
 def _strongest(over: Sequence[Floats], left: Sequence[Floats], rows: list[tuple[int, slice]]) -> list[float]:
-    """Turns per unit of the waves over a variable that take most of the rest: of any length that the rows resolve.
+    """Turns per unit of the wave over a variable that takes most of the rest, of any length, and of some near it.
 
     Args:
         over: place or time, [rows of the run] each.
@@ -108,21 +110,16 @@ def _strongest(over: Sequence[Floats], left: Sequence[Floats], rows: list[tuple[
 
     """
     lengths = [float(np.ptp(over[i][piece])) for i, piece in rows]
-    highest = _FASTEST_HZ * BLOCK_S * sum(piece.stop - piece.start for _, piece in rows) / sum(lengths)
+    # half the highest compared frequency at the mean speed, as each wave has a second harmonic
+    highest = 0.5 * POSITION_HZ * BLOCK_S * sum(piece.stop - piece.start for _, piece in rows) / sum(lengths)
     at = np.concatenate([over[i][piece] for i, piece in rows])
     bins = np.floor((at - at.min()) * _BINS * highest).astype(np.int64)
     summed = np.bincount(bins, np.concatenate([left[i][piece] for i, piece in rows]))
     count = next_fast_len(_LINES * len(summed))
     turns = rfftfreq(count, 1.0 / (_BINS * highest))
     inside = (turns >= _FEWEST_TURNS / max(lengths)) & (turns <= highest)
-    turns, power = turns[inside], np.abs(np.asarray(rfft(summed, count)))[inside]
-    strongest: list[float] = []
-    for i in np.argsort(-power):
-        if all(abs(turns[i] - other) > _APART_TURNS / max(lengths) for other in strongest):
-            strongest.append(float(turns[i]))
-        if len(strongest) == _WAVES:
-            break
-    return strongest
+    strongest = turns[inside][np.abs(np.asarray(rfft(summed, count)))[inside].argmax()]
+    return (strongest + np.linspace(-0.5, 0.5, _NEARBY) * turns[1]).tolist()
 
 
 def _wave(

@@ -6,19 +6,27 @@ import numpy as np
 
 from diagnosis.features.grid import BLOCK_S, averaged, without_vibration
 from diagnosis.gap.prepare import Prepared
-from diagnosis.relations.relation import Bools, Floats, Missing, Piece, Relation, Term, kept_blocks, term
+from diagnosis.model.sensor_chain import ACCEL_GAIN, ORDINARY
+from diagnosis.relations.relation import (
+    RESOLUTION,
+    SETTLES,
+    Bools,
+    Floats,
+    Missing,
+    Piece,
+    Relation,
+    Term,
+    kept_blocks,
+    term,
+)
 from diagnosis.relations.shapes import free
 
 _ROW_BLOCKS = 20  # blocks of a row: 20 ms
 _FEWEST_ROWS = 5  # stretches of vibration
-_RESOLUTION = 1e-3  # least noise of a row
-# Of ordinary accelerometers, with as much spread: see `accel_rolled_off` in `diagnosis.model.sensor_chain`
-_ROLLED_OFF = 0.5
-_GAIN = 0.01  # spread of an ordinary accelerometer's gain
+_ROLLED_OFF = ORDINARY["accel_rolled_off"]
 _UNEVEN = 0.003  # scatter of an ordinary accelerometer's gain from one frequency to another
 _CORNERS_HZ = (1000.0, 1500.0, 2200.0, 3200.0, 4500.0, 6500.0, 9500.0)  # of a roll-off
 _INSIDE_HZ, _BEYOND_HZ = np.linspace(1200.0, 4800.0, 19), (5200.0, 5800.0, 6500.0, 7500.0)
-_HEAT_S = (0.7, 1.5, 3.0, 8.0)  # in which a piezo warms up
 
 
 def exciter_relation(runs: list[Prepared]) -> Relation | Missing:
@@ -40,38 +48,29 @@ def exciter_relation(runs: list[Prepared]) -> Relation | Missing:
     for corner_Hz in _CORNERS_HZ:
         for order, law in ((1, _first_order), (2, _second_order)):
             shape = [law(f / corner_Hz) / abs(float(law(np.array([most_Hz / corner_Hz]))[0])) for f in frequency]
-            effects.append(
-                term("piezo-roll-off", f"order {order}, {corner_Hz:.3g} Hz", shape, 0.4, 1, "log_attenuation")
-            )
+            form = f"order {order}, {corner_Hz:.3g} Hz"
+            effects.append(term("piezo-roll-off", form, shape, 0.4, 1, "log_attenuation"))
     for frequency_Hz in (*_INSIDE_HZ, *_BEYOND_HZ):
         for share in (0.15, 0.7):
             shape = [_resonance(f / frequency_Hz, share) / share for f in frequency]
             effects.append(term("piezo-resonance", f"{frequency_Hz:.4g} Hz, {share:g}", shape, 0.5, 1, "share"))
+
+    def sags(form: str, shape: list[Floats], sign: int = 0) -> None:
+        effects.append(term("piezo-sag", form, shape, 0.3, sign, "log_loss"))
+
     forces = [row_means(run.signals["drive_force_N"]) for run in runs if "drive_force_N" in run.signals]
     patterns: list[Term] = []
     if len(forces) == len(runs):
         most_N = max(float(np.abs(f).max()) for f in forces)
-        effects.append(term("piezo-sag", "load", [-f / most_N for f in forces], 0.3, 0, "log_loss"))
-        effects.append(
-            term(
-                "piezo-sag",
-                "load, steeper",
-                [np.log1p(-0.45 * np.clip(f / most_N, -1.0, 1.0)) / 0.45 for f in forces],
-                0.3,
-                1,
-                "log_loss",
-            )
-        )
+        sags("load", [-f / most_N for f in forces])
+        sags("load, steeper", [np.log1p(-0.45 * np.clip(f / most_N, -1.0, 1.0)) / 0.45 for f in forces], 1)
         patterns.append(free("the force", forces, 8))
     driven = [_driven_s(run) for run in runs]
-    for time_s in _HEAT_S:
+    longest_s = max(len(run.commands.drive) for run in runs) * BLOCK_S
+    for time_s in [longest_s * share for share in SETTLES]:
         warm = [np.expm1(-t / time_s) for t in driven]
-        effects.append(term("piezo-sag", f"heat {time_s:g} s", warm, 0.3, 0, "log_loss"))
-        effects.append(
-            term(
-                "piezo-sag", f"heat {time_s:g} s, strong", [-np.log1p(-0.6 * w) / 0.6 for w in warm], 0.3, 0, "log_loss"
-            )
-        )
+        sags(f"heat {time_s:.2g} s", warm)
+        sags(f"heat {time_s:.2g} s, strong", [-np.log1p(-0.6 * w) / 0.6 for w in warm])
     each_Hz = np.unique(np.concatenate(frequency))
     each_Hz = each_Hz[each_Hz > 0.0]
     levels = tuple(np.stack([f == level_Hz for level_Hz in each_Hz], axis=1).astype(np.float64) for f in frequency)
@@ -82,12 +81,12 @@ def exciter_relation(runs: list[Prepared]) -> Relation | Missing:
     return Relation(
         name="exciter", unit="", row_s=_ROW_BLOCKS * BLOCK_S, highest_Hz=25.0, left=left, pieces=pieces,
         nuisances=(
-            term("gain", "", ones, _GAIN),
-            term("roll-off of the accelerometer", "", [-0.5 * (f / 1e4) ** 2 for f in frequency], _ROLLED_OFF),
-            term("its bend", "", [(f / 1e4) ** 4 for f in frequency], 0.25 * _ROLLED_OFF),
+            term("gain", "", ones, ACCEL_GAIN),
+            term("roll-off of the accelerometer", "", [-0.5 * (f / 1e4) ** 2 for f in frequency], _ROLLED_OFF[1]),
+            term("its bend", "", [(f / 1e4) ** 4 for f in frequency], 0.25 * _ROLLED_OFF[1]),
             Term("each frequency", "", levels, _UNEVEN),
         ),
-        effects=tuple(effects), patterns=tuple(patterns), resolution=_RESOLUTION, keeps_mean=True,
+        effects=tuple(effects), patterns=tuple(patterns), resolution=RESOLUTION, keeps_mean=True,
     )  # fmt: skip
 
 
@@ -103,7 +102,7 @@ def delivered_log(run: Prepared) -> Floats:
         return np.zeros(len(run.commands.drive) // _ROW_BLOCKS)
     still_mps2 = run.noise.shake_mps2.get("base_shake_mps2", 0.0)
     frequency_Hz = run.commands.frequency_Hz
-    seen = 1.0 / (1.0 + _ROLLED_OFF * (frequency_Hz / 1e4) ** 2)
+    seen = 1.0 / (1.0 + _ROLLED_OFF[0] * (frequency_Hz / 1e4) ** 2)
     commanded = row_means(0.5 * ((2.0 * np.pi * frequency_Hz) ** 2 * run.commands.amplitude_m) ** 2 * seen)
     whole = without_vibration(run.signals, averaged(frequency_Hz))  # a block of 4.5 periods has a mean of its own
     delivered = row_means(whole["base_shake_mps2"] ** 2) - still_mps2**2

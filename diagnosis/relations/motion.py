@@ -8,18 +8,19 @@ from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.feature import scales_of
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.gap.prepare import Prepared
-from diagnosis.relations.relation import Missing, Relation, pieces_without_vibration, term
+from diagnosis.model.sensor_chain import BEND_S2, ORDINARY
+from diagnosis.relations.relation import (
+    POSITION_HZ,
+    RESOLUTION,
+    SKEW,
+    Missing,
+    Relation,
+    pieces_without_vibration,
+    term,
+)
 from diagnosis.relations.shapes import bend, calmed, free, near_slips, rate, slip_phase
 
 NEEDED = ("mass_accel_mps2", "mass_position_m")
-# Content above is noise of the position, whose second derivative grows with the square of the frequency.
-_HIGHEST_HZ = 60.0
-_RESOLUTION = 1e-5  # least noise of a row, as a share of the acceleration that the static friction gives the slide
-_SCALE = 0.008  # slope of the position sensor, relative
-_DELAY_S = 2e-4  # between the two channels
-_BEND_S2 = 1e-7  # lag of the second order between the two channels
-_SKEW = 5e-4  # between two recorders of which one is timed by software
-_LOWEST_RAD_PER_S = 2.0 * math.pi * 0.35  # accelerometers begin at 0 to 0.5 Hz
 
 
 def motion_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
@@ -39,18 +40,18 @@ def motion_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
     whole_s = [t + run.before_s for t, run in zip(own_s, runs, strict=True)]
     since = [slip_phase(v, scales_of(rig).slip_s if rig.drive == "spring" else 0.05) for v in velocity]
     return Relation(
-        name="motion", unit="m/s2", row_s=BLOCK_S, highest_Hz=_HIGHEST_HZ,
+        name="motion", unit="m/s2", row_s=BLOCK_S, highest_Hz=POSITION_HZ,
         left=left, pieces=pieces,
         nuisances=(
-            term("scale of the position", "", accel, _SCALE),
-            term("delay", "", jerk, _DELAY_S),
-            term("bend", "", [rate(j) for j in jerk], _BEND_S2),
-            term("lowest frequency", "", velocity, _LOWEST_RAD_PER_S),
+            term("scale of the position", "", accel, math.hypot(ORDINARY["position_scale"][1], ORDINARY["drive_slope"][1])),
+            term("delay", "", jerk, math.hypot(*ORDINARY["position_delay_s"])),
+            term("bend", "", [rate(j) for j in jerk], BEND_S2),
+            term("lowest frequency", "", velocity, 2.0 * math.pi * math.hypot(*ORDINARY["accel_lowest_Hz"])),
         ),
         effects=(
             term("accelerometer-gain", "mass", accel, 0.2, 0, "ratio"),
             *(
-                term("acceleration-clock", form, [-t * j for t, j in zip(times, jerk, strict=True)], _SKEW, 0, "skew")
+                term("acceleration-clock", form, [-t * j for t, j in zip(times, jerk, strict=True)], SKEW, 0, "skew")
                 for form, times in (("in each run", own_s), ("since the first run", whole_s))
             ),
         ),
@@ -59,5 +60,5 @@ def motion_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
             free("the velocity", velocity, 12),
             free("the time since a slip", since, 14),
         ),
-        resolution=_RESOLUTION * rig.static_force_N / rig.mass_kg,
+        resolution=RESOLUTION * rig.static_force_N / rig.mass_kg,
     )  # fmt: skip

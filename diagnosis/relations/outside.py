@@ -5,22 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.relations.products import (
-    BandNoise,
-    Products,
-    band_edges_Hz,
-    band_of_rows,
-    model_columns,
-    square_left,
-    turned_back,
-    turned_piece,
-    weighted,
-)
-from diagnosis.relations.relation import Floats, Term
+from diagnosis.relations.products import BandNoise, Products, in_time, model_columns, weighted
+from diagnosis.relations.relation import Floats
 from diagnosis.relations.search import Found
 
 _WINDOW_S = 0.1  # of a local variance
-_RCOND = 1e-12  # of columns that are nearly alike
 _SPREADS = np.geomspace(1e-3, 1e2, 26)  # of a free function, relative to the noise of a row
 
 
@@ -30,15 +19,11 @@ class Pattern(NamedTuple):
     what: str  # the variable
     evidence: float  # natural logarithm, against the chosen causes alone
     rms: float  # of the function over the rows, in the relation's unit
-    share: float | None  # of the rest on the held-out runs; below 0: it predicts worse than nothing
 
 
-def patterns_of(
-    products: Products, runs: list[int], held_out: list[int], noise: BandNoise, chosen: Found
-) -> tuple[Pattern, ...]:
+def patterns_of(products: Products, runs: list[int], noise: BandNoise, chosen: Found) -> tuple[Pattern, ...]:
     """Every pattern of the relation beside the chosen causes, fitted to `runs`; the largest evidence first."""
-    whole = weighted(products, runs, noise)
-    plain, elsewhere = (products.values[of].sum(axis=(0, 1)) for of in (runs, held_out))
+    whole, plain = weighted(products, runs, noise), products.values[runs].sum(axis=(0, 1))
     rows = float(products.lengths[runs].sum())
     model, spreads = model_columns(products, chosen.terms)
     patterns: list[Pattern] = []
@@ -46,12 +31,10 @@ def patterns_of(
         columns = products.columns((term,))
         evidence, size = _likeliest(_freed(whole, model, spreads, columns))
         # a part that the nuisances could take as well is not the pattern's
-        square = float(size @ _without(plain, model, columns) @ size) / max(rows, 1.0)
-        share = None
-        if held_out:
-            held = _without(elsewhere, model, np.append(columns, len(elsewhere) - 1))
-            share = 1.0 - square_left(held, size) / max(float(held[-1, -1]), 1e-300)
-        patterns.append(Pattern(term.cause, evidence, math.sqrt(max(square, 0.0)), share))
+        across = plain[model[:, None], columns]
+        taken = np.linalg.lstsq(plain[model[:, None], model], across)[0] if len(model) else across
+        square = float(size @ (plain[columns[:, None], columns] - across.T @ taken) @ size) / max(rows, 1.0)
+        patterns.append(Pattern(term.cause, evidence, math.sqrt(max(square, 0.0))))
     return tuple(sorted(patterns, key=lambda pattern: -pattern.evidence))
 
 
@@ -65,13 +48,6 @@ def _freed(whole: Floats, model: np.ndarray, spreads: Floats, columns: np.ndarra
     scale = 1.0 / np.sqrt(np.diag(inner))
     across = scale[:, None] * whole[model[:, None], everything]
     return free - across.T @ np.linalg.solve(inner * np.outer(scale, scale), across)
-
-
-def _without(plain: Floats, model: np.ndarray, columns: np.ndarray) -> Floats:
-    """The products of `columns`, less all that the columns of the model could take."""
-    across = plain[model[:, None], columns]
-    taken = np.linalg.lstsq(plain[model[:, None], model], across, rcond=_RCOND)[0] if len(model) else across
-    return plain[columns[:, None], columns] - across.T @ taken
 
 
 def _likeliest(free: Floats) -> tuple[float, Floats]:
@@ -89,30 +65,15 @@ def _likeliest(free: Floats) -> tuple[float, Floats]:
     return float(gained[best]) - math.log(len(_SPREADS)), size
 
 
-def whitened_rows(
-    products: Products, runs: list[int], noise: BandNoise, terms: tuple[Term, ...], sizes: Floats
-) -> list[Floats]:
-    """What the terms leave of each piece of `runs`, in units of the noise, back in time: [rows] each, white without a gap."""
+def bursts_of(products: Products, runs: list[int], noise: BandNoise, sizes: Floats) -> float:
+    """Mean over median of the local variance of what `sizes` leave: 1 for even noise, more where a few windows hold the rest."""
     relation = products.relation
-    edges = band_edges_Hz(relation)
-    deviation = np.append(np.sqrt(noise.variance), np.inf)
-    columns: list[Floats] = []
+    length = max(round(_WINDOW_S / relation.row_s), 2)
+    left, weights = np.append(-sizes, 1.0)[:, None], 1.0 / np.sqrt(noise.variance)
+    local = [np.ones(1)]
     for run in runs:
         for piece in relation.pieces[run]:
-            band = band_of_rows(relation, piece[1] - piece[0], edges)
-            turned = turned_piece(relation, terms, run, piece, len(band))
-            rest = (turned[:, -1] - turned[:, :-1] @ sizes) / deviation[band]
-            columns.append(turned_back(rest[:, None], piece[1] - piece[0])[:, 0])
-    return columns
-
-
-def burst_ratio(rows: list[Floats], row_s: float) -> float:
-    """Mean over median of the local variance over windows of 0.1 s: 1 for even noise, more where a few windows hold the rest."""
-    length = max(round(_WINDOW_S / row_s), 2)
-    local = [
-        (piece[: len(piece) // length * length].reshape(-1, length) ** 2).mean(axis=1)
-        for piece in rows
-        if len(piece) >= length
-    ]
-    values = np.concatenate(local) if local else np.ones(1)
+            rows = in_time(relation, products.terms, run, piece, weights, left)[:, 0]
+            local.append((rows[: len(rows) // length * length].reshape(-1, length) ** 2).mean(axis=1))
+    values = np.concatenate(local)
     return float(values.mean() / max(float(np.median(values)), 1e-30))

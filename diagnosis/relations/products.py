@@ -114,13 +114,6 @@ def turned_piece(relation: Relation, terms: tuple[Term, ...], run: int, piece: t
     return np.asarray(dct(columns, axis=1, norm="ortho", overwrite_x=True))[:, :used].T
 
 
-def turned_back(values: Floats, length: int) -> Floats:
-    """Rows of a piece from its lowest frequencies, [length, columns]."""
-    padded = np.zeros((length, values.shape[1]))
-    padded[: len(values)] = values
-    return np.asarray(idct(padded, axis=0, norm="ortho"))
-
-
 class BandNoise(NamedTuple):
     """Variance of a row in each band, [bands]."""
 
@@ -131,10 +124,44 @@ class BandNoise(NamedTuple):
         return float(self.variance @ products.rows[runs].sum(axis=0))
 
 
+def in_time(
+    relation: Relation,
+    terms: tuple[Term, ...],
+    run: int,
+    piece: tuple[int, int],
+    weights: Floats | None,
+    mix: Floats | None = None,
+) -> Floats:
+    """Rows of a piece in time without the frequencies that are left out, [rows, columns + 1], or `mix`ed, [rows, mixtures].
+
+    Args:
+        relation, terms: as in `turned_piece`.
+        run, piece: of the relation.
+        weights: factor of each band, [bands]; None: 1.
+        mix: sums of the columns, [columns + 1, mixtures].
+
+    """
+    length = piece[1] - piece[0]
+    edges = band_edges_Hz(relation)
+    band = band_of_rows(relation, length, edges)
+    turned = turned_piece(relation, terms, run, piece, len(band))
+    factors = np.append(np.ones(len(edges) - 1) if weights is None else weights, 0.0)
+    turned = (turned if mix is None else turned @ mix) * factors[band, None]
+    return np.asarray(idct(turned, axis=0, n=length, norm="ortho"))
+
+
 def weighted(products: Products, runs: list[int], noise: BandNoise) -> Floats:
     """The products over `runs` in units of the noise, [columns, columns]."""
     over = products.values[runs].sum(axis=0)
     return np.tensordot(1.0 / noise.variance, over, axes=1)
+
+
+def sizes_of(products: Products, runs: list[int], noise: BandNoise, terms: tuple[Term, ...]) -> Floats:
+    """Coefficients of the nuisances and of `terms`, fitted to `runs`."""
+    columns, spreads = model_columns(products, terms)
+    whole = weighted(products, runs, noise)
+    inner = whole[columns[:, None], columns] * np.outer(spreads, spreads) + np.eye(len(columns))
+    return spreads * np.linalg.solve(inner, whole[columns, -1] * spreads)
 
 
 def noise_of(products: Products, runs: list[int], columns: np.ndarray, spreads: Floats) -> BandNoise:

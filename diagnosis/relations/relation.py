@@ -8,17 +8,26 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from bridge.arrays import Bools, Floats
+from diagnosis.features.segments import SETTLING
 from diagnosis.gap.prepare import Prepared
 
 Piece = tuple[int, int]  # rows [first, last) of a run, without a hole
 # Causes that no effect of the library makes.
-OUTSIDE = frozenset({"acceleration-clock", "logger-clock", "force-amplifier", "loose-clamp"})
-END_BLOCKS = 20  # left out at the ends of a run
-_EDGE_BLOCKS = 100  # left out around a change of command, while drive and piezo settle
+OUTSIDE = frozenset({"acceleration-clock", "logger-clock"})
 # Rows of a piece. Shorter: its lowest frequencies are those of slips, and columns pass for noise. Longer: pieces are lost.
 _SHORTEST = 300
 _SPARE = 1.5  # by which the rows of a thinned relation still resolve more than its highest frequency
 _WAVES = 4  # half waves of a slow drift over a run
+RESOLUTION = (
+    1e-5  # least noise of a row, as a share of the static friction, or of the acceleration that it gives the slide
+)
+POSITION_HZ = 60.0  # content of a position, or of its second derivative, that is compared: above is noise of the sensor
+# Size of a large effect, as a share of the drive's critical damping, compliance, speed, or of the largest force. Ten times as
+# much or as little changes a log evidence by 2.3.
+LARGE = 0.1
+SKEW = 5e-4  # between two recorders of which one is timed by software
+# Time constants of what settles, in lengths of the longest run: steps of 2.5, which a spread of sizes bridges
+SETTLES = (1.0, 0.4, 0.15, 0.06)
 
 
 class Term(NamedTuple):
@@ -81,15 +90,14 @@ def wander(lengths: list[int], spread: float) -> Term:
 
 
 def kept_blocks(run: Prepared) -> Bools:
-    """Marks the blocks away from changes of command and from the ends of the run, [blocks]."""
+    """Marks the blocks away from changes of command and from the ends of the run, while drive and piezo settle, [blocks]."""
     commands = run.commands
     changes = np.zeros(len(commands.drive))
+    changes[0] = changes[-1] = 1.0
     if any(segment.drive_velocity_mps != 0.0 for segment in commands.segments):
         for command in (commands.drive, commands.frequency_Hz, commands.amplitude_m):
             changes[1:] += np.diff(command) != 0.0
-    kept = maximum_filter1d(changes, 2 * _EDGE_BLOCKS + 1) == 0.0
-    kept[:END_BLOCKS] = kept[-END_BLOCKS:] = False
-    return kept
+    return np.asarray(maximum_filter1d(changes, 2 * SETTLING + 1) == 0.0)
 
 
 def pieces_of(kept: Bools, shortest: int = _SHORTEST) -> tuple[Piece, ...]:

@@ -10,7 +10,6 @@ from diagnosis.relations.products import BandNoise, Products, model_columns, pla
 from diagnosis.relations.relation import Floats, Term
 
 _TRIED_TOGETHER = 40  # terms of which all pairs are tried
-_TRIED_IN_TRIPLES = 16  # of which all triples are tried
 
 
 class Reduced(NamedTuple):
@@ -108,7 +107,7 @@ class Ranking(NamedTuple):
 
 
 def ranked(data: Reduced) -> Ranking:
-    """All single terms, all pairs of the best 40 and all triples of the best 16, of different causes each."""
+    """All single terms, all pairs of the best 40, and the best pair with any third, of different causes each."""
     if not data.terms:
         return Ranking((), ())
     alone = evidences(data, [(i,) for i in range(len(data.terms))])
@@ -116,23 +115,15 @@ def ranked(data: Reduced) -> Ranking:
     singles: dict[str, int] = {}
     for i in order:
         singles.setdefault(data.terms[i].cause, i)
-    best = [found_of(data, (order[0],))]
-
-    def differ(subset: tuple[int, ...]) -> bool:
-        return len({data.terms[i].cause for i in subset}) == len(subset)
-
+    best = [(order[0],)]
     leading = list(dict.fromkeys([*singles.values(), *order]))[:_TRIED_TOGETHER]
-    pairs = [pair for pair in combinations(leading, 2) if differ(pair)]
-    together = evidences(data, pairs)
-    if pairs:
-        best.append(found_of(data, pairs[int(together.argmax())]))
-        by_pair = [i for j in np.argsort(-together)[:60] for i in pairs[j]]
-        leading = list(dict.fromkeys([*by_pair, *order]))[:_TRIED_IN_TRIPLES]
-        triples = [triple for triple in combinations(leading, 3) if differ(triple)]
-        threes = evidences(data, triples)
-        if triples:
-            best.append(found_of(data, triples[int(threes.argmax())]))
-    return Ranking(tuple(found_of(data, (i,)) for i in singles.values()), tuple(best))
+    for sets in (combinations(leading, 2), ((*best[-1], i) for i in order)):
+        differ = [subset for subset in sets if len({data.terms[i].cause for i in subset}) == len(subset)]
+        if differ:
+            best.append(differ[int(evidences(data, differ).argmax())])
+    return Ranking(
+        tuple(found_of(data, (i,)) for i in singles.values()), tuple(found_of(data, found) for found in best)
+    )
 
 
 def without_each(data: Reduced, chosen: Found) -> tuple[float, ...]:

@@ -1,4 +1,4 @@
-"""Shapes of columns: what a channel looks like behind a play, a mode, a knee, or as a free function of a variable."""
+"""Shapes of columns: what a channel looks like behind a mode, or as a free function of a variable."""
 
 import math
 from collections.abc import Sequence
@@ -7,11 +7,10 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 from scipy.signal import lfilter, savgol_filter
 
-from bridge.kernel import kernel
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.relations.relation import Floats, Term
 
-_RATE_BLOCKS = 15  # over which a speed is read
+MODES_HZ = np.geomspace(25.0, 320.0, 30)  # of frame and base: a ringing is some periods long, so steps of 9 %
 _MOVES = 8.0  # standard deviations of this speed above the usual one, from which the slide moves
 _AROUND_BLOCKS, _EDGE_BLOCKS = 30, 8.0  # around a motion that count as near it, and the soft edge
 # Window and order of the polynomials. Quick: keeps 95 % of 100 Hz. Slow: a stick is a straight line with a bow.
@@ -32,7 +31,7 @@ def bend(values: Floats) -> Floats:
 
 def near_slips(position_m: Floats) -> Floats:
     """Weight of each block, [blocks]: 1 near a motion that is faster than creep, 0 where the slide sticks, with soft edges."""
-    speed = np.abs(np.asarray(savgol_filter(position_m, _RATE_BLOCKS, 2, deriv=1)))
+    speed = np.abs(np.asarray(savgol_filter(position_m, *_QUICK, deriv=1)))
     usual = np.median(speed)
     noise = 1.4826 * np.median(np.abs(speed - usual))
     moves = speed > usual + _MOVES * noise
@@ -59,13 +58,6 @@ def mode(values: Floats, frequency_Hz: float, damping_ratio: float) -> Floats:
     ahead = np.array([1.0, 2.0, 1.0]) * steady / over
     back = np.array([1.0, 2.0 * (steady - second) / over, (steady - first + second) / over])
     return np.asarray(lfilter(ahead, back, values - values[0])) + values[0]
-
-
-def play(values: Floats, half_width: float) -> Floats:
-    """Position of a slider that `values` [blocks] push from both sides, with this much play either way; it begins near 0."""
-    result = np.empty(len(values))
-    _play(np.ascontiguousarray(values, np.float64), half_width, result)
-    return result
 
 
 def free(what: str, over: Sequence[Floats], count: int) -> Term:
@@ -100,11 +92,3 @@ def knots_of(values: Floats, count: int) -> Floats:
     least = 1e-9 * max(float(np.abs(values).max()), 1e-30)
     knots = knots[np.concatenate(([True], np.diff(knots) > least))]
     return knots if len(knots) > 1 else np.array([knots[0] - 1.0, knots[0] + 1.0])
-
-
-@kernel
-def _play(values: Floats, half_width: float, result: Floats) -> None:
-    at = 0.0
-    for i in range(values.shape[0]):
-        at = min(max(at, values[i] - half_width), values[i] + half_width)
-        result[i] = at

@@ -8,18 +8,17 @@ import numpy as np
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.feature import BOW, scales_of
 from diagnosis.features.grid import BLOCK_S
+from diagnosis.features.noise import SLOW_SHARE
+from diagnosis.features.segments import SETTLING
 from diagnosis.gap.prepare import Prepared
-from diagnosis.relations.relation import END_BLOCKS, Floats, Missing, Relation, Term, lacking, term, wander
+from diagnosis.model.sensor_chain import BEND_S2, ORDINARY
+from diagnosis.relations.relation import RESOLUTION, Floats, Missing, Relation, Term, lacking, term, wander
 from diagnosis.relations.shapes import bend, calmed, free, near_slips, rate, slip_phase
 from diagnosis.relations.spring_effects import spring_effects
 
 NEEDED = ("drive_force_N", "mass_position_m", "drive_position_m")
 _HIGHEST_HZ = 120.0  # slips end below; above, a block mean of 1 ms is not the value at its middle
-_RESOLUTION = 6e-6  # least noise of a row, as a share of the static friction
-# Standard deviations of what no manifest states; sources: `diagnosis.hypotheses.nuisances`.
-_SCALE, _SLOPE, _DELAY_S, _BEND_S2 = 0.004, 0.006, 1.1e-4, 5e-8
 _SOFT = 0.1  # of the mean rate of the extension: below, it has no direction
-_WANDER = 6e-4  # of the static friction: a strain gauge drifts by 10 mN in 10 s on the paper's rig
 
 
 def spring_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
@@ -44,27 +43,30 @@ def spring_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
     middle_m = float(np.mean([s.mean() for s in drive]))
     bow_per_m = BOW / float(np.ptp(np.concatenate(drive)))
 
-    known = math.hypot(rig.tolerance.get("drive_stiffness_N_per_m", 0.0), _SCALE)
+    known = math.hypot(rig.tolerance.get("drive_stiffness_N_per_m", 0.0), ORDINARY["position_scale"][1])
+    delay_s = math.hypot(ORDINARY["force_delay_s"][1], ORDINARY["position_delay_s"][1])
     nuisances = [
         term("drive_stiffness_N_per_m", "", extension, known * stiffness),
-        term("delay", "", [-stiffness * v for v in rates], _DELAY_S),
-        term("bend", "", [stiffness * bend(e) for e in extension], _BEND_S2),
-        wander([len(values) for values in left], _WANDER * rig.static_force_N),
+        term("delay", "", [-stiffness * v for v in rates], delay_s),
+        term("bend", "", [stiffness * bend(e) for e in extension], BEND_S2),
+        wander([len(values) for values in left], SLOW_SHARE * rig.static_force_N),
     ]
     if damping > 0.0 and (tolerance := rig.tolerance.get("drive_damping_Ns_per_m", 0.0)) > 0.0:
         nuisances.append(term("drive_damping_Ns_per_m", "", rates, tolerance * damping))
     for name, position in (("drive", drive), ("mass", slide)):
         about = [p - middle_m for p in position]
-        nuisances.append(term(f"slope of the {name} sensor", "", [stiffness * p for p in about], _SLOPE))
+        nuisances.append(
+            term(f"slope of the {name} sensor", "", [stiffness * p for p in about], ORDINARY["drive_slope"][1])
+        )
         nuisances.append(term(f"bow of the {name} sensor", "", [stiffness * p * p for p in about], bow_per_m))
     most_N = max(float(np.abs(f).max()) for f in force)
     return Relation(
         name="spring", unit="N", row_s=BLOCK_S, highest_Hz=_HIGHEST_HZ, left=left,
-        pieces=tuple(((END_BLOCKS, len(values) - END_BLOCKS),) for values in left),
+        pieces=tuple(((SETTLING, len(values) - SETTLING),) for values in left),
         nuisances=tuple(nuisances),
         effects=tuple(spring_effects(rig, extension, rates, runs, most_N)),
         patterns=tuple(_patterns(rig, extension, rates, drive)),
-        resolution=_RESOLUTION * rig.static_force_N,
+        resolution=RESOLUTION * rig.static_force_N,
     )  # fmt: skip
 
 

@@ -25,9 +25,9 @@ from diagnosis.judge.judge import NONE, Judged
 from diagnosis.judge.ledger import Ledger
 from diagnosis.judge.outcome import Model, verdict_of, wrong_numbers
 from diagnosis.judge.witnesses import NO_FIT, Witnesses
-from diagnosis.latent.naming import named_by
+from diagnosis.latent.answer import named_by
 from diagnosis.pictures.choice import pictures
-from diagnosis.result import PARAMETERS, Candidate, Cell, Diagnosis, Experiment, Gap, Shrinkage, WrongNumber
+from diagnosis.result import PARAMETERS, Candidate, Cell, Diagnosis, Experiment, Gap, Shrinkage
 from plant.effects.library import EFFECTS
 
 HOLD = Experiment(
@@ -55,68 +55,63 @@ def assembled(seen: Witnesses, ledger: Ledger, judged: Judged) -> Diagnosis:
     fitter, baseline = search.rig.fitter, search.rig.fit
     named = _in_time(lambda: search.of(judged.names), None) if judged.names else None
     best = named or baseline
-    judged_gap, numbers, cells = Gap(DEFINITION), tuple[WrongNumber, ...](), list[Cell]()
+    gap, cells = Gap(DEFINITION), list[Cell]()
     cells += _in_time(lambda: _cells_of(fitter.floor, fitter.problem, fitter.predicted(baseline.deviations, {})), [])
     rival = _in_time(lambda: _rival(search, judged), None)
     if (held_out := seen.held_out) is not None:
         cells += _in_time(lambda: _cells(held_out.floor, held_out.differences(baseline)), [])
-        judged_gap = _in_time(lambda: _gap(held_out, baseline, named, rival), judged_gap)
+        gap = _in_time(lambda: _gap(held_out, baseline, named, rival), gap)
     numbers = _in_time(lambda: tuple(wrong_numbers(fitter.nuisances, best, held_out)), ())
-    model = Model(named is not None, numbers, judged_gap, _outside(seen))
-    kind, effects = verdict_of(judged, model, named_by(seen.latent))
+    done = _judged(seen, ledger, judged, Model(named is not None, numbers, gap, _outside(seen)))
     cells += _vibrating(evidence)
     total = sum(cell.share for cell in cells)
-    where = sorted((cell._replace(share=cell.share / total) for cell in cells), key=lambda cell: -cell.share)
     shown = Problem(evidence.rig, seen.runs)
     shown.until_s = seen.until_s
     nuisances = fitter.nuisances
     described, refitted = (nuisances.point(at, {}) for at in (np.zeros(len(nuisances)), baseline.deviations))
     of_named = nuisances.point(best.deviations, best.effects) if named is not None and named.effects else None
-    return Diagnosis(
-        verdict=kind,
-        effects=effects,
-        summary=(),
+    return done._replace(
         candidates=_candidates(judged, search, named),
-        complete=judged.complete,
-        not_distinguishable=_alike(judged, effects),
-        where=tuple(where),
-        gap=judged_gap,
+        not_distinguishable=_alike(judged, done.effects),
+        where=tuple(sorted((cell._replace(share=cell.share / total) for cell in cells), key=lambda cell: -cell.share)),
         next_experiment=_next(seen, search, [best, *([] if rival is None else [rival])]),
         rig=nuisances.parameters(best.deviations),
         findings=(*evidence.findings, *_changing(seen.runs)),
-        pictures=_in_time(lambda: pictures(shown, described, refitted, of_named, effects), ()),
+        pictures=_in_time(lambda: pictures(shown, described, refitted, of_named, done.effects), ()),
         compared_features=len(baseline.residual),
-        elapsed_s=0.0,
-        numbers=numbers,
-        ledger=ledger.rows,
-        cannot_show=seen.hidden,
     )
 
 
 def _without_fits(seen: Witnesses, ledger: Ledger, judged: Judged) -> Diagnosis:
     """The diagnosis from relations and latent friction alone."""
-    model = Model(fitted=False, numbers=(), gap=Gap(DEFINITION), outside=_outside(seen))
+    gap = Gap(DEFINITION, tuple(run.file for run in seen.evidence.runs if run.holdout))
+    done = _judged(seen, ledger, judged, Model(fitted=False, numbers=(), gap=gap, outside=_outside(seen)))
+    if done.verdict != "no-gap":
+        return done
+    # the relations do not see every effect
+    candidates = tuple(candidate._replace(probability=math.nan) for candidate in done.candidates)
+    return done._replace(verdict="not-finished", candidates=candidates, complete=math.nan)
+
+
+def _judged(seen: Witnesses, ledger: Ledger, judged: Judged, model: Model) -> Diagnosis:
+    """The part of a diagnosis that needs no fit."""
     kind, effects = verdict_of(judged, model, named_by(seen.latent))
-    if kind == "no-gap":  # the relations do not see every effect
-        kind = "not-finished"
-    candidates = _candidates(judged, None, None)
-    if kind == "not-finished":
-        candidates = tuple(candidate._replace(probability=math.nan) for candidate in candidates)
     return Diagnosis(
         verdict=kind,
         effects=effects,
         summary=(),
-        candidates=candidates,
-        complete=math.nan if kind == "not-finished" else judged.complete,
+        candidates=_candidates(judged, None, None),
+        complete=judged.complete,
         not_distinguishable=(),
         where=(),
-        gap=Gap(DEFINITION, tuple(run.file for run in seen.evidence.runs if run.holdout)),
+        gap=model.gap,
         next_experiment=LONGER if seen.comparable or not seen.runs else HOLD,
         rig=(),
         findings=(*seen.evidence.findings, NO_FIT),
         pictures=(),
         compared_features=0,
         elapsed_s=0.0,
+        numbers=model.numbers,
         ledger=ledger.rows,
         cannot_show=seen.hidden,
     )

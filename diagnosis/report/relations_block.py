@@ -52,17 +52,6 @@ def signal_of(relation: str) -> str:
     return _SIGNALS.get(relation, relation)
 
 
-def in_a_line(decision: Decision) -> str:
-    """The decision of the relations as a progress message; empty without a decision."""
-    if decision.outside:
-        first = decision.outside[0]
-        return f"{signal_of(first.relation)}: {first.what}, which no effect of the library causes"
-    if decision.decided:
-        first = decision.decided[0]
-        return f"{signal_of(first.relation)}: {first.cause}"
-    return ""
-
-
 def _shares(answered: Answered) -> list[Share]:
     if answered.shares is None:
         return []

@@ -1,15 +1,13 @@
 """A diagnosis in words: verdicts, relations, latent friction, numbers with their units, the meaning of each effect."""
 
 import math
-from collections.abc import Sequence
 from typing import Final
 
 from bridge.units import decimals_of, fixed_digits, interval, name_and_unit, percent, prefixed, quantity, times
 from diagnosis.fits.held_out import FAR_FOR_NO_GAP
 from diagnosis.hypotheses.catalogue import CATALOGUE
-from diagnosis.latent.answer import LatentSignal
+from diagnosis.latent.answer import MOST
 from diagnosis.latent.causes import NOISE, SCATTER
-from diagnosis.latent.naming import MOST
 from diagnosis.latent.rows import BREAKAWAY, SLIDING
 from diagnosis.result import (
     PARAMETERS,
@@ -171,20 +169,6 @@ def closing_number_in_words(number: WrongNumber) -> str:
     """A number that was found, the described one, and the share of the gap that it closes."""
     closes = "" if number.share is None else f", closes {closed_in_words(number.share)} of the gap"
     return f"{wrong_number_in_words(number)}{closes}"
-
-
-def latent_line(latent: Sequence[LatentSignal]) -> str:
-    """The largest share whose interval exceeds chance, as a progress message; empty without such a share."""
-    candidates = [
-        (share.share, latent_signal.signal, share)
-        for latent_signal in latent
-        for share in latent_signal.shares
-        if share.beyond_chance
-    ]
-    if not candidates:
-        return ""
-    _, signal, share = max(candidates, key=lambda candidate: candidate[0])
-    return f"{signal}: {share_in_words(Share(signal, share.what, share.share, share.interval_90, share.null_90))}"
 
 
 def mostly(diagnosis: Diagnosis) -> Share | None:

@@ -11,9 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.latent.answer import LatentSignal, signal_of
+from diagnosis.latent.answer import LatentSignal, named_by, signal_of
 from diagnosis.latent.causes import DIRECTION, FORCE_PLACE, LOAD, PLACE, SPEED, TIME
-from diagnosis.latent.naming import named_by
 from diagnosis.latent.rows import BREAKAWAY, SLIDING, ExcessRows
 from diagnosis.processes import one_thread
 

@@ -5,13 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis.latent.answer import LatentSignal, latent_of, signal_of
+from diagnosis.latent.answer import LatentSignal, latent_of, named_by, signal_of
 from diagnosis.latent.causes import DIRECTION, FORCE_PLACE, LOAD, NOISE, PLACE, SCATTER, TIME
-from diagnosis.latent.naming import named_by
 from diagnosis.latent.rows import BREAKAWAY, SLIDING, ExcessRows
 from diagnosis.latent.shares import LatentShare
 from diagnosis.report.relations_block import latent_rows, latent_shares
-from diagnosis.report.words import latent_line, share_in_words
+from diagnosis.report.words import share_in_words
 from tests.unit.diagnosis.relations.kinematic import rig, runs
 
 ROWS = 90
@@ -157,7 +156,6 @@ def test_a_share_is_a_cause_only_where_its_whole_interval_exceeds_chance():
     assert within.null_90 is not None
     assert within.share > within.null_90
     assert latent_rows([signal._replace(shares=(within,))])[0].causes == ()
-    assert latent_line([signal._replace(shares=(within,))]) == ""
 
 
 def test_a_negative_share_is_written_as_such():
