@@ -1,5 +1,6 @@
 """A real rig behind its guard, from its rig file: its device, opened, with calibration and limits."""
 
+import math
 from pathlib import Path
 
 from bridge.arrays import Records
@@ -55,6 +56,8 @@ def calibration(rig: DeviceRig) -> Records:
         channel = rig.channels[name]
         memory["source"][0, row] = -1 if channel.source is None else channel.source
         memory["scale"][0, row], memory["offset"][0, row] = channel.sign * channel.scale, channel.offset
+        memory["range_low"][0, row] = -math.inf if channel.lowest is None else channel.lowest
+        memory["range_high"][0, row] = math.inf if channel.highest is None else channel.highest
     return memory
 
 
