@@ -58,6 +58,7 @@ class Device(ABC):
     # whose clock makes a block: the device's, if `read` waits until a block is complete; the computer's, whose loop reads one
     # each block length; or none, as a simulated device makes a block for each `write`
     pace: Pace = "device"
+    answer_s = 0.0  # longest time from `write` until the device executes it, beyond the block under way
 
     def __init__(self, setup: Setup) -> None:
         """Read the settings, without a connection. Raises Fault CONFIG."""

@@ -279,7 +279,7 @@ class DeviceNode(GuardedNode):
         except Exception as error:
             self._rest()
             self._problems.append(
-                ("DEVICE_REFUSED", f"{_reason(error)}: the exciter rests, and begins again from 0", 1)
+                ("DEVICE_REFUSED", f"{reason_of(error)}: the exciter rests, and begins again from 0", 1)
             )
 
     def _whole(self, block: DeviceBlock | None) -> DeviceBlock | None:
@@ -319,7 +319,7 @@ class DeviceNode(GuardedNode):
         try:
             self._device.safe()
         except Exception as error:
-            self._problems.append(("DEVICE_REFUSED", f"{_reason(error)}: the exciter may still vibrate", 1))
+            self._problems.append(("DEVICE_REFUSED", f"{reason_of(error)}: the exciter may still vibrate", 1))
 
     def _read(self) -> DeviceBlock | None:
         try:
@@ -330,7 +330,7 @@ class DeviceNode(GuardedNode):
             block = self._whole(self._device.read()) if self._is_open else None
             self._take_problems()
         except Exception as error:
-            self._fall_silent(error.code if isinstance(error, DeviceError) else "DEVICE_GONE", _reason(error))
+            self._fall_silent(error.code if isinstance(error, DeviceError) else "DEVICE_GONE", reason_of(error))
             with contextlib.suppress(Exception):  # it is lost already
                 self._device.close()
             self._is_open, self._open_again_s = False, time.monotonic() + _OPEN_AGAIN_S
@@ -403,7 +403,7 @@ class DeviceNode(GuardedNode):
         self._device.close()
 
 
-def _reason(error: Exception) -> str:
+def reason_of(error: Exception) -> str:
     """The reason of a failed call. An adapter may be foreign code: its error must not end the loop of the guard."""
     if isinstance(error, DeviceError):
         return str(error)

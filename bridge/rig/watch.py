@@ -28,7 +28,7 @@ class DeviceWatch:
     Args:
         block_s: length of a block by the device's clock.
         read_s: longest time of a `read` without a block.
-        has_clock: whether the device makes its blocks by a clock of its own.
+        has_clock: whether the device makes its blocks by its own clock.
 
     """
 

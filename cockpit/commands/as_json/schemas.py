@@ -161,6 +161,7 @@ _RESULTS = {
     "record": "cockpit.commands.processes:Recorded",
     "rig serve": "cockpit.commands.processes:Served",
     "rig check": "bridge.rig.check:RigCheck",
+    "rig conformance": "bridge.rig.conformance.report:Conformance",
     "rig box": "cockpit.commands.rig:Boxed",
     "status": "cockpit.live.status:Status",
     "fault": "cockpit.faults.injection:Injected",
