@@ -106,7 +106,7 @@ def _simulated(
     """Serve a simulated rig; returns the number of blocks. Raises Fault."""
     from cockpit.run.run_tables import refuse_faults
     from cockpit.run.scenario import header, refuse_short_blocks
-    from plant.app import run as simulate
+    from plant.rig.app import run as simulate
 
     if not lockstep:
         refuse_short_blocks(made)

@@ -107,7 +107,7 @@ def rig_box(
     from bridge.wire import realtime
     from cockpit.run.child_process import stop_event
     from cockpit.run.scenario import load_rig
-    from plant.box import Box, BoxConfig
+    from plant.rig.box import Box, BoxConfig
 
     config = validate(BoxConfig, read_toml(box), box.name)
     made = Box(config, load_rig(config.rig, config.settings))

@@ -12,8 +12,8 @@ from collections import deque
 import numpy as np
 
 from plant.config import RigConfig
-from plant.device import PlantDevice
 from plant.records import TRUTH
+from plant.rig.device import PlantDevice
 from tests.patience import PATIENCE_S
 
 BEGIN = 600  # block at which a misbehaviour begins, unless it is there from the start
