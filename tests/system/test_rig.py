@@ -65,6 +65,8 @@ def test_a_real_rig_runs_in_lockstep_with_the_rig_file_alone(tmp_path: Path) -> 
     assert controller["amplitude"]["accel_range_mps2"] == 100.0
     events = {event.code: event.text for event in run.events}
     assert events["INJECTED"].startswith("mass_accel_mps2 offset 7")
+    for command in ("replay", "look"):  # the header in the log sets rate and blocks for every reader
+        assert CliRunner().invoke(app, [command, str(log)]).exit_code == 0
     assert events["UNPROTECTED"].startswith("no watchdog")
 
 
