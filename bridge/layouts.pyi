@@ -57,8 +57,9 @@ class GuardMemory:
     vibration_mps:float
 
 class DeviceMemory:
-    command_block:int; commanded_Hz:float; commanded_m:float; offset:npt.NDArray[Any]; scale:npt.NDArray[Any];
-    source:npt.NDArray[Any]
+    at_end:npt.NDArray[Any]; command_block:int; commanded_Hz:float; commanded_m:float; highest:npt.NDArray[Any];
+    lowest:npt.NDArray[Any]; offset:npt.NDArray[Any]; range_high:npt.NDArray[Any]; range_low:npt.NDArray[Any];
+    scale:npt.NDArray[Any]; source:npt.NDArray[Any]; step:npt.NDArray[Any]
 
 class PlantParams:
     F_c:float; F_s:float; accel_bandwidth_Hz:float; accel_highpass_keep:float; accel_highpass_keep_stick:float;

@@ -51,6 +51,7 @@ _PANELS: dict[str, dict[str, tuple[str, ...]]] = {
         "rig": (
             "rig.rig_app",
             "stickslip rig check mine.toml",
+            "stickslip rig conformance mine.toml --junit report.xml",
             "stickslip rig serve mine.toml",
             "stickslip rig box box.toml",
         ),

@@ -20,11 +20,7 @@ NOT_JUDGED = (
     "diagnosis/version.py",
     "diagnosis/report",
     "diagnosis/pictures",
-    "plant/app.py",
-    "plant/node.py",
-    "plant/device.py",
-    "plant/box.py",
-    "plant/exciter_faults.py",
+    "plant/rig",
 )
 # fields of a row of `diagnosis.hypotheses.catalogue` that only texts and pictures use
 _NOT_JUDGED_KEYWORDS = {"words", "shown_by", "shown_twice"}

@@ -27,10 +27,7 @@ step          one whole block with its messages
 simulate      a run without bus and sensors
 stability     the slider linearised around steady sliding
 inputs        velocity of the drive, its announcements, noise and delays, block by block, drawn ahead by a thread
-node, app     the rig behind its guard, in one compiled step; its process
-device        the physics alone as a device, for the guard of every rig
-box           this device in another process, behind a TCP port
-exciter_faults  injected faults of the exciter
+rig/          the plant behind its guard on the bus, and as a device for the guard of every rig
 effects/      effects of a real rig that the nominal rig lacks
 four_rigs, four_rigs_step  the same for four or eight rigs side by side, in vector registers; one step of them
 """

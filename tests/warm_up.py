@@ -23,9 +23,9 @@ def control(folder: Path) -> None:
     from cockpit.run.scenario import load_scenario
     from controller.node import ControllerNode
     from controller.replay import replay
-    from plant.device import PlantDevice
-    from plant.node import PlantNode
     from plant.records import guard_records
+    from plant.rig.device import PlantDevice
+    from plant.rig.node import PlantNode
 
     scenario = load_scenario("paper-c45-c45", ["duration_s=0.4"])
     PlantNode(scenario.rig, scenario.seed).warm_up()

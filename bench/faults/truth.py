@@ -11,8 +11,8 @@ from bridge.wire.topics import OPERATOR, Outgoing
 from cockpit.run.in_process import TimedAction
 from cockpit.run.scenario import Scenario
 from cockpit.run.simulated.run import SimulatedRun
-from plant.node import PlantNode
 from plant.records import TRUTH
+from plant.rig.node import PlantNode
 
 _POSITION, _VELOCITY = TRUTH.index("true_drive_position_m"), TRUTH.index("true_velocity_mps")
 

@@ -4,6 +4,7 @@ device   the contract of a device: converter and exciter
 node     a rig behind its guard, block by block: `GuardedNode`; around a device: `DeviceNode`
 step     a block between its messages, compiled; the plant's loop calls the same parts
 rate     the measured rate of a device
+watch    faults that show in the times of its blocks, and in the vibration that it executes
 file     the rig file of a real rig
 load     the device that it describes, by its adapter
 real     this device, opened, behind its guard

@@ -106,12 +106,13 @@ def _listen(device: Device, seconds: float) -> _Heard:
         while time.monotonic() < until_s:
             device.write(1.0, 0.0)
             block = device.read()
+            problems = device.problems()
             begun = begun or (block is not None and not block.waiting)  # not with blocks from before
+            heard.dropped = problems[-1][1] if problems else heard.dropped
             if block is not None and begun:
                 heard.samples.append(block.samples)
                 heard.at_s.append(time.monotonic())
                 heard.lost += block.lost if len(heard.samples) > 1 else 0
-                heard.dropped = block.dropped or heard.dropped
             if device.pace == "computer":
                 time.sleep(device.block_s)
     except DeviceError as error:
@@ -142,7 +143,7 @@ def _of_device(device: Device, heard: _Heard, rate_Hz: float, gap_s: float) -> l
     if heard.lost:
         problems.append(Problem("device", f"{heard.lost} blocks were lost", "lower its rate, or use a faster link"))
     if heard.dropped:
-        problems.append(Problem("device", f"unreadable data: {heard.dropped}", "compare its frames with [converter]"))
+        problems.append(Problem("device", f"bad data: {heard.dropped}", "compare its frames with [converter]"))
     if gap_s > _JITTER_BLOCKS * device.block_s:
         text = f"a block came {gap_s * 1e3:.0f} ms after the one before"
         problems.append(Problem("device", text, "end other programs, or shorten the device's own buffer"))

@@ -18,7 +18,17 @@ Pace = Literal["device", "computer", "caller"]
 
 
 class DeviceError(Exception):
-    """The device refused an order or is gone; the text goes to the operator."""
+    """The device refused an order or is gone.
+
+    Args:
+        text: for the operator.
+        code: of the event, if `open` or `read` raises it, such as DEVICE_BUSY for a device that another client holds.
+
+    """
+
+    def __init__(self, text: str, code: str = "DEVICE_GONE") -> None:
+        super().__init__(text)
+        self.code = code
 
 
 class Setup(NamedTuple):
@@ -40,7 +50,6 @@ class DeviceBlock(NamedTuple):
     amplitude: float  # the same, in the unit of `write`
     lost: int = 0  # whole blocks that were lost before this one
     waiting: int = 0  # complete blocks that wait behind it
-    dropped: str = ""  # data before this block that could not be read, for the operator
 
 
 class Device(ABC):
@@ -49,6 +58,7 @@ class Device(ABC):
     # whose clock makes a block: the device's, if `read` waits until a block is complete; the computer's, whose loop reads one
     # each block length; or none, as a simulated device makes a block for each `write`
     pace: Pace = "device"
+    answer_s = 0.0  # longest time from `write` until the device executes it, beyond the block under way
 
     def __init__(self, setup: Setup) -> None:
         """Read the settings, without a connection. Raises Fault CONFIG."""
@@ -86,6 +96,10 @@ class Device(ABC):
     def enable(self, on: bool, toggle: int) -> None:
         """Set the enable line of the amplifier, and the output that a watchdog observes. Raises DeviceError."""
         raise DeviceError(f"enable {on}, {toggle}: this device has no enable line")
+
+    def problems(self) -> list[tuple[str, str]]:
+        """New problems with the data since the last call: code of an event, such as BLOCK_SHORT, and text; by default none."""
+        return []
 
     def announcements(self) -> Records:
         """Coming velocities of the drive, records of `Announce` before the next samples; by default none."""

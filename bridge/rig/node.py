@@ -18,7 +18,8 @@ from bridge.kernel_cache import compile_once
 from bridge.rig.device import Device, DeviceBlock, DeviceError
 from bridge.rig.faults.schedule import Faults
 from bridge.rig.rate import RateWatch
-from bridge.rig.step import begin, device_memory, end, fill
+from bridge.rig.step import begin, clipped, device_memory, end, fill
+from bridge.rig.watch import DeviceWatch, Problem
 from bridge.wire.clock import time
 from bridge.wire.messages import ANNOUNCE as ANNOUNCE_LAYOUT
 from bridge.wire.messages import APPLIED as APPLIED_LAYOUT
@@ -30,7 +31,10 @@ from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, SENSORS, Outgoing
 # Time of the blocks that may wait without a report. Smaller: each short stall of the computer is reported. Larger: v_a swings by
 # more than 4 % (the margin of the controller's LATE) without a report.
 _BEHIND_S = 0.015
-_OPEN_AGAIN_S = 1.0  # interval of the attempts to open a lost device
+_CLIPPED_S = 0.2  # interval at which clipped channels are reported
+# Interval of the attempts to open a lost device. Smaller: more load on a device that starts. Larger: a device that another client
+# took is reported after more than 1 s.
+_OPEN_AGAIN_S = 0.5
 
 
 class GuardedNode(ABC):
@@ -103,7 +107,7 @@ class GuardedNode(ABC):
     def at_rest(self) -> bool:
         """Whether the base is at rest."""
 
-    def problems(self) -> list[tuple[str, str, int]]:
+    def problems(self) -> list[Problem]:
         """Codes, texts and numbers of new problems with the rig itself, which are reported once a second at most."""
         return []
 
@@ -204,8 +208,15 @@ class DeviceNode(GuardedNode):
         self._silent_since_s: float | None = None  # None while blocks arrive
         self._is_open = True
         self._open_again_s = 0.0
-        self._problems: list[tuple[str, str, int]] = []
+        self._silent_code = ""  # of the newest report of the silence
+        self._problems: list[Problem] = []
+        self._look_blocks = max(round(_CLIPPED_S / device.block_s), 1)
+        self._begin_watches()
+
+    def _begin_watches(self) -> None:
+        device = self._device
         self._clock = RateWatch(device.setup.sample_rate_Hz, self._samples)
+        self._watch = DeviceWatch(device.block_s, device.longest_read_s, self.paced_by_rig)
 
     @property
     def paced_by_rig(self) -> bool:
@@ -222,6 +233,7 @@ class DeviceNode(GuardedNode):
         with contextlib.suppress(Exception):
             while self.paced_by_rig and (block := self._device.read()) is not None and block.waiting:
                 pass
+        self._take_problems()
         self._heard_s = time.monotonic()
 
     def _step_copies(self) -> None:
@@ -241,6 +253,8 @@ class DeviceNode(GuardedNode):
         self._block, self._is_begun = block, False
         self._note_block(block)
         fill(self._guard_state, self._memory, self.block_ns, block.lost, block.samples, self._sensors)
+        if self.block % self._look_blocks == 0 and (names := clipped(self._memory, self._look_blocks * self._samples)):
+            self._problems.append(("DEVICE_CLIPPED", f"{', '.join(names)}: many samples at one end of the range", 1))
         return self._accepted
 
     def _begin(self, commands: Records) -> None:
@@ -258,11 +272,14 @@ class DeviceNode(GuardedNode):
         try:
             if has_line := device.setup.has_enable_line:
                 device.enable(is_on, int(g.toggle))
-            device.write(float(g.frequency_Hz), float(g.amplitude_m) / self._stroke_m if is_on or has_line else 0.0)
+            amplitude = float(g.amplitude_m) / self._stroke_m if is_on or has_line else 0.0
+            device.write(float(g.frequency_Hz), amplitude)
+            if is_on or not has_line:  # while the line is off, the loop check watches the amplifier
+                self._watch.order(amplitude)
         except Exception as error:
             self._rest()
             self._problems.append(
-                ("DEVICE_REFUSED", f"{_reason(error)}: the exciter rests, and begins again from 0", 1)
+                ("DEVICE_REFUSED", f"{reason_of(error)}: the exciter rests, and begins again from 0", 1)
             )
 
     def _whole(self, block: DeviceBlock | None) -> DeviceBlock | None:
@@ -283,52 +300,70 @@ class DeviceNode(GuardedNode):
     def _note_block(self, block: DeviceBlock) -> None:
         if block.lost:
             self._problems.append(("SAMPLES_LOST", "blocks were lost before they were read", block.lost))
-        if block.dropped:
-            self._problems.append(("DEVICE_DATA", f"{block.dropped}: dropped", 1))
         if block.waiting * self._device.block_s > _BEHIND_S:
             self._problems.append(("BEHIND", f"{block.waiting} blocks waited to be read", 1))
-        if self.paced_by_rig and (measured := self._clock.add(1 + block.lost, time.monotonic())):
+        now_s = time.monotonic()
+        if self.paced_by_rig and (measured := self._clock.add(1 + block.lost, now_s)):
             self._problems.append((*measured, 1))
+        self._problems += self._watch.look(block, now_s)
+
+    def _take_problems(self) -> None:
+        problems = self._device.problems()
+        self._problems += [(*problem, 1) for problem in problems]
+        if any(code == "DEVICE_RESTARTED" for code, _ in problems):
+            self._rest()  # it has forgotten the vibration, which begins again from 0
 
     def _rest(self) -> None:
         self._guard_state["amplitude_m"] = 0.0
+        self._watch.order(0.0)
         try:
             self._device.safe()
         except Exception as error:
-            self._problems.append(("DEVICE_REFUSED", f"{_reason(error)}: the exciter may still vibrate", 1))
+            self._problems.append(("DEVICE_REFUSED", f"{reason_of(error)}: the exciter may still vibrate", 1))
 
     def _read(self) -> DeviceBlock | None:
         try:
+            if self._watch.failure is not None:
+                raise self._watch.failure
             if not self._is_open:
                 self._open_again()
             block = self._whole(self._device.read()) if self._is_open else None
+            self._take_problems()
         except Exception as error:
-            self._fall_silent(_reason(error))
+            self._fall_silent(error.code if isinstance(error, DeviceError) else "DEVICE_GONE", reason_of(error))
             with contextlib.suppress(Exception):  # it is lost already
                 self._device.close()
             self._is_open, self._open_again_s = False, time.monotonic() + _OPEN_AGAIN_S
+            self._begin_watches()
             return None
         now_s = time.monotonic()
         if block is None:
+            self._watch.empty()
             if now_s - self._heard_s > self._timeout_s:
-                self._fall_silent(f"no block for {self._timeout_s:g} s")
+                self._fall_silent("DEVICE_SILENT", f"no block for {self._timeout_s:g} s")
             return None
         self._heard_s = now_s
         if self._silent_since_s is not None:
-            self._problems.append(("DEVICE_BACK", f"blocks again after {now_s - self._silent_since_s:.2f} s", 1))
-            self._silent_since_s = None
-            self._clock = RateWatch(self._device.setup.sample_rate_Hz, self._samples)
+            silent_s = now_s - self._silent_since_s
+            self._problems.append(("DEVICE_BACK", f"blocks again after {silent_s:.2f} s", 1))
+            self._silent_since_s, self._silent_code = None, ""
+            self._begin_watches()
+            if not block.lost:  # the device does not know: without the lost time a moving drive would jump
+                block = block._replace(lost=max(round(silent_s / self._device.block_s) - 1, 0))
         return block
 
-    def _fall_silent(self, why: str) -> None:
+    def _fall_silent(self, code: str, why: str) -> None:
         """Let the exciter rest until blocks arrive again."""
         if self._silent_since_s is None:
             self._silent_since_s, self._is_begun, self._accepted = self._heard_s, False, 0
             self._rest()
-            self._problems.append(("DEVICE_SILENT", f"{why}: the exciter rests", 1))
+        elif code in (self._silent_code, "DEVICE_SILENT"):
+            return
+        self._silent_code = code
+        self._problems.append((code, f"{why}: the exciter rests", 1))
 
     def _open_again(self) -> None:
-        """Try to open a lost device, once each second. Raises DeviceError."""
+        """Try to open a lost device, twice a second. Raises DeviceError."""
         if time.monotonic() < self._open_again_s:
             time.sleep(self.block_ns * 1e-9)
             return
@@ -357,7 +392,7 @@ class DeviceNode(GuardedNode):
             self._silent_since_s is not None or self._block.amplitude == 0.0
         )
 
-    def problems(self) -> list[tuple[str, str, int]]:
+    def problems(self) -> list[Problem]:
         """Codes, texts and numbers of new problems with the device, and its measured rate."""
         problems, self._problems = self._problems, []
         return problems
@@ -368,7 +403,7 @@ class DeviceNode(GuardedNode):
         self._device.close()
 
 
-def _reason(error: Exception) -> str:
+def reason_of(error: Exception) -> str:
     """The reason of a failed call. An adapter may be foreign code: its error must not end the loop of the guard."""
     if isinstance(error, DeviceError):
         return str(error)

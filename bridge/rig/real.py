@@ -1,5 +1,7 @@
 """A real rig behind its guard, from its rig file: its device, opened, with calibration and limits."""
 
+import math
+from collections.abc import Sequence
 from pathlib import Path
 
 from bridge.arrays import Records
@@ -9,6 +11,7 @@ from bridge.guard.records import ExciterLimits, build
 from bridge.guard.wide import protection
 from bridge.rig.device import DeviceError
 from bridge.rig.faults.schedule import Faults
+from bridge.rig.faults.table import FaultTable
 from bridge.rig.file import DeviceRig
 from bridge.rig.load import device_of
 from bridge.rig.node import DeviceNode
@@ -17,25 +20,25 @@ from bridge.rig.step import device_memory
 from bridge.wire.channels import CHANNELS
 
 
-def served(rig: DeviceRig, folder: Path) -> Served:
-    """A real rig for `bridge.rig.process.serve`; it never starts ARMED."""
+def served(rig: DeviceRig, folder: Path, faults: Sequence[FaultTable] = (), seed: int = 0) -> Served:
+    """A real rig for `bridge.rig.process.serve`, with injected faults; it never starts ARMED."""
 
     def make(run: int, _may_arm: bool) -> DeviceNode:
-        return open_node(rig, folder, run)
+        return open_node(rig, folder, run, faults, seed)
 
     return Served(rig.name, rig.guard, notes(rig), make)
 
 
-def open_node(rig: DeviceRig, folder: Path, run: int) -> DeviceNode:
+def open_node(rig: DeviceRig, folder: Path, run: int, faults: Sequence[FaultTable] = (), seed: int = 0) -> DeviceNode:
     """The node of a rig whose device is open. Raises Fault CONFIG, NO_DEVICE; a rig that cannot be opened is never simulated."""
     device = device_of(rig, folder)
     guard = build(rig.guard, _exciter(rig), run, absent=absent(rig.channels))
-    faults = Faults((), 0, rig.converter.block_s, rig.converter.samples_per_block)
+    injected = Faults(faults, seed, rig.converter.block_s, rig.converter.samples_per_block)
     try:
         device.open()
     except DeviceError as error:
         raise Fault("NO_DEVICE", f"{rig.name}: {error}") from None
-    return DeviceNode(device, guard, faults, calibration(rig), rig.exciter.stroke_m_per_V or 1.0)
+    return DeviceNode(device, guard, injected, calibration(rig), rig.exciter.stroke_m_per_V or 1.0)
 
 
 def notes(rig: DeviceRig) -> list[tuple[str, str]]:
@@ -55,6 +58,8 @@ def calibration(rig: DeviceRig) -> Records:
         channel = rig.channels[name]
         memory["source"][0, row] = -1 if channel.source is None else channel.source
         memory["scale"][0, row], memory["offset"][0, row] = channel.sign * channel.scale, channel.offset
+        memory["range_low"][0, row] = -math.inf if channel.lowest is None else channel.lowest
+        memory["range_high"][0, row] = math.inf if channel.highest is None else channel.highest
     return memory
 
 

@@ -85,9 +85,11 @@ def serve_rig(shared: SharedOptions, rig: str | None, wait_for: str, as_json: Js
             from bridge.rig.process import serve
             from bridge.rig.real import served
             from cockpit.run.device_run import device_header
+            from cockpit.run.run_tables import refuse_faults
 
             described = device_header(made, "plant", shared.lockstep)
-            real = served(made.rig, folder)
+            refuse_faults(made, shared.lockstep)
+            real = served(made.rig, folder, made.fault, made.seed)
             blocks = serve(real, made.duration_s, made.bus, described, roles, shared.lockstep, stop, kept, report)
     done = Served("plant", made.bus.endpoint, shared.lockstep, blocks)
     print_result(as_json, done, [done.in_words()])
@@ -102,8 +104,9 @@ def _simulated(
     report: Callable[[str, str], None],
 ) -> int:
     """Serve a simulated rig; returns the number of blocks. Raises Fault."""
-    from cockpit.run.scenario import header, refuse_faults, refuse_short_blocks
-    from plant.app import run as simulate
+    from cockpit.run.run_tables import refuse_faults
+    from cockpit.run.scenario import header, refuse_short_blocks
+    from plant.rig.app import run as simulate
 
     if not lockstep:
         refuse_short_blocks(made)

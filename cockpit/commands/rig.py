@@ -1,4 +1,4 @@
-"""`stickslip rig ...`: serve and check a real rig; simulate a device."""
+"""`stickslip rig ...`: serve and check a real rig and its adapter; simulate a device."""
 
 import threading
 from pathlib import Path
@@ -9,6 +9,7 @@ import typer
 from cockpit.commands.as_json.option import Json, JsonGroup, print_result
 from cockpit.commands.options import SharedOptions, command
 from cockpit.commands.processes import WaitFor, serve_rig
+from cockpit.run.writable import JUNIT, check_output
 
 rig_app = typer.Typer(
     cls=JsonGroup, help="Serve a real rig behind the guard, check it; simulate a device.", no_args_is_help=True
@@ -57,6 +58,44 @@ def rig_check(
     return 0 if result.ok else 1
 
 
+@rig_app.command("conformance")
+@command("scenario", "settings", "endpoint", "prefix", "certs", "lockstep", "wait")
+def rig_conformance(
+    shared: SharedOptions,
+    rig: Annotated[str | None, typer.Argument(metavar="[RIG]", help="A rig file of a real rig, .toml.")] = None,
+    junit: Annotated[Path | None, typer.Option("--junit", metavar="FILE", help="Also write JUnit XML.")] = None,
+    as_json: Json = None,
+) -> int:
+    """Try every duty of an adapter, or of the rig at --endpoint, which vibrates; exit status 1: a check failed."""
+    from bridge.faults import Fault
+    from bridge.files import write_whole
+    from bridge.wire import realtime
+
+    if junit is not None:
+        check_output("--junit", junit, JUNIT)
+    if (rig is None) == (shared.endpoint is None):
+        given = "neither" if rig is None else "both"
+        raise Fault("CONFIG", f"RIG, --endpoint: {given} given: must be one; give a rig file, or the address of a rig")
+    if rig is not None:
+        from bridge.rig.conformance.of_device import conformance
+        from bridge.rig.load import device_of
+        from cockpit.run.device_run import load_device_rig
+
+        made, folder = load_device_rig(rig, shared.settings)
+        realtime.claim(realtime.core(0))
+        result = conformance(device_of(made, folder), made)
+    else:
+        from bridge.rig.conformance.of_client import conformance_of_client
+
+        if not shared.lockstep:
+            realtime.claim(realtime.core(1))
+        result = conformance_of_client(shared.bus(), shared.lockstep)
+    if junit is not None:
+        write_whole(junit, result.junit())
+    print_result(as_json, result, result.in_words())
+    return 0 if result.ok else 1
+
+
 @rig_app.command("box")
 @command()
 def rig_box(
@@ -68,7 +107,7 @@ def rig_box(
     from bridge.wire import realtime
     from cockpit.run.child_process import stop_event
     from cockpit.run.scenario import load_rig
-    from plant.box import Box, BoxConfig
+    from plant.rig.box import Box, BoxConfig
 
     config = validate(BoxConfig, read_toml(box), box.name)
     made = Box(config, load_rig(config.rig, config.settings))

@@ -9,6 +9,7 @@ from pydantic import model_validator
 from bridge.config import made_with, read_toml, validate, with_overrides
 from bridge.faults import Fault
 from bridge.guard.absent import absent
+from bridge.rig.faults.kinds import EXCITER, PROCESS
 from bridge.rig.file import DeviceRig
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.run.run_tables import RunTables, header_of
@@ -31,6 +32,10 @@ class DeviceRun(RunTables):
             raise ValueError(
                 "arm = true: a real rig is armed by an operator alone; leave it out, and use `stickslip arm`"
             )
+        for number, table in enumerate(self.fault):
+            if table.group in (EXCITER, PROCESS):
+                line = f"fault.{number}.target = {table.target}: must be a sensor, clock or bus: this rig is real"
+                raise ValueError(f"{line}; leave it out, or use a simulated rig")
         controller, converter = self.controller, self.rig.converter
         blocks = {"block_s": converter.block_s, "samples_per_block": converter.samples_per_block}
         for name, of_rig in blocks.items():
@@ -107,4 +112,5 @@ def _tables(name: str, settings: Sequence[str]) -> _Tables:
 def device_header(run: DeviceRun, role: str, lockstep: bool) -> wire.Header:
     """The header of a process of this run: role, configuration and versions."""
     rig = run.rig
-    return header_of(run, rig.header(), rig.vibration_limits, rig.name, role, lockstep)
+    faults = {"fault": [table.model_dump(mode="json") for table in run.fault]} if run.fault else {}
+    return header_of(run, rig.header(), rig.vibration_limits, rig.name, role, lockstep, faults)

@@ -28,8 +28,8 @@ from controller.node import operator_events
 from controller.replay import Change
 from controller.telemetry import SNAPSHOT_EVERY, STATE_EVERY, plotted, snapshot
 from controller.trips.trip_events import TripEvents
-from plant.node import no_number
 from plant.records import notes
+from plant.rig.node import no_number
 
 if TYPE_CHECKING:
     from cockpit.judge.run_judge import RunJudge

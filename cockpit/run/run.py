@@ -16,8 +16,8 @@ from bridge.plain import print_line
 from bridge.results import strict_json
 from bridge.wire.session import rig_security
 from cockpit.run.child_process import left_on_ctrl_c, stop_event, warn_without_priority
-from cockpit.run.run_tables import LogTable
-from cockpit.run.scenario import Scenario, load_scenario, refuse_faults, refuse_short_blocks
+from cockpit.run.run_tables import LogTable, refuse_faults
+from cockpit.run.scenario import Scenario, load_scenario, refuse_short_blocks
 from cockpit.run.writable import LOG, check_output, stamp_of
 
 if TYPE_CHECKING:
@@ -89,11 +89,10 @@ def run_scenario(
     check_output("--log", path, LOG)
     before = stamp_of(path)
     endless = scenario.duration_s == 0.0
-    if isinstance(scenario, Scenario):
-        if not (lockstep or in_process):
-            refuse_short_blocks(scenario)
-        if lockstep or not in_process:
-            refuse_faults(scenario, lockstep)
+    if isinstance(scenario, Scenario) and not (lockstep or in_process):
+        refuse_short_blocks(scenario)
+    if lockstep or not in_process:
+        refuse_faults(scenario, lockstep)
     if not (lockstep or in_process):
         warn_without_priority()
     if not in_process:

@@ -9,8 +9,11 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, Field
 
 from bridge.config import Strict
+from bridge.faults import Fault
 from bridge.guard.config import VibrationLimits
 from bridge.log.storage.log_files import Rotation
+from bridge.rig.faults.kinds import PROCESS
+from bridge.rig.faults.table import FaultTable
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.payloads import SCHEMA_VERSION
 from bridge.wire.zenoh_link import BusConfig
@@ -50,6 +53,22 @@ class RunTables(Strict):
     controller: ControllerConfig = ControllerConfig()
     bus: BusConfig = BusConfig()
     log: LogTable = LogTable()
+    fault: list[FaultTable] = Field(default=[], description="Injected faults, a table `[[fault]]` each.")
+
+
+def refuse_faults(run: RunTables, lockstep: bool) -> None:
+    """Raise Fault CONFIG for faults that a run of several processes cannot have.
+
+    In lockstep these are faults of bus and processes; in real time faults of processes, as a scenario cannot end real processes.
+    """
+    for number, table in enumerate(run.fault):
+        if lockstep and table.needs_time:
+            why = "needs a clock, which lockstep lacks; use --in-process, or real time"
+        elif not lockstep and table.group == PROCESS:
+            why = "a scenario cannot end real processes; use --in-process, or `stickslip fault` during the run"
+        else:
+            continue
+        raise Fault("CONFIG", f"{run.name}: fault.{number}.target = {table.target}: {why}")
 
 
 def processor() -> str:

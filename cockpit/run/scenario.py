@@ -3,13 +3,11 @@
 from collections.abc import Sequence
 from typing import Any
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from bridge.config import made_with, read_toml, validate, with_overrides
 from bridge.faults import Fault
 from bridge.guard.absent import absent
-from bridge.rig.faults.kinds import PROCESS
-from bridge.rig.faults.table import FaultTable
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.run.run_tables import RunTables, header_of
 from cockpit.run.scenario_file import RIG_FILE, find, is_real_rig, rig_table, with_rig
@@ -26,7 +24,6 @@ class Scenario(RunTables):
     """Configuration of one run of a simulated rig. Its validation checks that rig, controller and faults fit together."""
 
     rig: RigConfig
-    fault: list[FaultTable] = Field(default=[], description="Injected faults, a table `[[fault]]` each.")
 
     @model_validator(mode="after")
     def _fits_together(self) -> "Scenario":
@@ -67,21 +64,6 @@ def refuse_short_blocks(scenario: Scenario) -> None:
             "each block needs a message to the controller and back; lengthen it, or use --lockstep or --in-process"
         )
         raise Fault("CONFIG", line)
-
-
-def refuse_faults(scenario: Scenario, lockstep: bool) -> None:
-    """Raise Fault CONFIG for faults that a run of several processes cannot have.
-
-    In lockstep these are faults of bus and processes; in real time faults of processes, as a scenario cannot end real processes.
-    """
-    for number, table in enumerate(scenario.fault):
-        if lockstep and table.needs_time:
-            why = "needs a clock, which lockstep lacks; use --in-process, or real time"
-        elif not lockstep and table.group == PROCESS:
-            why = "a scenario cannot end real processes; use --in-process, or `stickslip fault` during the run"
-        else:
-            continue
-        raise Fault("CONFIG", f"{scenario.name}: fault.{number}.target = {table.target}: {why}")
 
 
 def load_rig(name: str, settings: list[str]) -> RigConfig:

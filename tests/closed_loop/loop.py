@@ -13,8 +13,8 @@ from cockpit.run.closed_loop import ClosedLoop
 from controller.config import ControllerConfig
 from controller.node import ControllerNode
 from plant.config import RigConfig
-from plant.node import PlantNode
 from plant.records import TRUTH
+from plant.rig.node import PlantNode
 
 
 class Loop(NamedTuple):

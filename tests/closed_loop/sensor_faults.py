@@ -13,8 +13,8 @@ from bridge.wire.topics import TRACE
 from controller.config import ControllerConfig
 from controller.node import ControllerNode
 from plant.config import RigConfig
-from plant.node import PlantNode
 from plant.piezo import base_velocity_mps
+from plant.rig.node import PlantNode
 
 Fault = Callable[[Any, int, "Memory"], None]  # the block's record [1], blocks since the fault began, its memory
 CHANNELS = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m")

@@ -17,7 +17,7 @@ from controller.announced import MOST_ANNOUNCED
 from controller.node import ControllerNode
 from controller.replay import replay
 from plant.config import MOST_BLOCKS_AHEAD
-from plant.node import PlantNode
+from plant.rig.node import PlantNode
 from plant.simulate import held_velocity
 
 STROKES = [

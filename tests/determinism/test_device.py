@@ -9,10 +9,10 @@ from bridge.rig.node import DeviceNode
 from bridge.wire.messages import APPLIED, sensor_block
 from cockpit.run.scenario import Scenario, load_scenario
 from controller.node import ControllerNode
-from plant.device import PlantDevice
-from plant.exciter_faults import ExciterFaults
-from plant.node import PlantNode
 from plant.records import guard_records
+from plant.rig.device import PlantDevice
+from plant.rig.exciter_faults import ExciterFaults
+from plant.rig.node import PlantNode
 from tests.golden.bless import situations
 
 MORE = {

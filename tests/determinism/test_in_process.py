@@ -13,7 +13,7 @@ from cockpit.run.in_process import TimedAction, run_onboard
 from cockpit.run.scenario import Scenario, header, load_scenario
 from controller.node import ControllerNode
 from controller.replay import Change
-from plant.node import PlantNode
+from plant.rig.node import PlantNode
 
 STOP_NS, RESET_NS, ARM_NS, CHANGE_NS = (
     333_000_000,

@@ -22,7 +22,7 @@ from cockpit.run.replay import changes_of
 from cockpit.run.scenario import Scenario, header, load_scenario
 from controller.node import ControllerNode
 from controller.replay import replay
-from plant.node import PlantNode
+from plant.rig.node import PlantNode
 from tests.logs import empty_log, tables_of, verdict_of, write
 from tests.patience import PATIENCE_S
 from tests.system.ports import free_endpoint

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from bridge.rig.real import open_node
 from cockpit.run.scenario import load_scenario
-from plant.node import PlantNode
+from plant.rig.node import PlantNode
 from tests.determinism.test_device import played
 from tests.unit.bridge.rig.boxes import boxed, rig_file
 

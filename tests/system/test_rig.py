@@ -40,7 +40,9 @@ def test_a_real_rig_runs_in_lockstep_with_the_rig_file_alone(tmp_path: Path) -> 
         channels = table()["channels"] | {"drive_force_N": {"absent": True}, "base_accel_mps2": accelerometer}
         converter = {"sample_rate_Hz": 25_000.0, "samples_per_block": 25}
         rig = written(tmp_path, port, channels=channels, converter=converter)
-        arguments = ["run", "--rig", str(rig), "--lockstep", "--set", "duration_s=0.4", "--log", str(log)]
+        fault = 'fault=[{kind="offset",target="mass_accel_mps2",value=7.0,from_s=0.2}]'
+        timed = ["--set", "duration_s=0.4", "--set", fault]
+        arguments = ["run", "--rig", str(rig), "--lockstep", *timed, "--log", str(log)]
         result = subprocess.run(
             [*SEEN, *arguments, "--endpoint", free_endpoint(), "--json"],
             timeout=PATIENCE_S,
@@ -54,12 +56,17 @@ def test_a_real_rig_runs_in_lockstep_with_the_rig_file_alone(tmp_path: Path) -> 
     assert run.applied["amplitude_m"].max() == 0.0
     assert np.array_equal(run.sensors["drive_force_N"], np.zeros((400, 25), np.float32))
     assert np.isfinite(run.sensors["drive_position_m"]).all()
+    shifted = np.median(run.sensors["mass_accel_mps2"][200:]) - np.median(run.sensors["mass_accel_mps2"][:200])
+    assert shifted == pytest.approx(7.0, abs=0.1)
     controller = json.loads(run.headers["controller"]["configuration"])
     assert controller["samples_per_block"] == 25
     assert controller["estimator"]["use_force"] is False
     assert controller["amplitude"]["accel_bandwidth_Hz"] == 8000.0
     assert controller["amplitude"]["accel_range_mps2"] == 100.0
     events = {event.code: event.text for event in run.events}
+    assert events["INJECTED"].startswith("mass_accel_mps2 offset 7")
+    for command in ("replay", "look"):  # the header in the log sets rate and blocks for every reader
+        assert CliRunner().invoke(app, [command, str(log)]).exit_code == 0
     assert events["UNPROTECTED"].startswith("no watchdog")
 
 
@@ -74,6 +81,14 @@ def test_a_rig_that_cannot_be_opened_ends_the_run_with_its_reason(tmp_path: Path
     ("arguments", "line"),
     [
         (["run", "--in-process"], "names a real rig: this command needs a simulated rig"),
+        (
+            ["plant", "--set", 'fault=[{kind="weak",target="exciter",value=0.5}]'],
+            "fault.0.target = exciter: must be a sensor, clock or bus: this rig is real",
+        ),
+        (
+            ["plant", "--set", 'fault=[{kind="late",target="link",value=0.1}]', "--lockstep"],
+            "needs a clock, which lockstep lacks",
+        ),
         (["plant", "--set", "arm=true"], "arm = true: a real rig is armed by an operator alone"),
         (["controller", "--set", "controller.block_s=0.0005"], "controller.block_s = 0.0005: must equal 0.001"),
         (["rig", "check"], "Connection refused"),

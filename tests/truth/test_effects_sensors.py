@@ -9,8 +9,8 @@ from bridge.wire.channels import CHANNELS
 from bridge.wire.messages import sensor_block
 from plant.core import advance_disturbed
 from plant.effects.sensors import LONGEST_DELAY
-from plant.node import PlantNode
 from plant.records import TRUTH, build
+from plant.rig.node import PlantNode
 from tests.effects_rig import HEAVY_KG, TAU, rig, run
 
 SAMPLE_S = 5e-5

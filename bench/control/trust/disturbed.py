@@ -19,7 +19,7 @@ from cockpit.run.scenario import Scenario
 from controller.config import ControllerConfig
 from controller.node import ControllerNode
 from plant.config import RigConfig
-from plant.node import PlantNode
+from plant.rig.node import PlantNode
 
 _WATCH_S = 10.0  # time from the begin of the disturbance that is judged
 _PATTERNS_S = {"once": [1.0], "each-1-s": [1.0 + i for i in range(8)], "each-3-s": [1.0, 4.0, 7.0]}

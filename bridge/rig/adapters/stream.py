@@ -71,6 +71,8 @@ class Adapter(Device):
         self._shape = setup.samples_per_block, setup.channels
         self._size = _HEAD.size + 4 * setup.samples_per_block * setup.channels
         self._begin_of_frame = _MARK + (self._size - _LENGTH_BYTES).to_bytes(4, "little")
+        self._expected: int | None = None  # number of the next block; None before the first one
+        self._problems: list[tuple[str, str]] = []
         self._socket: socket.socket | None = None
         self._program: subprocess.Popen[bytes] | None = None
         self._in = self._out = -1
@@ -78,8 +80,9 @@ class Adapter(Device):
 
     def _begin(self) -> None:
         self._bytes, self._unsent = bytearray(), b""
-        self._expected: int | None = None
-        self._lost, self._dropped = 0, ""
+        self._before, self._expected = self._expected, None
+        self._lost = 0
+        self._is_short = False  # whether the rest of a short frame follows
         self._written = 0.0, 0.0
         self._line = 0, 0
 
@@ -123,24 +126,30 @@ class Adapter(Device):
             except BlockingIOError:
                 return
             except OSError as error:
-                raise DeviceError(f"the connection is lost: {error.strerror}") from None
+                raise self._ended(f"the connection is lost: {error.strerror}") from None
             if not received:
-                raise DeviceError("the device ended the connection")
+                raise self._ended("the device ended the connection")
             self._bytes += received
             if len(received) < _READ_BYTES:
                 return
 
+    def _ended(self, text: str) -> DeviceError:
+        if self._expected is None and not self._bytes:
+            return DeviceError(f"{text}, before its first block: another client may hold the device", "DEVICE_BUSY")
+        return DeviceError(text)
+
     def _next(self) -> DeviceBlock | None:
         """The first block in the received bytes; other bytes before it are dropped."""
         while (at := self._bytes.find(_MARK)) >= 0 and len(self._bytes) >= at + _HEAD.size:
-            self._drop(at, f"{at} bytes between two frames")
+            self._drop(at, "DEVICE_DATA", f"{at} bytes between two frames")
             _, length, number, frequency_Hz, amplitude = _HEAD.unpack_from(self._bytes)
             if length != self._size - _LENGTH_BYTES:
                 made, due = length + _LENGTH_BYTES, self._size
-                self._drop(len(_MARK), f"a frame of {made} bytes, where {self._shape} samples and channels make {due}")
+                text = f"a frame of {made} bytes, where {self._shape} samples and channels make {due}"
+                self._drop(len(_MARK), "BLOCK_SHORT" if made < due else "DEVICE_DATA", text)
                 continue
             if (within := self._bytes.find(self._begin_of_frame, 1, self._size)) > 0:
-                self._drop(within, f"a frame that ended after {within} of {self._size} bytes")
+                self._drop(within, "BLOCK_SHORT", f"a frame that ended after {within} of {self._size} bytes")
                 continue
             if len(self._bytes) < self._size:
                 return None
@@ -148,23 +157,31 @@ class Adapter(Device):
             rows = samples.reshape(self._shape).T.astype(np.float64)
             del samples  # it would keep the bytes from being deleted
             del self._bytes[: self._size]
+            self._is_short = False
             if self._is_next(number):
                 return self._block(rows, frequency_Hz, amplitude)
         if at < 0 and len(self._bytes) >= len(_MARK):
-            self._drop(len(self._bytes) - len(_MARK) + 1, "bytes without a frame")
+            self._drop(len(self._bytes) - len(_MARK) + 1, "DEVICE_DATA", "bytes without a frame")
         return None
 
-    def _drop(self, count: int, why: str) -> None:
-        if count:
-            del self._bytes[:count]
-            self._dropped = why
+    def _drop(self, count: int, code: str, why: str) -> None:
+        if not count:
+            return
+        del self._bytes[:count]
+        if code != "DEVICE_DATA" or not self._is_short:
+            self._problems.append((code, f"{why}: dropped"))
+        self._is_short = code == "BLOCK_SHORT" or self._is_short
 
     def _is_next(self, number: int) -> bool:
         """Whether a block continues the count, perhaps after a loss, or begins another one."""
-        behind = 0 if self._expected is None else self._expected - number
+        expected, before = self._expected, self._before
+        behind = 0 if expected is None else expected - number
         if behind == 1 or (0 < behind <= _LATE_BLOCKS and number > 0):
-            self._dropped = f"block {number} after block {number + behind - 1}"
+            code = "BLOCK_REPEATED" if behind == 1 else "BLOCK_ORDER"
+            self._problems.append((code, f"block {number} after block {number + behind - 1}: dropped"))
             return False
+        if behind > 0 or (expected is None and before is not None and number < before):
+            self._problems.append(("DEVICE_RESTARTED", f"block {number} after block {(expected or before or 1) - 1}"))
         self._lost += max(-behind, 0)
         self._expected = number + 1
         return True
@@ -172,9 +189,14 @@ class Adapter(Device):
     def _block(self, rows: np.ndarray, frequency_Hz: float, amplitude: float) -> DeviceBlock:
         if not (math.isfinite(frequency_Hz) and math.isfinite(amplitude)):
             frequency_Hz, amplitude = self._written
-        block = DeviceBlock(rows, frequency_Hz, amplitude, self._lost, len(self._bytes) // self._size, self._dropped)
-        self._lost, self._dropped = 0, ""
+        block = DeviceBlock(rows, frequency_Hz, amplitude, self._lost, len(self._bytes) // self._size)
+        self._lost = 0
         return block
+
+    def problems(self) -> list[tuple[str, str]]:
+        """Dropped data, and restarts of the device's count."""
+        problems, self._problems = self._problems, []
+        return problems
 
     def enable(self, on: bool, toggle: int) -> None:
         """Set the enable line, sent with the next vibration."""

@@ -161,6 +161,7 @@ _RESULTS = {
     "record": "cockpit.commands.processes:Recorded",
     "rig serve": "cockpit.commands.processes:Served",
     "rig check": "bridge.rig.check:RigCheck",
+    "rig conformance": "bridge.rig.conformance.report:Conformance",
     "rig box": "cockpit.commands.rig:Boxed",
     "status": "cockpit.live.status:Status",
     "fault": "cockpit.faults.injection:Injected",
@@ -187,7 +188,7 @@ TOML = (
     Format(
         "real-rig", "A rig file of a real rig: `--rig FILE.toml`, `stickslip rig check`.", "bridge.rig.file:DeviceRig"
     ),
-    Format("box", "A simulated device: `stickslip rig box FILE.toml`.", "plant.box:BoxConfig"),
+    Format("box", "A simulated device: `stickslip rig box FILE.toml`.", "plant.rig.box:BoxConfig"),
     Format(
         "faults",
         "A group of the catalogue of `python -m bench faults`, as in deploy/faults.",

@@ -18,7 +18,7 @@ from cockpit.run.scenario import Scenario
 from cockpit.run.simulated.stage import Hub, Player, Receive, Session, Stage, WaitingInbox
 from controller.app import ControllerProcess
 from controller.node import ControllerNode
-from plant.node import PlantNode
+from plant.rig.node import PlantNode
 
 _LINKED_S = 0.05  # time from the resumption of a frozen process to its new link
 _LONGEST_AFTER_S = 2.0  # time after the last block for the fade-out and the end of the processes

@@ -12,7 +12,7 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import APPLIED, COMMAND
 from bridge.wire.topics import Outgoing, Topic
 from cockpit.run.scenario import load_rig
-from plant.node import PlantNode
+from plant.rig.node import PlantNode
 
 
 class Wire:

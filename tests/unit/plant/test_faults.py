@@ -18,8 +18,8 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.channels import CHANNELS
 from bridge.wire.messages import sensor_block
 from plant.config import RigConfig
-from plant.exciter_faults import FIELDS, ExciterFaults
 from plant.records import build
+from plant.rig.exciter_faults import FIELDS, ExciterFaults
 
 SAMPLES, BLOCK_S = 20, 1e-3
 RAMP = np.arange(SAMPLES) + 1.0

@@ -15,7 +15,7 @@ from cockpit.run.scenario import load_rig, load_scenario
 from controller.node import ControllerNode
 from plant.inputs import RigInputs
 from plant.loop_delay import LINE, whole_blocks
-from plant.node import PlantNode
+from plant.rig.node import PlantNode
 
 
 def rig(*settings: str):

@@ -19,8 +19,8 @@ from bridge.wire.inbox import Received
 from bridge.wire.messages import APPLIED
 from bridge.wire.topics import OPERATOR, Outgoing
 from cockpit.run.scenario import load_rig
-from plant.app import run
-from plant.node import PlantNode
+from plant.rig.app import run
+from plant.rig.node import PlantNode
 from tests.unit.plant.test_fade import Commanded, Wire
 
 HERE = "tcp/127.0.0.1:7447"

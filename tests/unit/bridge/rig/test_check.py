@@ -43,7 +43,15 @@ class Sampler(Device):
         self._blocks += 1
         self._change(samples, t_s)
         lost, self.lost = self.lost if self._blocks == 50 else 0, 0 if self._blocks == 50 else self.lost
-        return DeviceBlock(samples, 0.0, 0.0, lost, dropped=self.dropped if self._blocks == 60 else "")
+        return DeviceBlock(
+            samples,
+            0.0,
+            0.0,
+            lost,
+        )
+
+    def problems(self) -> list[tuple[str, str]]:
+        return [("DEVICE_DATA", self.dropped)] if self.dropped and self._blocks == 60 else []
 
     def write(self, _frequency_Hz: float, amplitude: float) -> None:
         self.amplitudes.add(amplitude)
@@ -127,7 +135,7 @@ def test_an_absent_channel_is_not_checked(checked: Callable[..., RigCheck]) -> N
     [
         ({"rate": 1.005}, "it makes 20100 samples a second, the rig file states 20000"),
         ({"lost": 3}, "3 blocks were lost"),
-        ({"dropped": "7 bytes between two frames"}, "unreadable data: 7 bytes between two frames"),
+        ({"dropped": "7 bytes between two frames"}, "bad data: 7 bytes between two frames"),
     ],
 )
 def test_a_bad_device_is_one_problem(checked: Callable[..., RigCheck], facts: dict[str, Any], text: str) -> None:

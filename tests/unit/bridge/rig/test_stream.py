@@ -50,13 +50,14 @@ def peer() -> Generator[Peer]:
 
 
 def numbers(peer: Peer, data: bytes, blocks: int) -> list[tuple[int, int, str]]:
-    """First sample, lost blocks and dropped data of the next blocks."""
+    """First sample, lost blocks and reported problems of the next blocks."""
     peer.socket.sendall(data)
     found: list[tuple[int, int, str]] = []
     for _ in range(blocks):
         block = peer.adapter.read()
         assert block is not None
-        found.append((int(block.samples[0, 0]), block.lost, block.dropped))
+        problems = "; ".join(f"{code} {text}" for code, text in peer.adapter.problems())
+        found.append((int(block.samples[0, 0]), block.lost, problems))
     return found
 
 
@@ -66,7 +67,7 @@ def test_a_frame_is_a_block_in_the_order_of_channels(peer: Peer) -> None:
     assert block is not None
     assert block.samples.shape == (CHANNELS, SAMPLES)
     assert block.samples[1].tolist() == [2.0 * i + 1.0 for i in range(SAMPLES)]
-    assert block[1:] == (2600.0, 3e-8, 0, 0, "")
+    assert block[1:] == (2600.0, 3e-8, 0, 0)
 
 
 @pytest.mark.parametrize(
@@ -74,12 +75,21 @@ def test_a_frame_is_a_block_in_the_order_of_channels(peer: Peer) -> None:
     [
         (frame(0) + frame(1), [(0, 0, ""), (1, 0, "")]),
         (frame(0) + frame(4) + frame(5), [(0, 0, ""), (4, 3, ""), (5, 0, "")]),
-        (frame(0) + frame(0) + frame(1), [(0, 0, ""), (1, 0, "block 0 after block 0")]),
-        (frame(0) + frame(2) + frame(1) + frame(3), [(0, 0, ""), (2, 1, ""), (3, 0, "block 1 after block 2")]),
-        (b"\xff" * 100 + frame(0), [(0, 0, "100 bytes between two frames")]),
-        (b"SSR" + frame(0), [(0, 0, "3 bytes between two frames")]),
-        (frame(0)[:150] + frame(1) + frame(2), [(1, 0, "a frame that ended after 150 of 192 bytes"), (2, 0, "")]),
-        (frame(900) + frame(0) + frame(1), [(900, 0, ""), (0, 0, ""), (1, 0, "")]),  # the device began its count again
+        (frame(0) + frame(0) + frame(1), [(0, 0, ""), (1, 0, "BLOCK_REPEATED block 0 after block 0: dropped")]),
+        (
+            frame(0) + frame(2) + frame(1) + frame(3),
+            [(0, 0, ""), (2, 1, ""), (3, 0, "BLOCK_ORDER block 1 after block 2: dropped")],
+        ),
+        (b"\xff" * 100 + frame(0), [(0, 0, "DEVICE_DATA 100 bytes between two frames: dropped")]),
+        (b"SSR" + frame(0), [(0, 0, "DEVICE_DATA 3 bytes between two frames: dropped")]),
+        (
+            frame(0)[:150] + frame(1) + frame(2),
+            [(1, 0, "BLOCK_SHORT a frame that ended after 150 of 192 bytes: dropped"), (2, 0, "")],
+        ),
+        (
+            frame(900) + frame(0) + frame(1),
+            [(900, 0, ""), (0, 0, "DEVICE_RESTARTED block 0 after block 900"), (1, 0, "")],
+        ),
     ],
 )
 def test_lost_repeated_and_broken_frames_are_counted(
@@ -91,7 +101,7 @@ def test_lost_repeated_and_broken_frames_are_counted(
 def test_a_frame_of_another_length_is_dropped_with_both_lengths(peer: Peer) -> None:
     ((first, lost, dropped),) = numbers(peer, frame(0, samples=10) + frame(1), 1)
     assert (first, lost) == (1, 0)
-    assert "bytes between two frames" in dropped
+    assert dropped == "BLOCK_SHORT a frame of 112 bytes, where (20, 2) samples and channels make 192: dropped"
 
 
 def test_a_device_that_does_not_know_its_vibration_gets_the_written_one(peer: Peer) -> None:
@@ -111,10 +121,19 @@ def test_blocks_that_wait_are_counted(peer: Peer) -> None:
     assert waiting == [4, 3, 2, 1, 0]
 
 
-def test_a_device_that_is_gone_is_an_error(peer: Peer) -> None:
+def test_a_device_that_another_client_holds_is_an_error(peer: Peer) -> None:
     peer.socket.close()
-    with pytest.raises(DeviceError, match="the device ended the connection"):
+    with pytest.raises(DeviceError, match="before its first block: another client may hold the device") as error:
         peer.adapter.read()
+    assert error.value.code == "DEVICE_BUSY"
+
+
+def test_a_device_that_leaves_is_another_error(peer: Peer) -> None:
+    numbers(peer, frame(0), 1)
+    peer.socket.close()
+    with pytest.raises(DeviceError, match="the device ended the connection") as error:
+        peer.adapter.read()
+    assert error.value.code == "DEVICE_GONE"
 
 
 def test_a_device_that_reads_no_commands_is_an_error(peer: Peer) -> None:

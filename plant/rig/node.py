@@ -18,10 +18,10 @@ from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
 from bridge.wire.messages import sensor_block
 from bridge.wire.topics import ANNOUNCE, Outgoing
 from plant.config import RigConfig
-from plant.exciter_faults import ExciterFaults
 from plant.inputs import RigInputs
 from plant.piezo import base_velocity_mps
 from plant.records import TRUTH, build, guard_records
+from plant.rig.exciter_faults import ExciterFaults
 from plant.step import act, report
 
 _VELOCITY = TRUTH.index("true_velocity_mps")

@@ -17,8 +17,8 @@ from pydantic import Field
 
 from bridge.config import Strict
 from plant.config import RigConfig
-from plant.device import PlantDevice
 from plant.records import TRUTH
+from plant.rig.device import PlantDevice
 
 _POSITION, _VELOCITY = TRUTH.index("true_drive_position_m"), TRUTH.index("true_velocity_mps")
 _FRAME_HEAD = struct.Struct("<4sIQdd")

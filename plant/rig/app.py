@@ -10,8 +10,8 @@ from bridge.rig.process import Served, serve
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.zenoh_link import BusConfig
 from plant.config import RigConfig
-from plant.node import PlantNode
 from plant.records import notes
+from plant.rig.node import PlantNode
 
 
 def run(

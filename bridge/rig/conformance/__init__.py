@@ -1,0 +1,9 @@
+"""25 named checks of an adapter, each with its value, its limit and a remedy; each of them can fail.
+
+heard    the blocks of a session, and the tone in them
+session  one session with an open device: rest, tones, steps, and each way to end a vibration
+data     the checks of blocks and channels
+exciter  the checks of the vibration
+of_device  the 25 checks of a device
+report   the results, as lines and as JUnit
+"""
