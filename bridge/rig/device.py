@@ -60,6 +60,11 @@ class Device(ABC):
         """Time after which a `read` without a block returns."""
         return LONGEST_READ_S if self.pace == "caller" else LONGEST_READ_BLOCKS * self.block_s
 
+    @property
+    def answer_s(self) -> float:
+        """Time from an order to its acknowledgement, of the newest acknowledged one; 0 if `write` waits for it."""
+        return 0.0
+
     @abstractmethod
     def open(self) -> None:
         """Connect, with the exciter at rest. Raises DeviceError."""

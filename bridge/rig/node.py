@@ -31,6 +31,7 @@ from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, SENSORS, Outgoing
 # more than 4 % (the margin of the controller's LATE) without a report.
 _BEHIND_S = 0.015
 _OPEN_AGAIN_S = 1.0  # interval of the attempts to open a lost device
+LATE_NS = 1_000_000  # round trip beyond which a command counts as late
 
 
 class GuardedNode(ABC):
@@ -199,6 +200,9 @@ class DeviceNode(GuardedNode):
         self._block = DeviceBlock(np.zeros((1, 1)), 0.0, 0.0)
         self._is_begun = False  # whether the vibration of the block under way is set
         self._accepted = 0  # number of commands accepted for it
+        self._took_s = self._answer_s = (
+            0.0  # of the newest of them: block complete to acknowledged; the exciter's part of it
+        )
         self._heard_s = time.monotonic()  # of the newest block
         self._timeout_s = int(guard[0][0].timeout_blocks) * device.block_s
         self._silent_since_s: float | None = None  # None while blocks arrive
@@ -248,7 +252,14 @@ class DeviceNode(GuardedNode):
         announce = self._device.announcements()
         self.announcements = [Outgoing(ANNOUNCE, announce[row : row + 1].tobytes()) for row in range(len(announce))]
         self._accepted = begin(self._guard_params, self._guard_state, self._memory, commands, announce)
+        ordered_s = time.monotonic()
         self._write()
+        self._answer_s = time.monotonic() - ordered_s + self._device.answer_s
+        if self._accepted:
+            since = (
+                self.block - int(self._memory["command_block"][0]) + self._block.waiting - 1
+            )  # blocks completed since
+            self._took_s = ordered_s - self._heard_s + since * self._device.block_s + self._answer_s
         self._is_begun = True
 
     def _write(self) -> None:
@@ -340,6 +351,12 @@ class DeviceNode(GuardedNode):
         block = self._block
         if self.paced_by_rig:
             late_ns = block.waiting * self.block_ns
+            round_trip_ns = round(self._took_s * 1e9) if accepted else 0
+            commands_late = accepted if round_trip_ns > LATE_NS else 0
+            self._applied["answer_ns"], self._applied["sample_rate_Hz"] = (
+                round(self._answer_s * 1e9),
+                self._clock.rate_Hz,
+            )
         end(
             self._guard_params, self._guard_state, self._memory, block.frequency_Hz, block.amplitude * self._stroke_m,
             accepted, commands_late, round_trip_ns, late_ns, self._sensors, self._applied,

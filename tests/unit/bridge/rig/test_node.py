@@ -275,3 +275,29 @@ def test_the_rate_of_a_device_is_measured_once(device: Bench, late_s: float, cod
     measured = [problem for problem in node.problems() if problem[0] != "SAMPLES_LOST"]
     assert [problem[0] for problem in measured] == [code]
     assert text in measured[0][1]
+    node.advance([])  # ends a step later
+    since_s = late_s + 1.0 + STEP_S
+    assert float(node.applied.sample_rate_Hz) == pytest.approx(20.0 * 11_001 / since_s)
+
+
+def test_latency_counts_from_the_end_of_the_block_to_the_answer_of_the_exciter(device: Bench) -> None:
+    rig = Rig(device)
+    rig.run(3)
+    assert int(rig.node.applied.round_trip_ns) == int(rig.node.applied.answer_ns) == 0  # a bench without a delay
+    read, write = device.read, device.write
+
+    def slow(frequency_Hz: float, amplitude: float) -> None:
+        device.now_s += 3e-4
+        write(frequency_Hz, amplitude)
+
+    device.write = slow
+    rig.run(1)
+    assert int(rig.node.applied.round_trip_ns) == pytest.approx(3e5, abs=1.0)
+    assert int(rig.node.applied.answer_ns) == pytest.approx(3e5, abs=1.0)
+    assert int(rig.node.applied.commands_late) == 0
+    device.read = lambda: (block := read()) and block._replace(waiting=2)
+    rig.run(2)  # a command for a block that two others follow acts 2 ms later
+    assert int(rig.node.applied.round_trip_ns) == pytest.approx(2.3e6, abs=1.0)
+    assert int(rig.node.applied.answer_ns) == pytest.approx(3e5, abs=1.0)
+    assert int(rig.node.applied.commands_late) == 1
+    assert int(rig.node.applied.late_ns) == 2_000_000
