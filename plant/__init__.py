@@ -30,6 +30,7 @@ inputs        velocity of the drive, its announcements, noise and delays, block 
 node, app     the rig behind its guard, in one compiled step; its process
 device        the physics alone as a device, for the guard of every rig
 box           this device in another process, behind a TCP port
+generator     its exciter as a function generator with command lines
 exciter_faults  injected faults of the exciter
 effects/      effects of a real rig that the nominal rig lacks
 four_rigs, four_rigs_step  the same for four or eight rigs side by side, in vector registers; one step of them

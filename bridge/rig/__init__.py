@@ -1,6 +1,6 @@
 """A rig of any kind behind its guard, as a process on the bus. Nothing here knows the plant or an adapter.
 
-device   the contract of a device: converter and exciter
+device   the contract of a device: converter and exciter, together or each alone
 node     a rig behind its guard, block by block: `GuardedNode`; around a device: `DeviceNode`
 step     a block between its messages, compiled; the plant's loop calls the same parts
 rate     the measured rate of a device

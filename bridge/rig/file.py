@@ -74,6 +74,11 @@ class DeviceExciterConfig(ExciterConfig):
     stroke_m_per_V: Positive | None = Field(
         default=None, description="Stroke for one volt of amplitude. Not given: the device takes metres."
     )
+    adapter: str = Field(
+        default="",
+        description="Adapter of a separate exciter, as for the device. Not given: the device has the exciter.",
+    )
+    device: dict[str, Any] = Field(default={}, description="Settings of this adapter.")
     enable_line: bool = Field(default=False, description="Whether the device switches the amplifier's enable line.")
     watchdog_s: Annotated[float, Field(ge=0)] = Field(
         default=0.0, description="Silence after which the device itself ends the vibration; 0: it has no watchdog."
@@ -117,5 +122,5 @@ class DeviceRig(Strict):
     def header(self) -> dict[str, Any]:
         """The rig in the header of its process: rate, blocks, calibration, exciter and guard, and a checksum of all of it."""
         blocks = {"block_s": self.converter.block_s, "samples_per_block": self.converter.samples_per_block}
-        table = self.model_dump(mode="json", exclude={"device"}) | {"solver": blocks}
+        table = self.model_dump(mode="json", exclude={"device": True, "exciter": {"device"}}) | {"solver": blocks}
         return table | {"checksum": hashlib.sha256(json.dumps(table, sort_keys=True).encode()).hexdigest()}

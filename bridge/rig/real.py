@@ -23,7 +23,7 @@ def served(rig: DeviceRig, folder: Path) -> Served:
     def make(run: int, _may_arm: bool) -> DeviceNode:
         return open_node(rig, folder, run)
 
-    return Served(rig.name, rig.guard, notes(rig), make)
+    return Served(rig.name, rig.guard, notes(rig, device_of(rig, folder).watchdog_s), make)
 
 
 def open_node(rig: DeviceRig, folder: Path, run: int) -> DeviceNode:
@@ -38,12 +38,15 @@ def open_node(rig: DeviceRig, folder: Path, run: int) -> DeviceNode:
     return DeviceNode(device, guard, faults, calibration(rig), rig.exciter.stroke_m_per_V or 1.0)
 
 
-def notes(rig: DeviceRig) -> list[tuple[str, str]]:
-    """Codes and texts of events at the start of a run: wide limits, and protection that this rig lacks."""
+def notes(rig: DeviceRig, watchdog_s: float = 0.0) -> list[tuple[str, str]]:
+    """Codes and texts of events at the start of a run: wide limits, and protection that this rig lacks.
+
+    `watchdog_s` is the device's own watchdog, where its adapter knows it.
+    """
     events = protection(rig.guard, _exciter(rig), rig.guard.fastest_drive_mps or 0.0, absent(rig.channels))
     if not rig.exciter.enable_line:
         events.append(("UNPROTECTED", "no enable line: the loop check finds no exciter that cannot be switched off"))
-    if rig.exciter.watchdog_s == 0.0:
+    if not (rig.exciter.watchdog_s or watchdog_s):
         events.append(("UNPROTECTED", "no watchdog: a killed process leaves the exciter vibrating"))
     return events
 

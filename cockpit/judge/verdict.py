@@ -73,7 +73,7 @@ class RunVerdict(NamedTuple):
     highest_set_point: float  # highest set point of v_a / v_d: the controller raises it at the start and after slips
     sensors: SensorVerdict | None  # whether they can support a verdict; None for an imported log
     latency: Latency | None
-    sample_rate: SampleRate | None  # None for a rig without a clock of its own, or a run of less than 10 s
+    sample_rate: SampleRate | None  # None before 10 s, and for a rig that the computer paces
     late_commands: int  # commands later than 1 ms after their block
     pauses: Pauses | None  # simultaneous stalls of all cores; None in lockstep, or if not watched
     computer: Computer | None  # all stalls; None in lockstep

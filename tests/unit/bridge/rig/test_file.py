@@ -74,7 +74,7 @@ def test_an_adapter_is_a_file_next_to_the_rig_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "name", "line"),
     [
-        ("", "scope", "adapter = 'scope': no such adapter; known: stream; or give a file"),
+        ("", "scope", "adapter = 'scope': no such adapter; known: scpi, stream; or give a file"),
         ("import no_such_driver", "./mine.py", "needs the package no_such_driver; install it"),
         ("class Adapter: ...", "./mine.py", "must have a class Adapter that derives from"),
         ("class Adapter(", "./mine.py", "cannot be read: '\\(' was never closed"),
@@ -85,6 +85,20 @@ def test_an_adapter_that_cannot_be_used_is_one_line(text: str, name: str, line: 
     (tmp_path / "mine.py").write_text(text)
     with pytest.raises(Fault, match=line):
         device_of(rig_file(adapter=name), tmp_path)
+
+
+def test_a_separate_exciter_has_an_adapter_and_settings_of_its_own(tmp_path: Path) -> None:
+    settings = {"address": "127.0.0.1:1", "dialect": "siglent-sdg", "burst_s": 0.05}
+    exciter = {"adapter": "scpi", "device": settings, "stroke_m_per_V": 1e-8}
+    rig = rig_file(device={"address": "127.0.0.1:1"}, exciter=exciter)
+    assert device_of(rig, tmp_path).watchdog_s == 0.05
+    assert "device" not in rig.header()["exciter"]
+    with pytest.raises(
+        Fault, match=r"exciter\.adapter = 'stream': must have a class Adapter that derives from .*Exciter"
+    ):
+        device_of(rig_file(device={"address": "127.0.0.1:1"}, exciter=exciter | {"adapter": "stream"}), tmp_path)
+    with pytest.raises(Fault, match=r"box: 127\.0\.0\.1:1: Connection refused"):
+        open_node(rig, tmp_path, 1)
 
 
 def test_a_device_that_cannot_be_opened_is_an_error_and_never_a_simulation(tmp_path: Path) -> None:
