@@ -86,12 +86,17 @@ class ScpiSettings(Strict):
             )
         return DIALECTS.get(name, {}) | table
 
+    @property
+    def is_visa(self) -> bool:
+        """Whether `address` is a VISA resource; [::1]:5025 is a socket."""
+        return "::" in self.address and not self.address.startswith("[")
+
     @model_validator(mode="after")
     def _is_whole(self) -> "ScpiSettings":
         lines = [("begin", line) for line in self.begin] + [("set", self.set), ("rest", self.rest)]
         for name, line in [*lines, *([("burst", self.burst)] if self.burst else [])]:
             _is_line(name, line)
-        if "::" in self.address:
+        if self.is_visa:
             if importlib.util.find_spec("pyvisa_py") is None:
                 line = f"address = {self.address!r}: needs the package pyvisa-py"
                 raise ValueError(f"{line}; pip install 'stickslip[visa]', or give HOST:PORT")
@@ -228,7 +233,7 @@ class Adapter(Exciter):
         self._begin()
         s = self._settings
         try:
-            self._link = (VisaLink if "::" in s.address else SocketLink)(s.address, s.answer_within_s)
+            self._link = (VisaLink if s.is_visa else SocketLink)(s.address, s.answer_within_s)
             for line in [*s.begin, s.rest]:
                 self._send(line, *self._wanted)
                 self._finish(s.answer_within_s)

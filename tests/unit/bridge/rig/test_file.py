@@ -8,6 +8,7 @@ import pytest
 
 from bridge.config import read_toml, validate
 from bridge.faults import Fault
+from bridge.rig.adapters.scpi import DIALECTS
 from bridge.rig.file import DeviceRig
 from bridge.rig.load import device_of
 from bridge.rig.real import notes, open_node
@@ -135,6 +136,15 @@ def test_a_rig_file_is_plain_toml(tmp_path: Path) -> None:
 
 def test_the_rig_file_of_the_guide_is_valid() -> None:
     guide = (Path(__file__).parents[4] / "docs/guides/connect-a-rig.md").read_text(encoding="utf-8")
-    rig = validate(DeviceRig, tomllib.loads(guide.partition("```toml\n")[2].partition("```")[0]), "guide")
+    first, generator, lines = (tomllib.loads(part.partition("```")[0]) for part in guide.split("```toml\n")[1:])
+    rig = validate(DeviceRig, first, "guide")
     assert rig.channels["drive_position_m"].sign == -1
     assert device_of(rig, Path()).setup.channels == 4
+    of_generator = generator["exciter"]
+    rig = validate(DeviceRig, first | {"exciter": of_generator}, "guide")
+    assert device_of(rig, Path()).watchdog_s == 0.1
+    assert {key: DIALECTS["agilent-33500"][key] for key in ("set", "burst", "rest", "least_V")}.items() <= lines.items()
+    rig = validate(
+        DeviceRig, first | {"exciter": of_generator | {"device": lines | {"address": "127.0.0.1:5025"}}}, "guide"
+    )
+    assert device_of(rig, Path()).watchdog_s == 0.1

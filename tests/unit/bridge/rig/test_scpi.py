@@ -167,6 +167,7 @@ def test_one_that_cannot_be_reached_is_one_line() -> None:
     ("settings", "line"),
     [
         ({"dialect": "other"}, "dialect = 'other': unknown; known: agilent-33500, siglent-sdg"),
+        ({"address": "[::1]"}, r"address = '\[::1\]': must be HOST:PORT"),
         ({"address": "here"}, "address = 'here': must be HOST:PORT, or a VISA resource"),
         ({"set": ":FREQ {frequency_Hz}"}, "must end with a query, whose answer acknowledges it"),
         ({"burst": "*TRG {count};*OPC?"}, r"cannot be filled in \('count'\); use \{frequency_Hz\}"),
