@@ -5,6 +5,7 @@ node     a rig behind its guard, block by block: `GuardedNode`; around a device:
 step     a block between its messages, compiled; the plant's loop calls the same parts
 rate     the measured rate of a device
 file     the rig file of a real rig
+derived  channels that its formulas derive from measured ones
 load     the device that it describes, by its adapter
 real     this device, opened, behind its guard
 check    the channels of a device with its exciter at rest

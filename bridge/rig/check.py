@@ -8,6 +8,7 @@ import numpy as np
 
 from bridge.arrays import Floats
 from bridge.results import in_json
+from bridge.rig.derived import Derived
 from bridge.rig.device import Device, DeviceError
 from bridge.rig.file import DeviceRig
 from bridge.wire.channels import CHANNELS, SENSOR_CHANNELS
@@ -95,7 +96,7 @@ def check(device: Device, rig: DeviceRig, seconds: float) -> RigCheck:
     """Check an open device for a time, with its exciter at rest."""
     heard = _listen(device, seconds)
     blocks = len(heard.samples)
-    raw = np.concatenate(heard.samples, axis=1) if blocks else np.empty((rig.sources, 0))
+    raw = Derived(rig)(np.concatenate(heard.samples, axis=1) if blocks else np.empty((rig.sources, 0)))
     rate_Hz, gap_s = _rate(device, heard)
     channels = [_channel(rig, name, raw) for name in CHANNELS]
     problems = _of_device(device, heard, rate_Hz, gap_s)
@@ -167,9 +168,9 @@ def _of_device(device: Device, heard: _Heard, rate_Hz: float, gap_s: float) -> l
 
 def _channel(rig: DeviceRig, name: str, raw: Floats) -> ChannelCheck:
     channel, nan = rig.channels[name], math.nan
-    if channel.source is None:
+    if channel.absent:
         return ChannelCheck(name, True, nan, nan, nan, nan, nan, 0.0)
-    values = channel.sign * channel.scale * raw[channel.source] + channel.offset
+    values = channel.sign * channel.scale * raw[rig.rows[name]] + channel.offset
     finite = values[np.isfinite(values)]
     missing = 1.0 - finite.size / max(values.size, 1)
     if finite.size < 2:
@@ -206,7 +207,7 @@ def _of_channel(rig: DeviceRig, row: ChannelCheck, raw: Floats) -> list[Problem]
     for end, limit in ((row.lowest, channel.lowest), (row.highest, channel.highest)):
         if limit is not None and (end <= limit if limit == channel.lowest else end >= limit):
             add(f"it reaches the end of its range, {limit:g}", "use a larger range, or correct scale and offset")
-    values = raw[channel.source or 0]
+    values = raw[rig.rows[row.name]]
     if np.unique(values[np.isfinite(values)]).size > _FEW_STEPS:
         share = max(float(np.mean(values == np.nanmin(values))), float(np.mean(values == np.nanmax(values))))
         if share > _AT_END:

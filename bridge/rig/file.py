@@ -7,9 +7,10 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from bridge.config import Strict
+from bridge.formula import Formula
 from bridge.guard.absent import ChannelName, PresentOrAbsent, absent, refusal
 from bridge.guard.config import ExciterConfig, GuardConfig, Positive, VibrationLimits
-from bridge.wire.channels import CHANNELS
+from bridge.wire.channels import CHANNELS, SENSOR_CHANNELS
 
 _NOT_ZERO = "scale = 0: must not be 0; give the SI units for one unit of the device"
 
@@ -21,10 +22,14 @@ def _scale(value: float) -> float:
 
 
 class ChannelConfig(PresentOrAbsent):
-    """The table `[channels.NAME]` of a real rig: the value in SI units is sign x scale x raw + offset."""
+    """The table `[channels.NAME]` of a real rig: the value in SI units is sign x scale x raw + offset, or a formula."""
 
     source: Annotated[int, Field(ge=0, le=255)] | None = Field(
         default=None, description="Number of the device's channel, from 0."
+    )
+    derive: str | None = Field(
+        default=None,
+        description="Formula of + - * / ( ), numbers, measured channels in SI units and names of [numbers], in place of source.",
     )
     scale: Annotated[float, AfterValidator(_scale)] = Field(
         default=1.0, description="SI units for one unit of the device."
@@ -41,11 +46,19 @@ class ChannelConfig(PresentOrAbsent):
 
     @model_validator(mode="after")
     def _has_a_source(self) -> "ChannelConfig":
-        if self.absent == (self.source is not None):
-            given = "both" if self.absent else "neither"
+        given = [name for name in ("source", "derive") if getattr(self, name) is not None] + ["absent"] * self.absent
+        if len(given) != 1:
+            words = " and ".join(given) or "none"
             raise ValueError(
-                f"source, absent: {given} given: must be one of them; give source = NUMBER or absent = true"
+                f"source, derive, absent: {words} given: must be one of them; give source = NUMBER or absent = true"
             )
+        if self.derive is not None:
+            if scaled := [name for name in ("scale", "offset", "sign", "unit") if name in self.model_fields_set]:
+                raise ValueError(f"{scaled[0]}: a derived channel is in SI units; put the factor into the formula")
+            try:
+                Formula(self.derive)
+            except ValueError as error:
+                raise ValueError(f"derive: {error}") from None
         return self
 
 
@@ -93,6 +106,7 @@ class DeviceRig(Strict):
     device: dict[str, Any] = Field({}, description="Settings of the adapter.")
     converter: ConverterConfig = ConverterConfig()
     channels: dict[ChannelName, ChannelConfig]
+    numbers: dict[str, float] = Field({}, description="Numbers by name, for the formulas of derived channels.")
     exciter: DeviceExciterConfig = DeviceExciterConfig()
     guard: GuardConfig
 
@@ -102,7 +116,31 @@ class DeviceRig(Strict):
             raise ValueError(f"channels.{missing[0]}: missing; give its source, or absent = true")
         if reason := refusal(absent(self.channels)):
             raise ValueError(reason)
+        if wrong := [name for name in self.numbers if name in CHANNELS or not Formula.is_name(name)]:
+            raise ValueError(f"numbers.{wrong[0]}: must be a name of letters, digits and _, and no channel; rename it")
+        for name, text in self.derived.items():
+            place = f"channels.{name}.derive = {text!r}"
+            if needed := SENSOR_CHANNELS[name].needed:
+                raise ValueError(f"{place}: this channel must be measured: {needed}; give its source")
+            known = [*self.measured, *self.numbers]
+            if unknown := sorted(Formula(text).names - set(known)):
+                raise ValueError(f"{place}: {unknown[0]}: no measured channel and no number; known: {', '.join(known)}")
         return self
+
+    @property
+    def measured(self) -> dict[str, int]:
+        """Row of each measured channel in the samples of the device."""
+        return {name: channel.source for name, channel in self.channels.items() if channel.source is not None}
+
+    @property
+    def derived(self) -> dict[str, str]:
+        """Formula of each derived channel."""
+        return {name: channel.derive for name, channel in self.channels.items() if channel.derive is not None}
+
+    @property
+    def rows(self) -> dict[str, int]:
+        """Row of each channel that the rig has, where the derived channels follow those of the device."""
+        return self.measured | {name: self.sources + row for row, name in enumerate(self.derived)}
 
     @property
     def vibration_limits(self) -> VibrationLimits:
@@ -117,7 +155,7 @@ class DeviceRig(Strict):
     @property
     def sources(self) -> int:
         """Number of channels that the device must have."""
-        return 1 + max(channel.source for channel in self.channels.values() if channel.source is not None)
+        return 1 + max(self.measured.values())
 
     def header(self) -> dict[str, Any]:
         """The rig in the header of its process: rate, blocks, calibration, exciter and guard, and a checksum of all of it."""

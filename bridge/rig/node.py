@@ -4,13 +4,13 @@ import contextlib
 import math
 import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bridge.arrays import Records
+from bridge.arrays import Floats, Records
 from bridge.guard.check import gain_report
 from bridge.guard.core import NO_COMMAND
 from bridge.guard.states import LEAVE, apply_order
@@ -181,6 +181,7 @@ class DeviceNode(GuardedNode):
         faults: injected faults.
         memory: calibration of its channels, a record of `bridge.rig.step.DEVICE`; None: SI units in the order of CHANNELS.
         stroke_m: stroke of the exciter for one unit of its amplitude.
+        derive: adds rows of derived channels to the samples of a block; None: none.
 
     """
 
@@ -193,9 +194,10 @@ class DeviceNode(GuardedNode):
         faults: Faults,
         memory: Records | None = None,
         stroke_m: float = 1.0,
+        derive: Callable[[Floats], Floats] | None = None,
     ) -> None:
         super().__init__(guard, round(device.block_s * 1e9), device.setup.samples_per_block, faults)
-        self._device, self._stroke_m = device, stroke_m
+        self._device, self._stroke_m, self._derive = device, stroke_m, derive
         self._memory = device_memory() if memory is None else memory
         self._block = DeviceBlock(np.zeros((1, 1)), 0.0, 0.0)
         self._is_begun = False  # whether the vibration of the block under way is set
@@ -244,7 +246,8 @@ class DeviceNode(GuardedNode):
             return None
         self._block, self._is_begun = block, False
         self._note_block(block)
-        fill(self._guard_state, self._memory, self.block_ns, block.lost, block.samples, self._sensors)
+        samples = self._derive(block.samples) if self._derive is not None else block.samples
+        fill(self._guard_state, self._memory, self.block_ns, block.lost, samples, self._sensors)
         return self._accepted
 
     def _begin(self, commands: Records) -> None:
@@ -281,7 +284,7 @@ class DeviceNode(GuardedNode):
         if block is None:
             return None
         samples = np.ascontiguousarray(block.samples, np.float64)
-        needed, numbers = int(self._memory["source"].max()) + 1, (block.frequency_Hz, block.amplitude)
+        needed, numbers = self._device.setup.channels, (block.frequency_Hz, block.amplitude)
         if samples.ndim != 2 or len(samples) < needed or samples.shape[1] != self._samples:
             due = f"must be {needed} channels or more x {self._samples}"
             self._problems.append(("DEVICE_DATA", f"samples of shape {samples.shape}: {due}: dropped", 1))

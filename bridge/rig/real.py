@@ -7,6 +7,7 @@ from bridge.faults import Fault
 from bridge.guard.absent import absent
 from bridge.guard.records import ExciterLimits, build
 from bridge.guard.wide import protection
+from bridge.rig.derived import Derived
 from bridge.rig.device import DeviceError
 from bridge.rig.faults.schedule import Faults
 from bridge.rig.file import DeviceRig
@@ -14,7 +15,7 @@ from bridge.rig.load import device_of
 from bridge.rig.node import DeviceNode
 from bridge.rig.process import Served
 from bridge.rig.step import device_memory
-from bridge.wire.channels import CHANNELS
+from bridge.wire.channels import CHANNELS, SENSOR_CHANNELS
 
 
 def served(rig: DeviceRig, folder: Path) -> Served:
@@ -29,13 +30,13 @@ def served(rig: DeviceRig, folder: Path) -> Served:
 def open_node(rig: DeviceRig, folder: Path, run: int) -> DeviceNode:
     """The node of a rig whose device is open. Raises Fault CONFIG, NO_DEVICE; a rig that cannot be opened is never simulated."""
     device = device_of(rig, folder)
-    guard = build(rig.guard, _exciter(rig), run, absent=absent(rig.channels))
+    guard = build(rig.guard, _exciter(rig), run, absent=absent(rig.channels), derived=rig.derived)
     faults = Faults((), 0, rig.converter.block_s, rig.converter.samples_per_block)
     try:
         device.open()
     except DeviceError as error:
         raise Fault("NO_DEVICE", f"{rig.name}: {error}") from None
-    return DeviceNode(device, guard, faults, calibration(rig), rig.exciter.stroke_m_per_V or 1.0)
+    return DeviceNode(device, guard, faults, calibration(rig), rig.exciter.stroke_m_per_V or 1.0, Derived(rig))
 
 
 def notes(rig: DeviceRig, watchdog_s: float = 0.0) -> list[tuple[str, str]]:
@@ -44,6 +45,10 @@ def notes(rig: DeviceRig, watchdog_s: float = 0.0) -> list[tuple[str, str]]:
     `watchdog_s` is the device's own watchdog, where its adapter knows it.
     """
     events = protection(rig.guard, _exciter(rig), rig.guard.fastest_drive_mps or 0.0, absent(rig.channels))
+    events += [
+        ("UNPROTECTED", f"{name} is derived, so that it contradicts no other channel: {SENSOR_CHANNELS[name].guards}")
+        for name in rig.derived
+    ]
     if not rig.exciter.enable_line:
         events.append(("UNPROTECTED", "no enable line: the loop check finds no exciter that cannot be switched off"))
     if not (rig.exciter.watchdog_s or watchdog_s):
@@ -56,7 +61,7 @@ def calibration(rig: DeviceRig) -> Records:
     memory = device_memory()
     for row, name in enumerate(CHANNELS):
         channel = rig.channels[name]
-        memory["source"][0, row] = -1 if channel.source is None else channel.source
+        memory["source"][0, row] = rig.rows.get(name, -1)
         memory["scale"][0, row], memory["offset"][0, row] = channel.sign * channel.scale, channel.offset
     return memory
 

@@ -104,6 +104,14 @@ def test_an_exciter_that_does_not_rest_by_itself_is_a_warning(
     assert result.ok is not bool(problems)
 
 
+def test_a_derived_channel_is_checked_like_a_measured_one(checked: Callable[..., RigCheck]) -> None:
+    channels = table()["channels"] | {"drive_force_N": {"derive": "2 * base_accel_mps2 + 5"}}
+    result = checked(rig=rig_file(channels=channels))
+    assert result.problems == []
+    assert result.channels[0].mean == pytest.approx(5.0, abs=0.01)
+    assert result.channels[0].noise == pytest.approx(2.0 * result.channels[2].noise)
+
+
 def test_a_sound_rig_has_no_problem(checked: Callable[..., RigCheck]) -> None:
     result = checked()
     assert result.problems == []

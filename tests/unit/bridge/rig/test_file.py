@@ -37,8 +37,27 @@ def channels(**changed: Any) -> dict[str, Any]:
             {"channels": channels(mass_accel_mps2=None)},
             "channels.mass_accel_mps2: missing; give its source, or absent = true",
         ),
-        ({"channels": channels(mass_accel_mps2={})}, "channels.mass_accel_mps2: source, absent: neither given"),
-        ({"channels": channels(mass_accel_mps2={"source": 1, "absent": True})}, "source, absent: both given"),
+        ({"channels": channels(mass_accel_mps2={})}, "channels.mass_accel_mps2: source, derive, absent: none given"),
+        ({"channels": channels(mass_accel_mps2={"source": 1, "absent": True})}, "source and absent given: must be one"),
+        ({"channels": channels(drive_force_N={"source": 1, "derive": "1"})}, "source and derive given: must be one of"),
+        (
+            {"channels": channels(drive_force_N={"derive": "1", "scale": 2.0})},
+            "scale: a derived channel is in SI units",
+        ),
+        (
+            {"channels": channels(drive_force_N={"derive": "k * (a"})},
+            r"drive_force_N: derive: character 7 of 'k \* \(a': must be an operator or \), not its end",
+        ),
+        (
+            {"channels": channels(drive_force_N={"derive": "k_d * mass_position_m"})},
+            r"channels\.drive_force_N\.derive = 'k_d \* mass_position_m': k_d: no measured channel and no number; known: mass",
+        ),
+        (
+            {"channels": channels(drive_position_m={"derive": "mass_position_m"})},
+            "this channel must be measured: no other channel shows v_d",
+        ),
+        ({"numbers": {"mass_position_m": 1.0}}, r"numbers\.mass_position_m: must be a name of"),
+        ({"numbers": {"k d": 1.0}}, r"numbers\.k d: must be a name of"),
         ({"channels": channels(force={"source": 0})}, "force: no such channel; known: drive_force_N"),
         (
             {"channels": channels(drive_position_m={"absent": True})},
@@ -118,6 +137,14 @@ def test_lost_protection_is_noted_for_lines_and_watchdogs() -> None:
     assert [code for code, _ in notes(whole) if code == "UNPROTECTED"] == []
 
 
+def test_the_lost_protection_of_a_derived_channel_is_noted() -> None:
+    derived = channels(drive_force_N={"derive": "3 * mass_position_m"})
+    assert any(
+        code == "UNPROTECTED" and text.startswith("drive_force_N is derived, so that it contradicts no other channel")
+        for code, text in notes(rig_file(channels=derived))
+    )
+
+
 def test_the_header_holds_blocks_calibration_and_limits() -> None:
     header = rig_file(device={"address": "127.0.0.1:1"}).header()
     assert header["solver"] == {"block_s": 1e-3, "samples_per_block": 20}
@@ -136,10 +163,14 @@ def test_a_rig_file_is_plain_toml(tmp_path: Path) -> None:
 
 def test_the_rig_file_of_the_guide_is_valid() -> None:
     guide = (Path(__file__).parents[4] / "docs/guides/connect-a-rig.md").read_text(encoding="utf-8")
-    first, generator, lines = (tomllib.loads(part.partition("```")[0]) for part in guide.split("```toml\n")[1:])
+    first, derived, generator, lines = (
+        tomllib.loads(part.partition("```")[0]) for part in guide.split("```toml\n")[1:]
+    )
     rig = validate(DeviceRig, first, "guide")
     assert rig.channels["drive_position_m"].sign == -1
     assert device_of(rig, Path()).setup.channels == 4
+    rig = validate(DeviceRig, first | derived | {"channels": first["channels"] | derived["channels"]}, "guide")
+    assert list(rig.derived) == ["drive_force_N"]
     of_generator = generator["exciter"]
     rig = validate(DeviceRig, first | {"exciter": of_generator}, "guide")
     assert device_of(rig, Path()).watchdog_s == 0.1
