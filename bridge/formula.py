@@ -60,8 +60,8 @@ class _Parser:
         return ValueError(f"character {at + 1} of {self.text[:_LONGEST]!r}: {rule}")
 
     def _expected(self, what: str) -> ValueError:
-        at, _, found = self._tokens[self._next]
-        return self._error(at, f"must be {what}, not {found}")
+        at, _, text = self._tokens[self._next]
+        return self._error(at, f"must be {what}, not {text}")
 
     def _take(self) -> str:
         self._next += 1

@@ -139,7 +139,7 @@ class DeviceRig(Strict):
 
     @property
     def rows(self) -> dict[str, int]:
-        """Row of each channel that the rig has, where the derived channels follow those of the device."""
+        """Row of each channel that the rig has, where the derived channels follow the rows of the device."""
         return self.measured | {name: self.sources + row for row, name in enumerate(self.derived)}
 
     @property

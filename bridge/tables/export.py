@@ -153,7 +153,7 @@ def raw_columns(columns: Columns, plant: Mapping[str, Any]) -> Columns:
             _, sign, scale, offset = numbers
             made[f"raw_{name.rpartition('_')[0]}"] = (columns[name].astype(np.float64) - offset) / (sign * scale)
     if not made:
-        rule = "the header of the log has no calibration, as its rig is no real rig"
+        rule = "the header of the log has no calibration, as its rig is simulated"
         raise Fault("CONFIG", f"--raw: {rule}; leave it out")
     return made
 

@@ -1,4 +1,4 @@
-"""Formulas: their values, and one line with place and rule for each text that is none."""
+"""Formulas: their values, and one line with place and rule for each other text."""
 
 import numpy as np
 import pytest
