@@ -97,6 +97,14 @@ class DeviceExciterConfig(ExciterConfig):
         default=0.0, description="Silence after which the device itself ends the vibration; 0: it has no watchdog."
     )
 
+    @model_validator(mode="after")
+    def _has_an_adapter(self) -> "DeviceExciterConfig":
+        if self.device and not self.adapter:
+            raise ValueError(
+                "device: settings without an adapter; give adapter, or use [device] for the device's exciter"
+            )
+        return self
+
 
 class DeviceRig(Strict):
     """One rig file of a real rig."""

@@ -57,6 +57,7 @@ def channels(**changed: Any) -> dict[str, Any]:
             "this channel must be measured: no other channel shows v_d",
         ),
         ({"numbers": {"mass_position_m": 1.0}}, r"numbers\.mass_position_m: must be a name of"),
+        ({"exciter": {"device": {"burst_s": 1.0}}}, "exciter: device: settings without an adapter; give adapter"),
         ({"numbers": {"k d": 1.0}}, r"numbers\.k d: must be a name of"),
         ({"channels": channels(force={"source": 0})}, "force: no such channel; known: drive_force_N"),
         (
