@@ -15,6 +15,7 @@ kernel_linking  how kernels that call each other are compiled once
 compiling  the progress of compilation, and signals during it
 plain, processes  text that is safe on a terminal; the identity of a process
 threads   work that a thread repeats
+formula   arithmetic of a fixed grammar over named values, in files of users
 arrays    names for the types of arrays
 
 """

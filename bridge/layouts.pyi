@@ -106,9 +106,9 @@ class SensorRow:
     sequence:int; t_ns:int
 
 class AppliedRow:
-    amplitude_m:float; cause:int; command_block:int; commands:int; commands_late:int; commands_refused:int;
-    fallback:int; frequency_Hz:float; guard_limit:int; guard_state:int; heat_share:float; late_ns:int;
-    round_trip_ns:int; sequence:int; t_ns:int; toggle:int
+    amplitude_m:float; answer_ns:int; cause:int; command_block:int; commands:int; commands_late:int;
+    commands_refused:int; fallback:int; frequency_Hz:float; guard_limit:int; guard_state:int; heat_share:float;
+    late_ns:int; round_trip_ns:int; sample_rate_Hz:float; sequence:int; t_ns:int; toggle:int
 
 class CommandRow:
     amplitude_m:float; block:int; frequency_Hz:float; limit:int; mode:int; reason:int; run:int; sequence:int; t_ns:int

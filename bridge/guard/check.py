@@ -169,8 +169,8 @@ def write_gain(p: GuardParams, s: GuardMemory, block: SensorRow) -> None:
 
 @kernel
 def _note(p: GuardParams, s: GuardMemory, channel: int, samples: Record) -> bool:
-    """Note the range of a channel; returns whether its samples are finite. An absent channel has no range, and never froze."""
-    if p.absent[channel] == 1:
+    """Note the range of a channel; returns whether its samples are finite. Only a measured channel has a range, or freezes."""
+    if p.absent[channel] != 0:
         return True
     for i in range(samples.shape[0]):
         value = float(samples[i])

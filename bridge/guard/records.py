@@ -45,7 +45,7 @@ PARAMS = np.dtype(
     ]
     + [(name, "i8") for name in ("timeout_blocks", "lost_blocks", "window_blocks", "bands", "tones")]
     + [("band_Hz", "f8", (MOST_BANDS, 2)), ("tone_Hz", "f8", (MOST_TONES,))]
-    + [("absent", "i8", (len(CHANNELS),))],  # 1: the rig has no such channel
+    + [("absent", "i8", (len(CHANNELS),))],  # 1: the rig has no such channel; 2: derived from others, which are checked
     align=True,
 )
 
@@ -100,7 +100,12 @@ class ExciterLimits(NamedTuple):
 
 
 def build(
-    config: GuardConfig, exciter: ExciterLimits, run: int, arm: bool = False, absent: Collection[str] = ()
+    config: GuardConfig,
+    exciter: ExciterLimits,
+    run: int,
+    arm: bool = False,
+    absent: Collection[str] = (),
+    derived: Collection[str] = (),
 ) -> tuple[Records, Records]:
     """Parameters and state of a guard at power-up.
 
@@ -112,6 +117,7 @@ def build(
         run: the number that each command must carry.
         arm: the rig is simulated, and its scenario arms it.
         absent: channels that the rig does not have.
+        derived: channels that are derived from measured ones.
 
     """
     params = record(PARAMS)
@@ -160,7 +166,7 @@ def build(
     p.tone_Hz[: len(tones)] = tones
     if reason := refusal(absent):
         raise Fault("CONFIG", reason)
-    p.absent[:] = [name in absent for name in CHANNELS]
+    p.absent[:] = [1 if name in absent else 2 if name in derived else 0 for name in CHANNELS]
 
     state = record(STATE)
     s: Any = state[0]

@@ -1,11 +1,12 @@
 """A rig of any kind behind its guard, as a process on the bus. Nothing here knows the plant or an adapter.
 
-device   the contract of a device: converter and exciter
+device   the contract of a device: converter and exciter, together or each alone
 node     a rig behind its guard, block by block: `GuardedNode`; around a device: `DeviceNode`
 step     a block between its messages, compiled; the plant's loop calls the same parts
 rate     the measured rate of a device
 watch    faults that show in the times of its blocks, and in the vibration that it executes
 file     the rig file of a real rig
+derived  channels that its formulas derive from measured ones
 load     the device that it describes, by its adapter
 real     this device, opened, behind its guard
 check    the channels of a device with its exciter at rest

@@ -8,6 +8,7 @@ import numpy as np
 
 from bridge.arrays import Floats
 from bridge.results import in_json
+from bridge.rig.derived import Derived
 from bridge.rig.device import Device, DeviceError
 from bridge.rig.file import DeviceRig
 from bridge.wire.channels import CHANNELS, SENSOR_CHANNELS
@@ -55,8 +56,10 @@ class RigCheck(NamedTuple):
     blocks: int
     lost: int
     longest_gap_s: float
+    answer_s: float  # answer time of a separate exciter; 0: the device has the exciter
     channels: list[ChannelCheck]
     problems: list[Problem]
+    warnings: list[Problem]  # findings that do not fail the check
 
     @in_json
     def ok(self) -> bool:
@@ -68,10 +71,13 @@ class RigCheck(NamedTuple):
         lines = [
             f"rig      {self.rig}: {self.blocks} blocks in {self.seconds:.1f} s, {self.rate_Hz:.0f} samples a second"
         ]
+        if self.answer_s:
+            lines.append(f"exciter  answers in {self.answer_s * 1e3:.1f} ms")
         for row in self.channels:
             shown = f"{row.lowest:.4g} to {row.highest:.4g}, noise {row.noise:.3g}, hum {row.hum:.3g}"
             lines.append(f"channel  {row.name:<18} {'absent' if row.absent else shown}")
         lines += [f"problem  {problem.place}: {problem.text}; {problem.remedy}" for problem in self.problems]
+        lines += [f"warning  {warning.place}: {warning.text}; {warning.remedy}" for warning in self.warnings]
         return [*lines, "check    ok" if self.ok else f"check    {len(self.problems)} problems"]
 
 
@@ -90,13 +96,24 @@ def check(device: Device, rig: DeviceRig, seconds: float) -> RigCheck:
     """Check an open device for a time, with its exciter at rest."""
     heard = _listen(device, seconds)
     blocks = len(heard.samples)
-    raw = np.concatenate(heard.samples, axis=1) if blocks else np.empty((rig.sources, 0))
+    raw = Derived(rig)(np.concatenate(heard.samples, axis=1) if blocks else np.empty((rig.sources, 0)))
     rate_Hz, gap_s = _rate(device, heard)
     channels = [_channel(rig, name, raw) for name in CHANNELS]
     problems = _of_device(device, heard, rate_Hz, gap_s)
+    if 2.0 * device.answer_s > device.watchdog_s > 0.0:
+        text = f"it answers in {device.answer_s * 1e3:.0f} ms, so that a burst of {device.watchdog_s * 1e3:.0f} ms ends early"
+        problems.append(Problem("exciter", text, "raise burst_s"))
+    warnings: list[Problem] = []
+    if not (device.watchdog_s or rig.exciter.watchdog_s):
+        text = "it has no burst and no watchdog: a killed process leaves it on"
+        warnings.append(
+            Problem("exciter", text, "use bursts, or state exciter.watchdog_s of a device that has a watchdog")
+        )
     if blocks:
         problems += [problem for row in channels if not row.absent for problem in _of_channel(rig, row, raw)]
-    return RigCheck(rig.name, seconds, rate_Hz, blocks, heard.lost, gap_s, channels, problems)
+    return RigCheck(
+        rig.name, seconds, rate_Hz, blocks, heard.lost, gap_s, device.answer_s, channels, problems, warnings
+    )
 
 
 def _listen(device: Device, seconds: float) -> _Heard:
@@ -152,9 +169,9 @@ def _of_device(device: Device, heard: _Heard, rate_Hz: float, gap_s: float) -> l
 
 def _channel(rig: DeviceRig, name: str, raw: Floats) -> ChannelCheck:
     channel, nan = rig.channels[name], math.nan
-    if channel.source is None:
+    if channel.absent:
         return ChannelCheck(name, True, nan, nan, nan, nan, nan, 0.0)
-    values = channel.sign * channel.scale * raw[channel.source] + channel.offset
+    values = channel.sign * channel.scale * raw[rig.rows[name]] + channel.offset
     finite = values[np.isfinite(values)]
     missing = 1.0 - finite.size / max(values.size, 1)
     if finite.size < 2:
@@ -191,7 +208,7 @@ def _of_channel(rig: DeviceRig, row: ChannelCheck, raw: Floats) -> list[Problem]
     for end, limit in ((row.lowest, channel.lowest), (row.highest, channel.highest)):
         if limit is not None and (end <= limit if limit == channel.lowest else end >= limit):
             add(f"it reaches the end of its range, {limit:g}", "use a larger range, or correct scale and offset")
-    values = raw[channel.source or 0]
+    values = raw[rig.rows[row.name]]
     if np.unique(values[np.isfinite(values)]).size > _FEW_STEPS:
         share = max(float(np.mean(values == np.nanmin(values))), float(np.mean(values == np.nanmax(values))))
         if share > _AT_END:

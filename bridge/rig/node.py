@@ -4,13 +4,13 @@ import contextlib
 import math
 import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bridge.arrays import Records
+from bridge.arrays import Floats, Records
 from bridge.guard.check import gain_report
 from bridge.guard.core import NO_COMMAND
 from bridge.guard.states import LEAVE, apply_order
@@ -35,6 +35,7 @@ _CLIPPED_S = 0.2  # interval at which clipped channels are reported
 # Interval of the attempts to open a lost device. Smaller: more load on a device that starts. Larger: a device that another client
 # took is reported after more than 1 s.
 _OPEN_AGAIN_S = 0.5
+LATE_NS = 1_000_000  # round trip beyond which a command counts as late
 
 
 class GuardedNode(ABC):
@@ -184,6 +185,7 @@ class DeviceNode(GuardedNode):
         faults: injected faults.
         memory: calibration of its channels, a record of `bridge.rig.step.DEVICE`; None: SI units in the order of CHANNELS.
         stroke_m: stroke of the exciter for one unit of its amplitude.
+        derive: adds rows of derived channels to the samples of a block; None: none.
 
     """
 
@@ -196,13 +198,17 @@ class DeviceNode(GuardedNode):
         faults: Faults,
         memory: Records | None = None,
         stroke_m: float = 1.0,
+        derive: Callable[[Floats], Floats] | None = None,
     ) -> None:
         super().__init__(guard, round(device.block_s * 1e9), device.setup.samples_per_block, faults)
-        self._device, self._stroke_m = device, stroke_m
+        self._device, self._stroke_m, self._derive = device, stroke_m, derive
         self._memory = device_memory() if memory is None else memory
         self._block = DeviceBlock(np.zeros((1, 1)), 0.0, 0.0)
         self._is_begun = False  # whether the vibration of the block under way is set
         self._accepted = 0  # number of commands accepted for it
+        self._took_s = self._answer_s = (
+            0.0  # of the newest of them: block complete to acknowledged; the exciter's part of it
+        )
         self._heard_s = time.monotonic()  # of the newest block
         self._timeout_s = int(guard[0][0].timeout_blocks) * device.block_s
         self._silent_since_s: float | None = None  # None while blocks arrive
@@ -252,7 +258,8 @@ class DeviceNode(GuardedNode):
             return None
         self._block, self._is_begun = block, False
         self._note_block(block)
-        fill(self._guard_state, self._memory, self.block_ns, block.lost, block.samples, self._sensors)
+        samples = self._derive(block.samples) if self._derive is not None else block.samples
+        fill(self._guard_state, self._memory, self.block_ns, block.lost, samples, self._sensors)
         if self.block % self._look_blocks == 0 and (names := clipped(self._memory, self._look_blocks * self._samples)):
             self._problems.append(("DEVICE_CLIPPED", f"{', '.join(names)}: many samples at one end of the range", 1))
         return self._accepted
@@ -262,7 +269,14 @@ class DeviceNode(GuardedNode):
         announce = self._device.announcements()
         self.announcements = [Outgoing(ANNOUNCE, announce[row : row + 1].tobytes()) for row in range(len(announce))]
         self._accepted = begin(self._guard_params, self._guard_state, self._memory, commands, announce)
+        ordered_s = time.monotonic()
         self._write()
+        self._answer_s = time.monotonic() - ordered_s + self._device.answer_s
+        if self._accepted:
+            since = (
+                self.block - int(self._memory["command_block"][0]) + self._block.waiting - 1
+            )  # blocks completed since
+            self._took_s = ordered_s - self._heard_s + since * self._device.block_s + self._answer_s
         self._is_begun = True
 
     def _write(self) -> None:
@@ -287,7 +301,7 @@ class DeviceNode(GuardedNode):
         if block is None:
             return None
         samples = np.ascontiguousarray(block.samples, np.float64)
-        needed, numbers = int(self._memory["source"].max()) + 1, (block.frequency_Hz, block.amplitude)
+        needed, numbers = self._device.setup.channels, (block.frequency_Hz, block.amplitude)
         if samples.ndim != 2 or len(samples) < needed or samples.shape[1] != self._samples:
             due = f"must be {needed} channels or more x {self._samples}"
             self._problems.append(("DEVICE_DATA", f"samples of shape {samples.shape}: {due}: dropped", 1))
@@ -375,6 +389,12 @@ class DeviceNode(GuardedNode):
         block = self._block
         if self.paced_by_rig:
             late_ns = block.waiting * self.block_ns
+            round_trip_ns = round(self._took_s * 1e9) if accepted else 0
+            commands_late = accepted if round_trip_ns > LATE_NS else 0
+            self._applied["answer_ns"], self._applied["sample_rate_Hz"] = (
+                round(self._answer_s * 1e9),
+                self._clock.rate_Hz,
+            )
         end(
             self._guard_params, self._guard_state, self._memory, block.frequency_Hz, block.amplitude * self._stroke_m,
             accepted, commands_late, round_trip_ns, late_ns, self._sensors, self._applied,

@@ -18,7 +18,7 @@ from bridge.guard.states import HOLD, RESET, STOP
 from bridge.guard.stop_file import RigFile
 from bridge.plain import StepReport, no_report
 from bridge.rig.faults.line import Message
-from bridge.rig.node import GuardedNode
+from bridge.rig.node import LATE_NS, GuardedNode
 from bridge.wire import realtime, refusals
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.clock import time
@@ -36,7 +36,6 @@ _LONGEST_FADE_BLOCKS = 1000  # longest wait until the exciter rests [blocks]
 # Longest wait for the answer to a block of a device, in block lengths. Smaller: a command of a busy computer acts a block later.
 # Larger: the next block is read late.
 _ANSWER_SHARE = 0.5
-_LATE_NS = 1_000_000  # round trip beyond which a command counts as late
 # Change of the exciter's warmth, over the largest allowed, after which it is stored. Smaller: more writes; with 0.05 there are 20
 # on the way to the limit, and 20 as it cools. Larger: a crash forgets more.
 _HEAT_STEP = 0.05
@@ -215,7 +214,8 @@ class GuardedRig:
         """Publish END and withdraw the rig's liveliness token; the other processes end once they see both."""
         self._complaints.report_when_due(all_of_it=True)
         self._report_stall()
-        self.event("END", f"blocks={self._node.block}")
+        rate_Hz = float(self._node.applied.sample_rate_Hz)
+        self.event("END", f"blocks={self._node.block}{f' sample_rate_Hz={rate_Hz:.1f}' if rate_Hz else ''}")
         self._bus.withdraw()
 
     def _send(self, messages: Sequence[Outgoing]) -> None:
@@ -346,7 +346,7 @@ class GuardedRig:
                 commands.append(received.payload)
                 if node.block - answered <= _ROUND_TRIPS_KEPT:
                     round_trip_ns = received.arrival_ns - sent_ns[answered % _ROUND_TRIPS_KEPT]
-                    late_commands += round_trip_ns > _LATE_NS
+                    late_commands += round_trip_ns > LATE_NS
             messages = node.advance(commands, late_commands, round_trip_ns, late_ns)
             sent_ns[(node.block - 1) % _ROUND_TRIPS_KEPT] = time.perf_counter_ns()
             self._send(messages)

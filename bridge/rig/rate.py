@@ -7,7 +7,7 @@ _FAR = 2e-3
 
 
 class RateWatch:
-    """Measures the rate of a device, once.
+    """Measures the rate of a device from its first block on, and reports it once.
 
     Args:
         rate_Hz: stated rate of the samples.
@@ -16,10 +16,10 @@ class RateWatch:
     """
 
     def __init__(self, rate_Hz: float, samples_per_block: int) -> None:
-        self._rate_Hz, self._samples = rate_Hz, samples_per_block
+        self._stated_Hz, self._samples = rate_Hz, samples_per_block
         self._begun_s: float | None = None
         self._blocks = 0
-        self._is_done = False
+        self.rate_Hz = 0.0  # 0 before 10 s
 
     def add(self, blocks: int, now_s: float) -> tuple[str, str] | None:
         """Add blocks that arrived by `now_s` [s]; after 10 s, once, the code and text of the measured rate."""
@@ -28,12 +28,17 @@ class RateWatch:
             return None
         self._blocks += blocks
         since_s = now_s - self._begun_s
-        if self._is_done or since_s < _FROM_S:
+        if since_s < _FROM_S:
             return None
-        self._is_done = True
-        rate_Hz = self._blocks * self._samples / since_s
-        ratio = rate_Hz / self._rate_Hz
-        text = f"{rate_Hz:.1f} samples a second by the computer's clock, {ratio:.5f} times the rate of the rig file"
+        is_first = self.rate_Hz == 0.0
+        self.rate_Hz = self._blocks * self._samples / since_s
+        return self._report() if is_first else None
+
+    def _report(self) -> tuple[str, str]:
+        ratio = self.rate_Hz / self._stated_Hz
+        text = (
+            f"{self.rate_Hz:.1f} samples a second by the computer's clock, {ratio:.5f} times the rate of the rig file"
+        )
         if abs(ratio - 1.0) < _FAR:
             return "DEVICE_CLOCK", text
         return "DEVICE_RATE", f"{text}: v_d and every frequency are wrong by this factor"

@@ -9,6 +9,7 @@ from bridge.faults import Fault
 from bridge.guard.absent import absent
 from bridge.guard.records import ExciterLimits, build
 from bridge.guard.wide import protection
+from bridge.rig.derived import Derived
 from bridge.rig.device import DeviceError
 from bridge.rig.faults.schedule import Faults
 from bridge.rig.faults.table import FaultTable
@@ -17,7 +18,7 @@ from bridge.rig.load import device_of
 from bridge.rig.node import DeviceNode
 from bridge.rig.process import Served
 from bridge.rig.step import device_memory
-from bridge.wire.channels import CHANNELS
+from bridge.wire.channels import CHANNELS, SENSOR_CHANNELS
 
 
 def served(rig: DeviceRig, folder: Path, faults: Sequence[FaultTable] = (), seed: int = 0) -> Served:
@@ -26,27 +27,34 @@ def served(rig: DeviceRig, folder: Path, faults: Sequence[FaultTable] = (), seed
     def make(run: int, _may_arm: bool) -> DeviceNode:
         return open_node(rig, folder, run, faults, seed)
 
-    return Served(rig.name, rig.guard, notes(rig), make)
+    return Served(rig.name, rig.guard, notes(rig, device_of(rig, folder).watchdog_s), make)
 
 
 def open_node(rig: DeviceRig, folder: Path, run: int, faults: Sequence[FaultTable] = (), seed: int = 0) -> DeviceNode:
     """The node of a rig whose device is open. Raises Fault CONFIG, NO_DEVICE; a rig that cannot be opened is never simulated."""
     device = device_of(rig, folder)
-    guard = build(rig.guard, _exciter(rig), run, absent=absent(rig.channels))
+    guard = build(rig.guard, _exciter(rig), run, absent=absent(rig.channels), derived=rig.derived)
     injected = Faults(faults, seed, rig.converter.block_s, rig.converter.samples_per_block)
     try:
         device.open()
     except DeviceError as error:
         raise Fault("NO_DEVICE", f"{rig.name}: {error}") from None
-    return DeviceNode(device, guard, injected, calibration(rig), rig.exciter.stroke_m_per_V or 1.0)
+    return DeviceNode(device, guard, injected, calibration(rig), rig.exciter.stroke_m_per_V or 1.0, Derived(rig))
 
 
-def notes(rig: DeviceRig) -> list[tuple[str, str]]:
-    """Codes and texts of events at the start of a run: wide limits, and protection that this rig lacks."""
+def notes(rig: DeviceRig, watchdog_s: float = 0.0) -> list[tuple[str, str]]:
+    """Codes and texts of events at the start of a run: wide limits, and protection that this rig lacks.
+
+    `watchdog_s` is the device's own watchdog, where its adapter knows it.
+    """
     events = protection(rig.guard, _exciter(rig), rig.guard.fastest_drive_mps or 0.0, absent(rig.channels))
+    events += [
+        ("UNPROTECTED", f"{name} is derived, so that it contradicts no other channel: {SENSOR_CHANNELS[name].guards}")
+        for name in rig.derived
+    ]
     if not rig.exciter.enable_line:
         events.append(("UNPROTECTED", "no enable line: the loop check finds no exciter that cannot be switched off"))
-    if rig.exciter.watchdog_s == 0.0:
+    if not (rig.exciter.watchdog_s or watchdog_s):
         events.append(("UNPROTECTED", "no watchdog: a killed process leaves the exciter vibrating"))
     return events
 
@@ -56,7 +64,7 @@ def calibration(rig: DeviceRig) -> Records:
     memory = device_memory()
     for row, name in enumerate(CHANNELS):
         channel = rig.channels[name]
-        memory["source"][0, row] = -1 if channel.source is None else channel.source
+        memory["source"][0, row] = rig.rows.get(name, -1)
         memory["scale"][0, row], memory["offset"][0, row] = channel.sign * channel.scale, channel.offset
         memory["range_low"][0, row] = -math.inf if channel.lowest is None else channel.lowest
         memory["range_high"][0, row] = math.inf if channel.highest is None else channel.highest

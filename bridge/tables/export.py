@@ -1,9 +1,9 @@
 """A run log as tables for other programs, streamed, so that the memory does not grow with the log."""
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -14,6 +14,7 @@ from bridge.files import check_file, refuse_to_lose
 from bridge.log.damage import Damage
 from bridge.log.log_reader import LogReader
 from bridge.log.logfile import STREAMING, block_period_ns, iter_pieces, sample_times_s
+from bridge.log.metadata import configuration_of, is_number, value_at
 from bridge.tables.writers import ArrowTable, Columns, MatFile, MatTable, TableWriter
 from bridge.wire.channels import CHANNELS
 
@@ -47,10 +48,12 @@ def export(
     until_s: float = np.inf,
     progress: Callable[[float], None] | None = None,
     overwrite: bool = False,
+    raw: bool = False,
 ) -> Exported:
     """Write streaming topics of a log as tables: a row for each sample of the sensors, a row for each message of other topics.
 
     `to` ends in .parquet, .csv or .mat. With several topics, .parquet and .csv get a file for each topic, FILE.TOPIC.parquet.
+    With `raw` the sensors have also the values of the device, from the calibration in the header: see `raw_columns`.
     Only rows with from_s <= t_s < until_s are written. `progress` is called with the share of the log that was read, 0 to 1.
     An existing table is replaced only with `overwrite`.
 
@@ -71,7 +74,7 @@ def export(
         writers = _writers(to, topics)
         mat_files = {writer.file for writer in writers.values() if isinstance(writer, MatTable)}
         owners = [*writers.values(), *mat_files]
-        rows = _stream(reader, writers, from_s, until_s, progress)
+        rows = _stream(reader, writers, from_s, until_s, progress, raw)
         files = [file for owner in owners for file in owner.finish()]
         finished = True
     except OSError as error:
@@ -105,6 +108,7 @@ def _stream(
     from_s: float,
     until_s: float,
     progress: Callable[[float], None] | None,
+    raw: bool,
 ) -> dict[str, int]:
     rows = dict.fromkeys(writers, 0)
     period_ns = 0.0
@@ -114,6 +118,7 @@ def _stream(
         if piece.topic == "sensors":
             period_ns = period_ns or block_period_ns(piece.records)
             columns = sensor_columns(piece.records, period_ns)
+            columns |= raw_columns(columns, configuration_of(reader.metadata, "plant", reader.path)) if raw else {}
         else:
             columns = message_columns(piece.records)
         t_s = columns["t_s"]
@@ -132,6 +137,25 @@ def sensor_columns(sensors: Records, period_ns: float) -> Columns:
     """Sensor blocks as columns, [samples] each: `t_s` float64, the channels float32 as they were sent."""
     columns: Columns = {"t_s": sample_times_s(sensors, period_ns).ravel()}
     return columns | {name: sensors[name].ravel() for name in CHANNELS}
+
+
+def raw_columns(columns: Columns, plant: Mapping[str, Any]) -> Columns:
+    """The samples in units of the device, float64, such as `raw_drive_force`: (value - offset) / (sign x scale).
+
+    Calibrated values are in the log as float32: a raw value is exact to their rounding, 6e-8 of the calibrated value. Derived and
+    absent channels have none. `plant` is the configuration of the rig's process. Raises Fault CONFIG without a calibration.
+    """
+    made: Columns = {}
+    for name in CHANNELS:
+        channel = value_at(plant, f"rig.channels.{name}")
+        numbers = [value_at(channel, key) for key in ("source", "sign", "scale", "offset")]
+        if all(map(is_number, numbers)):
+            _, sign, scale, offset = numbers
+            made[f"raw_{name.rpartition('_')[0]}"] = (columns[name].astype(np.float64) - offset) / (sign * scale)
+    if not made:
+        rule = "the header of the log has no calibration, as its rig is simulated"
+        raise Fault("CONFIG", f"--raw: {rule}; leave it out")
+    return made
 
 
 def message_columns(records: Records) -> Columns:

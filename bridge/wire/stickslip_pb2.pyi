@@ -276,7 +276,7 @@ class Command(_message.Message):
     def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., block: _Optional[int] = ..., frequency_Hz: _Optional[float] = ..., amplitude_m: _Optional[float] = ..., mode: _Optional[int] = ..., limit: _Optional[int] = ..., reason: _Optional[int] = ..., run: _Optional[int] = ...) -> None: ...
 
 class Applied(_message.Message):
-    __slots__ = ("sequence", "t_ns", "frequency_Hz", "amplitude_m", "command_block", "commands", "fallback", "round_trip_ns", "late_ns", "commands_late", "guard_state", "cause", "guard_limit", "commands_refused", "heat_share", "toggle")
+    __slots__ = ("sequence", "t_ns", "frequency_Hz", "amplitude_m", "command_block", "commands", "fallback", "round_trip_ns", "late_ns", "commands_late", "guard_state", "cause", "guard_limit", "commands_refused", "heat_share", "toggle", "answer_ns", "sample_rate_Hz")
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     T_NS_FIELD_NUMBER: _ClassVar[int]
     FREQUENCY_HZ_FIELD_NUMBER: _ClassVar[int]
@@ -293,6 +293,8 @@ class Applied(_message.Message):
     COMMANDS_REFUSED_FIELD_NUMBER: _ClassVar[int]
     HEAT_SHARE_FIELD_NUMBER: _ClassVar[int]
     TOGGLE_FIELD_NUMBER: _ClassVar[int]
+    ANSWER_NS_FIELD_NUMBER: _ClassVar[int]
+    SAMPLE_RATE_HZ_FIELD_NUMBER: _ClassVar[int]
     sequence: int
     t_ns: int
     frequency_Hz: float
@@ -309,7 +311,9 @@ class Applied(_message.Message):
     commands_refused: int
     heat_share: float
     toggle: int
-    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., frequency_Hz: _Optional[float] = ..., amplitude_m: _Optional[float] = ..., command_block: _Optional[int] = ..., commands: _Optional[int] = ..., fallback: _Optional[int] = ..., round_trip_ns: _Optional[int] = ..., late_ns: _Optional[int] = ..., commands_late: _Optional[int] = ..., guard_state: _Optional[int] = ..., cause: _Optional[int] = ..., guard_limit: _Optional[int] = ..., commands_refused: _Optional[int] = ..., heat_share: _Optional[float] = ..., toggle: _Optional[int] = ...) -> None: ...
+    answer_ns: int
+    sample_rate_Hz: float
+    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., frequency_Hz: _Optional[float] = ..., amplitude_m: _Optional[float] = ..., command_block: _Optional[int] = ..., commands: _Optional[int] = ..., fallback: _Optional[int] = ..., round_trip_ns: _Optional[int] = ..., late_ns: _Optional[int] = ..., commands_late: _Optional[int] = ..., guard_state: _Optional[int] = ..., cause: _Optional[int] = ..., guard_limit: _Optional[int] = ..., commands_refused: _Optional[int] = ..., heat_share: _Optional[float] = ..., toggle: _Optional[int] = ..., answer_ns: _Optional[int] = ..., sample_rate_Hz: _Optional[float] = ...) -> None: ...
 
 class Trace(_message.Message):
     __slots__ = ("sequence", "t_ns", "block", "events", "gap_blocks", "state", "mode", "reason", "limit", "slips", "score", "force_rate", "drive_force_N", "burst_mps2", "drive_velocity_mps", "vibration_velocity_mps", "wanted_velocity_mps", "wanted_amplitude_m", "wanted_frequency_Hz", "time_to_slip_s", "lateness_ns", "announcements", "surges", "sliding_velocity_mps", "window_s", "velocity_ratio", "drive_stiffness_N_per_m", "drive_stiffness_sigma", "breakaway_force_N", "sliding_force_N", "loop_delay_s", "exciter_gain")

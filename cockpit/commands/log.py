@@ -130,6 +130,9 @@ def log_export(
     ] = "",
     start: Annotated[str, typer.Option("--from", help="Start time in the run, e.g. 12.5s.")] = "",
     end: Annotated[str, typer.Option("--until", help="End time in the run, e.g. 20s.")] = "",
+    raw: Annotated[
+        bool, typer.Option("--raw", help="Sensors also in units of the device, by the calibration in the log.")
+    ] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing tables.")] = False,
     as_json: Json = None,
 ) -> int:
@@ -144,7 +147,7 @@ def log_export(
     check_output("--to", to, TABLE)
     names = [name.strip() for name in topic.split(",")] if topic else STREAMING
     with watched_share(f"exporting {path.name}", quiet=as_json == STDOUT) as progress:
-        written = export(path, to, list(dict.fromkeys(names)), from_s, until_s, progress, overwrite)
+        written = export(path, to, list(dict.fromkeys(names)), from_s, until_s, progress, overwrite, raw)
     words = [f"{name:<8} {counted(rows, 'row')}" for name, rows in written.rows.items()]
     nothing = "nothing written: no message of these topics in this time; an existing table is unchanged"
     words += [str(file) for file in written.files] or [nothing]

@@ -101,7 +101,7 @@ def rig_conformance(
 def rig_box(
     box: Annotated[Path, typer.Argument(metavar="BOX", help="File of a simulated device, .toml.")], as_json: Json = None
 ) -> None:
-    """Simulate a device for the adapter `stream` until Ctrl-C: the plant's physics behind a TCP port, with a dead man."""
+    """Simulate a device until Ctrl-C: the plant's physics behind a TCP port, with a dead man, or with a generator."""
     from bridge.config import read_toml, validate
     from bridge.plain import print_line
     from bridge.wire import realtime
@@ -113,6 +113,8 @@ def rig_box(
     made = Box(config, load_rig(config.rig, config.settings))
     if not config.waits:
         realtime.claim(realtime.core(1))
+    if made.generator is not None:
+        print_line(f"generator at {config.host}:{made.generator.port}")
     print_line(f"box      {config.rig} at {config.host}:{made.port}")
     stop: threading.Event = stop_event()
     made.run(stop)

@@ -101,6 +101,8 @@ SIGNALS = {
         PlottedSignal("mass_position_m", "x", "slide's position", "position", "sensors", 1e3, "mm", _GREEN, _POSITIONS),
         PlottedSignal("drive_position_m", "s_d", "drive's position", "position", "sensors", 1e3, "mm", _RED, _POSITIONS),
         PlottedSignal("round_trip_ns", "", "block to command", "round trip", "applied", 1e-3, "µs", _BROWN, unknown=0),
+        PlottedSignal("answer_ns", "", "exciter's answer time", "round trip", "applied", 1e-3, "µs", _GREY, unknown=0),
+        PlottedSignal("sample_rate_Hz", "", "rate of the samples, measured", "rate", "applied", 1.0, "Hz", _INK, unknown=0.0),
         PlottedSignal("heat_share", "", "exciter's temperature rise / limit", "heating", "applied", 1e2, "%", _RED),
     )
 }

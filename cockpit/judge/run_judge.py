@@ -40,7 +40,7 @@ from cockpit.judge.ratio_watch import RatioWatch
 from cockpit.judge.sensor_watch import SensorWatch
 from cockpit.judge.setup import SETTLING_S, Described, Setup, described, is_known, plant_of, setup_of
 from cockpit.judge.slips import Forces, bins_of, forces_of
-from cockpit.judge.verdict import IN_CHARGE_SHARE, MISSING_SHARE, RunVerdict
+from cockpit.judge.verdict import IN_CHARGE_SHARE, MISSING_SHARE, RunVerdict, SampleRate
 from cockpit.judge.watches import FrozenWatch, LatencyWatch, Losses, RigWatch, StepWatch, clock_fault, losses_of
 from cockpit.judge.window import LAYOUTS, HasMoved, WaitingRows, Window, reduced
 from diagnosis.slips import Cycles
@@ -244,6 +244,7 @@ class RunJudge:
             highest_set_point=steps.highest_set_point,
             sensors=windows.sensors.result(slips_s, judged_s) if windows.checked else None,
             latency=latency,
+            sample_rate=self._sample_rate(),
             late_commands=self._latency.late,
             pauses=windows.commands.result(self._latency, self._rig.end_ns)
             if latency is not None and not not_watched
@@ -263,6 +264,10 @@ class RunJudge:
             imported=setup.imported,
             gain_verified=setup.known_gain or self._rig.gain_seen,
         )
+
+    def _sample_rate(self) -> SampleRate | None:
+        measured_Hz = self._latency.sample_rate_Hz
+        return SampleRate(measured_Hz, 1.0 / self.log.sample_s) if measured_Hz else None
 
     def _lines(
         self, charge: InCharge, fallbacks: Stretches, damaged: list[str], checksums: Checksums, foreign: dict[str, int]

@@ -30,6 +30,18 @@ _OF_THE_RIG = {code for code in EVENTS if harms(code)} - _OF_THE_LOG
 _TRIPS = {"FAULT", *TRIPS}
 
 
+class SampleRate(NamedTuple):
+    """Rate of the samples."""
+
+    measured_Hz: float  # by the clock of the rig's computer
+    stated_Hz: float  # by the times of the blocks
+
+    def in_words(self) -> str:
+        """Both, and their ratio."""
+        ratio = self.measured_Hz / self.stated_Hz
+        return f"{self.measured_Hz:.1f} samples a second, measured: {ratio:.5f} times the stated {self.stated_Hz:.0f}"
+
+
 class RunVerdict(NamedTuple):
     """Figures of a run."""
 
@@ -61,6 +73,7 @@ class RunVerdict(NamedTuple):
     highest_set_point: float  # highest set point of v_a / v_d: the controller raises it at the start and after slips
     sensors: SensorVerdict | None  # whether they can support a verdict; None for an imported log
     latency: Latency | None
+    sample_rate: SampleRate | None  # None before 10 s, and for a rig that the computer paces
     late_commands: int  # commands later than 1 ms after their block
     pauses: Pauses | None  # simultaneous stalls of all cores; None in lockstep, or if not watched
     computer: Computer | None  # all stalls; None in lockstep

@@ -80,9 +80,12 @@ def _figures(verdict: RunVerdict) -> list[str]:
                 "(`stickslip arm`) or set amplitude.known_gain."
             )
     if v.latency is not None:
-        p50, p99, p999, share = v.latency
+        p50, p99, p999, share, answer_p50, answer_p99 = v.latency
         quantiles = f"p50 {p50:.0f} us, p99 {p99:.0f} us, p99.9 {p999:.0f} us"
-        lines.append(f"latency  block to command {quantiles}; {100 * share:.2f} % within 1 ms")
+        answer = f"; of it the exciter's answer p50 {answer_p50:.0f} us, p99 {answer_p99:.0f} us" if answer_p50 else ""
+        lines.append(f"latency  block to command {quantiles}; {100 * share:.2f} % within 1 ms{answer}")
+    if v.sample_rate is not None:
+        lines.append(f"rate     {v.sample_rate.in_words()}")
     lines.extend(pauses_in_words(v.pauses))
     if v.normal_scheduling:
         who = " and ".join(v.normal_scheduling)

@@ -29,13 +29,16 @@ class Latency(NamedTuple):
     p99_us: float
     p999_us: float
     within_1_ms: float  # share of the blocks whose command came within 1 ms
+    answer_p50_us: float = 0.0  # the exciter's own answer time, part of the latency; 0 without one
+    answer_p99_us: float = 0.0
 
 
 class LatencyWatch:
     """Delays of the commands, recorded by the plant."""
 
     def __init__(self) -> None:
-        self.took_us = Histogram()
+        self.took_us, self.answer_us = Histogram(), Histogram()
+        self.sample_rate_Hz = 0.0  # as last measured; 0: not measured
         self.late = 0  # commands later than 1 ms
         self.blocks = self.commands = 0
 
@@ -46,6 +49,9 @@ class LatencyWatch:
         self.late += int(records["commands_late"].sum())
         round_trip_ns = records["round_trip_ns"][records["commands"] > 0]
         self.took_us.add(round_trip_ns[round_trip_ns > 0] * 1e-3)
+        self.answer_us.add(records["answer_ns"][records["answer_ns"] > 0] * 1e-3)
+        measured_Hz = records["sample_rate_Hz"][records["sample_rate_Hz"] > 0.0]
+        self.sample_rate_Hz = float(measured_Hz[-1]) if len(measured_Hz) else self.sample_rate_Hz
 
     def result(self) -> Latency | None:
         """Percentiles; None in lockstep, which has no latency."""
@@ -54,7 +60,7 @@ class LatencyWatch:
         # a missing command counts as late, except for the last block: its command arrives after the end of the log
         in_time = min((self.commands - self.late) / max(self.blocks - 1, 1), 1.0)
         p50_us, p99_us, p999_us = (self.took_us.quantile(share) for share in (0.5, 0.99, 0.999))
-        return Latency(p50_us, p99_us, p999_us, in_time)
+        return Latency(p50_us, p99_us, p999_us, in_time, self.answer_us.quantile(0.5), self.answer_us.quantile(0.99))
 
 
 class RigWatch:

@@ -64,6 +64,7 @@ def rows(now: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("applied", _applied(now)),
         ("forecast", forecast if now.get("mode") else _UNKNOWN),
         ("commands", _latency(now) if live else _UNKNOWN),
+        *([("samples", f"{now['sample_rate_Hz']:.1f} a second, measured")] if now.get("sample_rate_Hz") else []),
         ("lost", _lost(now["lost"])),
     ]  # fmt: skip
 
@@ -81,7 +82,8 @@ def _latency(now: Mapping[str, Any]) -> str:
     if late["p50"] is None:
         return _UNKNOWN
     share = 100.0 * lost["late"] / max(lost["commands"], 1)
-    return f"half within {late['p50']:.0f} us, 99 % within {late['p99']:.0f} us, {share:.2f} % later than 1 ms"
+    answer = f"; the exciter answers in {now['answer_ns'] * 1e-3:.0f} us" if now.get("answer_ns") else ""
+    return f"half within {late['p50']:.0f} us, 99 % within {late['p99']:.0f} us, {share:.2f} % later than 1 ms{answer}"
 
 
 def _lost(lost: Mapping[str, int] | None) -> str:

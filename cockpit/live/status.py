@@ -39,6 +39,8 @@ class Status(NamedTuple):
     guard_limit: str | None  # limit of the guard that restricts the command now
     heat_share: float | None  # modelled temperature rise of the exciter, as a share of the largest allowed
     events: list[str]  # received while listening: 0.3 s, or longer on a busy computer
+    sample_rate_Hz: float | None  # measured by the rig's computer; None before 10 s, and if it paces the rig
+    answer_ns: float | None  # answer time of the exciter, a part of the latency of a command; None without one
     other_rig: str | None  # warning about a controller whose scenario describes another rig
 
     @property

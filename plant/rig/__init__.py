@@ -4,5 +4,6 @@ node     the rig behind its guard, in one compiled step
 app      its process
 device   the physics alone as a device
 box      this device in another process, behind a TCP port
+generator  its exciter as a function generator with command lines
 exciter_faults  injected faults of the exciter
 """

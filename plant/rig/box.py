@@ -1,6 +1,8 @@
-"""A simulated device in another process, for tests of the adapter `stream`: the plant's physics behind a TCP port.
+"""A simulated device in another process, for tests of the adapters: the plant's physics behind a TCP port, with frames of
+`stream`.
 
-It shares no code with the adapter. Its clock may be wrong, it has a dead man, and it records its true vibration.
+It shares no code with the adapters. Its exciter may have a generator with command lines (`plant.rig.generator`) at another port. Its
+clock may be wrong, it has a dead man, and it records its true vibration.
 """
 
 import contextlib
@@ -19,6 +21,7 @@ from bridge.config import Strict
 from plant.config import RigConfig
 from plant.records import TRUTH
 from plant.rig.device import PlantDevice
+from plant.rig.generator import Generator, GeneratorConfig
 
 _POSITION, _VELOCITY = TRUTH.index("true_drive_position_m"), TRUTH.index("true_velocity_mps")
 _FRAME_HEAD = struct.Struct("<4sIQdd")
@@ -38,6 +41,7 @@ class BoxConfig(Strict):
     clock_ppm: Annotated[float, Field(gt=-5e5, le=5e5)] = Field(0.0, description="Error of its clock; above 0: fast.")
     dead_man_s: Annotated[float, Field(gt=0)] = Field(0.1, description="Time without a command until it rests.")
     waits: bool = Field(False, description="true: each block waits for its command, so that no clock is needed.")
+    generator: GeneratorConfig | None = Field(None, description="Not given: the frames set the exciter.")
     record: str = Field("", description="CSV file of the true motion of each block; empty: none.")
 
 
@@ -56,6 +60,7 @@ class Box:
         self._device = PlantDevice(rig, config.seed)
         self._server = socket.create_server((config.host, config.port))
         self._server.setblocking(False)
+        self.generator = Generator(config.generator, config.host) if config.generator is not None else None
         self.port = int(self._server.getsockname()[1])
         self._client: socket.socket | None = None
         self._received = bytearray()
@@ -79,13 +84,26 @@ class Box:
                     time.sleep(max(begun_s + (self._blocks + 1) * block_s - time.monotonic(), 0.0))
                     self._accept()
                     self._receive()
+                    self._generate()
                 self._make_block(file)
             self._forget()
+        if self.generator is not None:
+            self.generator.close()
+
+    def _generate(self) -> None:
+        """Let the generator, if there is one, set the exciter."""
+        if self.generator is not None:
+            now_s = self._blocks * self._device.block_s
+            self.generator.poll(now_s, at_once=self._config.waits and self._client is None)
+            self._device.enable(on=True, toggle=0)
+            self._device.write(*self.generator.vibration(now_s))
 
     def _is_answered(self) -> bool:
         """Wait for a client and its command; whether there was one."""
-        waiting = self._client or self._server
-        if not select.select([waiting], [], [], _LOOK_S)[0]:
+        waiting = [self._client or self._server]
+        ready = select.select(waiting + (self.generator.sockets if self.generator else []), [], [], _LOOK_S)[0]
+        self._generate()
+        if waiting[0] not in ready:
             return False
         self._accept()
         return self._receive()
@@ -128,14 +146,15 @@ class Box:
             return False
         _, _, frequency_Hz, amplitude_m, enable, toggle = _ORDER.unpack_from(self._received, whole - _ORDER.size)
         del self._received[:whole]
-        self._device.enable(bool(enable), toggle)
-        self._device.write(frequency_Hz, amplitude_m)
+        if self.generator is None:
+            self._device.enable(bool(enable), toggle)
+            self._device.write(frequency_Hz, amplitude_m)
         self._silent_blocks = 0
         return True
 
     def _make_block(self, record: IO[str] | None) -> None:
         self._silent_blocks += 1
-        if self._silent_blocks * self._device.block_s > self._config.dead_man_s:
+        if self.generator is None and self._silent_blocks * self._device.block_s > self._config.dead_man_s:
             self._device.safe()
         block = self._device.read()
         head = _FRAME_HEAD.pack(b"SSR1", 24 + 4 * block.samples.size, self._blocks, block.frequency_Hz, block.amplitude)

@@ -109,12 +109,23 @@ def rows(record: Path) -> list[list[float]]:
     return [[float(value) for value in line.split(",")] for line in lines]
 
 
+def separate(answer_s: float) -> tuple[dict[str, Any], dict[str, Any]]:
+    """A box whose exciter has a generator with this answer time, and the rig file's table [exciter] for it."""
+    port = int(free_endpoint().rpartition(":")[2])
+    device = {"address": f"127.0.0.1:{port}", "dialect": "agilent-33500"}
+    box = {"generator": {"port": port, "answer_s": answer_s}}
+    return box, {"adapter": "scpi", "stroke_m_per_V": 7.8e-8, "device": device}
+
+
 @contextmanager
-def driven(folder: Path, **box: Any) -> Generator[tuple[subprocess.Popen[bytes], Path, str]]:
+def driven(
+    folder: Path, exciter: dict[str, Any] | None = None, **box: Any
+) -> Generator[tuple[subprocess.Popen[bytes], Path, str]]:
     """A box, its rig and a controller in real time, once the rig vibrates: the rig's process, the record, the endpoint."""
     record, endpoint = folder / "truth.csv", free_endpoint()
     with boxed(folder, waits=False, record=str(record), dead_man_s=DEAD_MAN_S, **box) as port:
-        rig = written(folder, port, device={"address": f"127.0.0.1:{port}"})
+        exciter = exciter or {"enable_line": True}
+        rig = written(folder, port, device={"address": f"127.0.0.1:{port}"}, exciter=exciter)
         named = ["--rig", str(rig), "--endpoint", endpoint]
         plant = subprocess.Popen([*SEEN, "plant", *named], stderr=subprocess.DEVNULL)
         controller = subprocess.Popen([*SEEN, "controller", *named], stderr=subprocess.DEVNULL)
@@ -140,10 +151,12 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.realtime
+@pytest.mark.parametrize("answer_s", [None, 0.03])
 @pytest.mark.parametrize("signal_name", ["SIGKILL", "SIGSTOP", "SIGTERM", "SIGINT"])
-def test_however_the_rigs_process_ends_the_vibration_ends(signal_name: str, home: Path) -> None:
-    """By the device's own record: within its dead man, or as fast as the ramp."""
-    with driven(home) as (plant, record, _):
+def test_however_the_rigs_process_ends_the_vibration_ends(signal_name: str, answer_s: float | None, home: Path) -> None:
+    """By the device's own record: within its dead man or burst, or as fast as the ramp."""
+    box, exciter = ({}, None) if answer_s is None else separate(answer_s)
+    with driven(home, exciter, **box) as (plant, record, _):
         os.kill(plant.pid, getattr(signal, signal_name))
         before = record.read_bytes().count(b"\n") - 1
         time.sleep(1.0)
@@ -154,10 +167,11 @@ def test_however_the_rigs_process_ends_the_vibration_ends(signal_name: str, home
 
 
 @pytest.mark.realtime
-@pytest.mark.parametrize("clock_ppm", [-5000.0, 5000.0])
-def test_a_converter_with_a_wrong_clock_is_followed(clock_ppm: float, home: Path) -> None:
+@pytest.mark.parametrize(("clock_ppm", "answer_s"), [(-5000.0, None), (5000.0, 0.03)])
+def test_a_converter_with_a_wrong_clock_is_followed(clock_ppm: float, answer_s: float | None, home: Path) -> None:
     """Paced by the computer's clock the loop was 100 ms behind after 20 s, and the accelerometer was accused."""
-    with driven(home, clock_ppm=clock_ppm) as (_, record, endpoint):
+    box, exciter = ({}, None) if answer_s is None else separate(answer_s)
+    with driven(home, exciter, clock_ppm=clock_ppm, **box) as (_, record, endpoint):
         time.sleep(2.0)
         begun = len(rows(record))
         time.sleep(12.0)
@@ -166,4 +180,7 @@ def test_a_converter_with_a_wrong_clock_is_followed(clock_ppm: float, home: Path
     ratio = held[:, 1] / held[:, 2]
     assert np.abs(held[:, 3]).max() < 0.01  # a slip reaches 0.022 m/s
     assert np.mean((ratio > 1.02) & (ratio < 1.5)) > 0.99
-    assert json.loads(seen.stdout)["state"] == "ACTIVE"
+    status = json.loads(seen.stdout)
+    assert status["state"] == "ACTIVE"
+    assert status["sample_rate_Hz"] == pytest.approx(20_000.0 * (1.0 + 1e-6 * clock_ppm), rel=1e-3)
+    assert answer_s is None or 0.9 * answer_s < 1e-9 * status["answer_ns"] < 2.0 * answer_s

@@ -56,7 +56,7 @@ CHECKS = (
     Check("reported", "report the vibration that the device executes, not the order", exciter.reported, _VIBRATION),
     Check(
         "answer-time",
-        "return the newest block; state `answer_s` of the adapter if the exciter is slow",
+        "return the newest block; state `slowest_answer_s` of the adapter if the exciter is slow",
         exciter.answer_time,
         _VIBRATION,
     ),

@@ -95,7 +95,7 @@ def facts_of(rig: DeviceRig, device: Device) -> Facts:
         frozenset(absent(rig.channels)),
         {name: (channel.lowest, channel.highest) for name, channel in rig.channels.items()},
         0 if device.pace == "caller" else 1,
-        device.answer_s,
+        device.slowest_answer_s,
         rig.exciter.watchdog_s,
         rig.exciter.enable_line,
     )

@@ -1,5 +1,6 @@
 """Export: every value of a log comes back from every format."""
 
+import json
 import resource
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,8 @@ from bridge.tables.export import export
 from bridge.tables.readers import read_table
 from bridge.wire.channels import CHANNELS
 from cockpit.commands.log import log_app
-from tests.logs import short_log
+from tests.logs import short_log, tables_of, write
+from tests.unit.bridge.rig.boxes import rig_file, table
 
 ALL = list(STREAMING)
 
@@ -69,6 +71,29 @@ def test_every_value_comes_back(log: Path, tmp_path: Path, suffix: str) -> None:
     assert shares[-1] <= 1.0
     assert not list(tmp_path.glob("*.part"))
     assert not list(tmp_path.glob("*.columns"))
+
+
+def test_values_in_units_of_the_device_are_exported_by_the_calibration_in_the_header(log: Path, tmp_path: Path) -> None:
+    run = read_run(log)
+    channels = table()["channels"] | {
+        "drive_force_N": {"source": 3, "scale": 50.0, "sign": -1, "offset": 2.0},
+        "mass_position_m": {"derive": "drive_position_m"},
+    }
+    plant = {"rig": rig_file(channels=channels).header()}
+    run.headers["plant"]["configuration"] = json.dumps(plant)
+    write(tmp_path / "real.mcap", tables_of(run), run)
+    export(tmp_path / "real.mcap", tmp_path / "raw.parquet", ["sensors"], raw=True)
+    exported = pyarrow.parquet.read_table(tmp_path / "raw.parquet")
+    volts = exported.column("raw_drive_force").to_numpy()
+    assert np.array_equal((2.0 - 50.0 * volts).astype(np.float32), run.sensors["drive_force_N"].ravel())
+    assert [name for name in exported.column_names if name.startswith("raw_")] == [
+        "raw_drive_force",
+        "raw_mass_accel",
+        "raw_base_accel",
+        "raw_drive_position",
+    ]
+    with pytest.raises(Fault, match="--raw: the header of the log has no calibration"):
+        export(log, tmp_path / "none.parquet", ["sensors"], raw=True)
 
 
 def test_units_are_exported(log: Path, tmp_path: Path) -> None:

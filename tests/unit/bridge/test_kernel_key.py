@@ -32,7 +32,7 @@ def project(tmp_path: Path) -> Path:
         "plant/effects/rigs/four.py": "LANES = 4\n",
         "plant/node.py": "from plant.core import advance\n",
         "bridge/units.py": "",
-        "cockpit/app.py": "from plant.node import PlantNode\n",
+        "cockpit/app.py": "from plant.rig.node import PlantNode\n",
     }
     for name, text in sources.items():
         path = tmp_path / name

@@ -314,6 +314,21 @@ def test_a_doubted_force_counts_no_slips(run: RunData, tmp_path: Path, reason: i
     assert verdict.after.slips == slips
 
 
+def test_the_measured_rate_and_the_answer_of_the_exciter_are_listed(run: RunData) -> None:
+    assert verdict_of(run).sample_rate is None
+    applied = run.applied.copy()
+    applied["sample_rate_Hz"][-100:] = 20_100.0
+    applied["commands"], applied["round_trip_ns"], applied["answer_ns"] = 1, 31_000_000, 30_000_000
+    verdict = verdict_of(run._replace(applied=applied))
+    assert verdict.sample_rate == (20_100.0, pytest.approx(20_000.0))
+    assert verdict.latency is not None
+    assert verdict.latency.answer_p50_us == pytest.approx(30_000.0, rel=3e-3)
+    lines = in_words(verdict, verbose=True)
+    assert "rate     20100.0 samples a second, measured: 1.00500 times the stated 20000" in lines
+    (latency,) = (line for line in lines if line.startswith("latency "))
+    assert "of it the exciter's answer p50 29934 us" in latency
+
+
 def test_the_highest_set_point_is_named_with_the_ratio(run: RunData) -> None:
     """A ratio of "1.11 to 3.18 ... (ok)" alone hides that the controller raised its set point."""
     trace = tables_of(run)["trace"]

@@ -53,7 +53,7 @@ def boxed(folder: Path, **config: Any) -> Generator[int]:
     assert process.stderr is not None
     try:
         for line in process.stderr:
-            if found := re.search(r" at [\d.]+:(\d+)$", line.strip()):
+            if found := re.search(r"^box .* at [\d.]+:(\d+)$", line.strip()):
                 yield int(found[1])
                 break
         else:

@@ -25,10 +25,14 @@ class Sampler(Device):
     def __init__(self, change: Change, rate: float = 1.0) -> None:
         super().__init__(Setup({}, Path(), 20_000.0, 20, 5, has_enable_line=False))
         self.now_s, self.lost, self.dropped, self.failure = 0.0, 0, "", ""
-        self.gap_s = 0.0
+        self.gap_s = self.answer = 0.0
         self.amplitudes: set[float] = set()
         self._change, self._rate, self._blocks = change, rate, 0
         self._random = np.random.default_rng(1)
+
+    @property
+    def answer_s(self) -> float:
+        return self.answer
 
     def open(self) -> None: ...
 
@@ -82,6 +86,38 @@ def set_row(row: int, values: Any) -> Change:
         samples[row] = values(samples[row], t_s) if callable(values) else values
 
     return change
+
+
+@pytest.mark.parametrize(
+    ("watchdog_s", "stated_s", "answer_s", "problems", "warnings"),
+    [
+        (0.1, 0.0, 0.03, [], []),
+        (0.1, 0.0, 0.06, ["it answers in 60 ms, so that a burst of 100 ms ends early"], []),
+        (0.0, 0.1, 0.0, [], []),
+        (0.0, 0.0, 0.0, [], ["it has no burst and no watchdog: a killed process leaves it on"]),
+    ],
+)
+def test_an_exciter_that_does_not_rest_by_itself_is_a_warning(
+    checked: Callable[..., RigCheck],
+    watchdog_s: float,
+    stated_s: float,
+    answer_s: float,
+    problems: list[str],
+    warnings: list[str],
+) -> None:
+    rig = rig_file(exciter={"watchdog_s": stated_s})
+    result = checked(rig=rig, watchdog_s=watchdog_s, answer=answer_s)
+    assert [problem.text for problem in result.problems] == problems
+    assert [warning.text for warning in result.warnings] == warnings
+    assert result.ok is not bool(problems)
+
+
+def test_a_derived_channel_is_checked_like_a_measured_one(checked: Callable[..., RigCheck]) -> None:
+    channels = table()["channels"] | {"drive_force_N": {"derive": "2 * base_accel_mps2 + 5"}}
+    result = checked(rig=rig_file(channels=channels))
+    assert result.problems == []
+    assert result.channels[0].mean == pytest.approx(5.0, abs=0.01)
+    assert result.channels[0].noise == pytest.approx(2.0 * result.channels[2].noise)
 
 
 def test_a_sound_rig_has_no_problem(checked: Callable[..., RigCheck]) -> None:

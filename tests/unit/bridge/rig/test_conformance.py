@@ -297,7 +297,7 @@ class Called(Right):
 class Slow(Right):
     """Its generator takes 30 ms for a line, and executes the newest."""
 
-    answer_s = 0.06
+    slowest_answer_s = 0.06
 
     def open(self) -> None:
         super().open()

@@ -8,6 +8,7 @@ import pytest
 
 from bridge.config import read_toml, validate
 from bridge.faults import Fault
+from bridge.rig.adapters.scpi import DIALECTS
 from bridge.rig.file import DeviceRig
 from bridge.rig.load import device_of
 from bridge.rig.real import notes, open_node
@@ -36,8 +37,28 @@ def channels(**changed: Any) -> dict[str, Any]:
             {"channels": channels(mass_accel_mps2=None)},
             "channels.mass_accel_mps2: missing; give its source, or absent = true",
         ),
-        ({"channels": channels(mass_accel_mps2={})}, "channels.mass_accel_mps2: source, absent: neither given"),
-        ({"channels": channels(mass_accel_mps2={"source": 1, "absent": True})}, "source, absent: both given"),
+        ({"channels": channels(mass_accel_mps2={})}, "channels.mass_accel_mps2: source, derive, absent: none given"),
+        ({"channels": channels(mass_accel_mps2={"source": 1, "absent": True})}, "source and absent given: must be one"),
+        ({"channels": channels(drive_force_N={"source": 1, "derive": "1"})}, "source and derive given: must be one of"),
+        (
+            {"channels": channels(drive_force_N={"derive": "1", "scale": 2.0})},
+            "scale: a derived channel is in SI units",
+        ),
+        (
+            {"channels": channels(drive_force_N={"derive": "k * (a"})},
+            r"drive_force_N: derive: character 7 of 'k \* \(a': must be an operator or \), not its end",
+        ),
+        (
+            {"channels": channels(drive_force_N={"derive": "k_d * mass_position_m"})},
+            r"channels\.drive_force_N\.derive = 'k_d \* mass_position_m': k_d: no measured channel and no number; known: mass",
+        ),
+        (
+            {"channels": channels(drive_position_m={"derive": "mass_position_m"})},
+            "this channel must be measured: no other channel shows v_d",
+        ),
+        ({"numbers": {"mass_position_m": 1.0}}, r"numbers\.mass_position_m: must be a name of"),
+        ({"exciter": {"device": {"burst_s": 1.0}}}, "exciter: device: settings without an adapter; give adapter"),
+        ({"numbers": {"k d": 1.0}}, r"numbers\.k d: must be a name of"),
         ({"channels": channels(force={"source": 0})}, "force: no such channel; known: drive_force_N"),
         (
             {"channels": channels(drive_position_m={"absent": True})},
@@ -74,7 +95,7 @@ def test_an_adapter_is_a_file_next_to_the_rig_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "name", "line"),
     [
-        ("", "scope", "adapter = 'scope': no such adapter; known: stream; or give a file"),
+        ("", "scope", "adapter = 'scope': no such adapter; known: scpi, stream; or give a file"),
         ("import no_such_driver", "./mine.py", "needs the package no_such_driver; install it"),
         ("class Adapter: ...", "./mine.py", "must have a class Adapter that derives from"),
         ("class Adapter(", "./mine.py", "cannot be read: '\\(' was never closed"),
@@ -85,6 +106,20 @@ def test_an_adapter_that_cannot_be_used_is_one_line(text: str, name: str, line: 
     (tmp_path / "mine.py").write_text(text)
     with pytest.raises(Fault, match=line):
         device_of(rig_file(adapter=name), tmp_path)
+
+
+def test_a_separate_exciter_has_an_adapter_and_settings_of_its_own(tmp_path: Path) -> None:
+    settings = {"address": "127.0.0.1:1", "dialect": "siglent-sdg", "burst_s": 0.05}
+    exciter = {"adapter": "scpi", "device": settings, "stroke_m_per_V": 1e-8}
+    rig = rig_file(device={"address": "127.0.0.1:1"}, exciter=exciter)
+    assert device_of(rig, tmp_path).watchdog_s == 0.05
+    assert "device" not in rig.header()["exciter"]
+    with pytest.raises(
+        Fault, match=r"exciter\.adapter = 'stream': must have a class Adapter that derives from .*Exciter"
+    ):
+        device_of(rig_file(device={"address": "127.0.0.1:1"}, exciter=exciter | {"adapter": "stream"}), tmp_path)
+    with pytest.raises(Fault, match=r"box: 127\.0\.0\.1:1: Connection refused"):
+        open_node(rig, tmp_path, 1)
 
 
 def test_a_device_that_cannot_be_opened_is_an_error_and_never_a_simulation(tmp_path: Path) -> None:
@@ -101,6 +136,14 @@ def test_lost_protection_is_noted_for_lines_and_watchdogs() -> None:
     ]
     whole = rig_file(exciter={"enable_line": True, "watchdog_s": 0.1})
     assert [code for code, _ in notes(whole) if code == "UNPROTECTED"] == []
+
+
+def test_the_lost_protection_of_a_derived_channel_is_noted() -> None:
+    derived = channels(drive_force_N={"derive": "3 * mass_position_m"})
+    assert any(
+        code == "UNPROTECTED" and text.startswith("drive_force_N is derived, so that it contradicts no other channel")
+        for code, text in notes(rig_file(channels=derived))
+    )
 
 
 def test_the_header_holds_blocks_calibration_and_limits() -> None:
@@ -121,6 +164,19 @@ def test_a_rig_file_is_plain_toml(tmp_path: Path) -> None:
 
 def test_the_rig_file_of_the_guide_is_valid() -> None:
     guide = (Path(__file__).parents[4] / "docs/guides/connect-a-rig.md").read_text(encoding="utf-8")
-    rig = validate(DeviceRig, tomllib.loads(guide.partition("```toml\n")[2].partition("```")[0]), "guide")
+    first, derived, generator, lines = (
+        tomllib.loads(part.partition("```")[0]) for part in guide.split("```toml\n")[1:]
+    )
+    rig = validate(DeviceRig, first, "guide")
     assert rig.channels["drive_position_m"].sign == -1
     assert device_of(rig, Path()).setup.channels == 4
+    rig = validate(DeviceRig, first | derived | {"channels": first["channels"] | derived["channels"]}, "guide")
+    assert list(rig.derived) == ["drive_force_N"]
+    of_generator = generator["exciter"]
+    rig = validate(DeviceRig, first | {"exciter": of_generator}, "guide")
+    assert device_of(rig, Path()).watchdog_s == 0.1
+    assert {key: DIALECTS["agilent-33500"][key] for key in ("set", "burst", "rest", "least_V")}.items() <= lines.items()
+    rig = validate(
+        DeviceRig, first | {"exciter": of_generator | {"device": lines | {"address": "127.0.0.1:5025"}}}, "guide"
+    )
+    assert device_of(rig, Path()).watchdog_s == 0.1

@@ -9,6 +9,7 @@ import pytest
 from bridge.guard.absent import absent
 from bridge.guard.records import ExciterLimits, build
 from bridge.guard.states import ARM
+from bridge.rig.derived import Derived
 from bridge.rig.device import Device, DeviceBlock, DeviceError, Setup
 from bridge.rig.faults.schedule import Faults
 from bridge.rig.faults.table import FaultTable
@@ -79,10 +80,11 @@ class Rig:
 
     def __init__(self, device: Bench, arm: bool = True, faults: tuple[FaultTable, ...] = (), **more: Any) -> None:
         rig = rig_file(**more)
-        guard = build(rig.guard, ExciterLimits.of(rig.exciter, STEP_S, 20), 1, arm, absent(rig.channels))
+        guard = build(rig.guard, ExciterLimits.of(rig.exciter, STEP_S, 20), 1, arm, absent(rig.channels), rig.derived)
         schedule = Faults(faults, 1, STEP_S, 20)
         self.device = device
-        self.node = DeviceNode(device, guard, schedule, calibration(rig), rig.exciter.stroke_m_per_V or 1.0)
+        stroke_m = rig.exciter.stroke_m_per_V or 1.0
+        self.node = DeviceNode(device, guard, schedule, calibration(rig), stroke_m, Derived(rig))
         self.sensors: list[Any] = []
         self.problems: list[str] = []
         self.applied_m: list[float] = []
@@ -237,6 +239,24 @@ def test_channels_are_wired_and_calibrated_and_the_exciter_takes_volts(device: B
     assert rig.applied_m[-1] == pytest.approx(3e-8)
 
 
+def test_a_channel_is_derived_from_calibrated_ones_and_never_froze(device: Bench) -> None:
+    channels = table()["channels"] | {
+        "drive_force_N": {"derive": "k_d * (drive_position_m - mass_position_m)"},
+        "mass_position_m": {"source": 3, "scale": 2.0, "offset": 1e-3},
+    }
+    rig = Rig(device, arm=False, channels=channels, numbers={"k_d": 1e4})
+    read, row = device.read, np.arange(5)[:, None]
+    device.read = lambda: (block := read()) and block._replace(samples=np.where(row > 2, 1e-3, block.samples))
+    rig.node.apply_order(ARM)
+    rig.run(2)
+    assert rig.sensors[-1].drive_force_N == pytest.approx(1e4 * (1e-3 - 3e-3))
+    rig.run(1000)  # at standstill both positions repeat their numbers, and so does the force
+    assert rig.node.applied.guard_state == wire.CHECKING
+    device.read = lambda: (block := read()) and block._replace(samples=np.where(row == 4, np.nan, block.samples))
+    rig.run(1)
+    assert np.isnan(rig.sensors[-1].drive_force_N).all()
+
+
 def test_without_an_enable_line_no_tone_is_ordered_while_it_would_be_off(device: Bench) -> None:
     rig = Rig(device, arm=False)
     rig.node.apply_order(ARM)
@@ -275,3 +295,29 @@ def test_the_rate_of_a_device_is_measured_once(device: Bench, late_s: float, cod
     measured = [problem for problem in node.problems() if problem[0] != "SAMPLES_LOST"]
     assert [problem[0] for problem in measured] == [code]
     assert text in measured[0][1]
+    node.advance([])  # ends a step later
+    since_s = late_s + 1.0 + STEP_S
+    assert float(node.applied.sample_rate_Hz) == pytest.approx(20.0 * 11_001 / since_s)
+
+
+def test_latency_counts_from_the_end_of_the_block_to_the_answer_of_the_exciter(device: Bench) -> None:
+    rig = Rig(device)
+    rig.run(3)
+    assert int(rig.node.applied.round_trip_ns) == int(rig.node.applied.answer_ns) == 0  # a bench without a delay
+    read, write = device.read, device.write
+
+    def slow(frequency_Hz: float, amplitude: float) -> None:
+        device.now_s += 3e-4
+        write(frequency_Hz, amplitude)
+
+    device.write = slow
+    rig.run(1)
+    assert int(rig.node.applied.round_trip_ns) == pytest.approx(3e5, abs=1.0)
+    assert int(rig.node.applied.answer_ns) == pytest.approx(3e5, abs=1.0)
+    assert int(rig.node.applied.commands_late) == 0
+    device.read = lambda: (block := read()) and block._replace(waiting=2)
+    rig.run(2)  # a command for a block that two others follow acts 2 ms later
+    assert int(rig.node.applied.round_trip_ns) == pytest.approx(2.3e6, abs=1.0)
+    assert int(rig.node.applied.answer_ns) == pytest.approx(3e5, abs=1.0)
+    assert int(rig.node.applied.commands_late) == 1
+    assert int(rig.node.applied.late_ns) == 2_000_000

@@ -10,6 +10,7 @@ from bridge.wire.messages import APPLIED, TRACE, sensor_block
 from bridge.wire.topics import SENSORS
 from cockpit.figures.signals import PANELS
 from cockpit.live.buckets import COLUMNS
+from cockpit.live.frame_words import frame_lines
 from cockpit.live.server import frame
 from cockpit.live.view import View
 from tests.unit.cockpit.live.made import BLOCK_NS, GONE, Rig, column, table_of_frame
@@ -187,6 +188,16 @@ def test_latency_is_counted_in_bars(rig: Rig, view: View) -> None:
     assert len(latency["edges_us"]) == len(latency["counts"]) + 1
     assert view.run.tally.latency_us.quantile(0.5) == pytest.approx(100.0, rel=0.005)
     assert view.now()["lost"]["late"] == 1
+
+
+def test_the_measured_rate_and_the_answer_of_the_exciter_are_shown(rig: Rig, view: View) -> None:
+    for number in range(20):
+        rig.block(number)
+        rig.applied(number, sample_rate_Hz=19_990.1, answer_ns=30_000_000)
+    view.step()
+    lines = "\n".join(frame_lines(view.now(), []))
+    assert "samples  19990.1 a second, measured" in lines
+    assert "the exciter answers in 30000 us" in lines
 
 
 def test_a_frame_is_json_and_columns() -> None:
