@@ -1,8 +1,8 @@
 """A simulated device in another process, for tests of the adapters: the plant's physics behind a TCP port, with frames of
 `stream`.
 
-It shares no code with the adapters. Its exciter may have a generator with command lines (`plant.rig.generator`) at another port. Its
-clock may be wrong, it has a dead man, and it records its true vibration.
+It shares no code with the adapters. Its exciter may be a generator with command lines (`plant.rig.generator`) at another
+port. Its clock may be wrong, it has a dead man, and it records its true vibration.
 """
 
 import contextlib

@@ -18,6 +18,7 @@ BLOCK_S = 2e-3
 CHECKED_S, SETTLED_S, HELD_S = 1.8, 2.0, 1.0  # of the loop check, of the controller, of the judged time
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_the_loop_holds_behind_a_generator_that_takes_30_ms_a_line(tmp_path: Path) -> None:
     record = tmp_path / "truth.csv"

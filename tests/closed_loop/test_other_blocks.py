@@ -23,6 +23,7 @@ from tests.unit.bridge.rig.boxes import table, toml
 RATE_HZ = 51_200.0
 
 
+@pytest.mark.nightly
 def test_a_rig_of_51_2_kHz_is_controlled_by_its_rig_file_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     samples = 64
     block_s = samples / RATE_HZ

@@ -13,7 +13,7 @@ from bridge.faults import Fault
 from bridge.rig.adapters import scpi
 from bridge.rig.adapters.scpi import DIALECTS, Adapter
 from bridge.rig.device import DeviceError, Setup
-from plant import generator as simulated
+from plant.rig import generator as simulated
 from plant.rig.generator import GeneratorConfig
 from tests.patience import PATIENCE_S
 
