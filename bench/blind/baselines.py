@@ -22,10 +22,10 @@ def lowest_bic(case: Opened) -> Opened:
 
     It never answers `unexplained`. A candidate that was not refitted does not take part.
     """
-    features = case.said.get("compared_features") or 0
+    features = case.diagnosis.get("compared_features") or 0
     values = {
         candidate["effect"]: candidate["chi2"] + len(candidate.get("parameters", {})) * math.log(features)
-        for candidate in case.said["candidates"]
+        for candidate in case.diagnosis["candidates"]
         if candidate.get("chi2") is not None and features > 0
     }
     if not values:
@@ -54,13 +54,13 @@ def told(case: Opened, shrinkage: float | None) -> Opened:
 
 
 def _gap_or_none(case: Opened, closes: str) -> Opened:
-    retuned = case.said["gap"].get("retuned")
+    retuned = case.diagnosis["gap"].get("retuned")
     gap = retuned is not None and retuned > _NO_GAP
     return _saying(case, {"unexplained" if gap else "none": 1.0}, _closed(case, closes))
 
 
 def _closed(case: Opened, who: str) -> Said | None:
-    return next((method for method in case.said["gap"].get("compared", []) if method["who"] == who), None)
+    return next((method for method in case.diagnosis["gap"].get("compared", []) if method["who"] == who), None)
 
 
 def _saying(case: Opened, probabilities: dict[str, float], closed: Said | None) -> Opened:

@@ -26,7 +26,7 @@ def true_cells(case: Opened) -> set[Cell]:
 
 def said_cells(case: Opened) -> set[Cell]:
     """The cells in which the result reports the gap."""
-    return {cell for cell, share in shares(case.said["where"]).items() if share >= LEAST_SHARE}
+    return {cell for cell, share in shares(case.diagnosis["where"]).items() if share >= LEAST_SHARE}
 
 
 def shares(where: Sequence[Mapping[str, Any]]) -> Counter[Cell]:

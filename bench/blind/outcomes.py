@@ -18,11 +18,11 @@ _NOTHING_SAID: dict[str, Any] = {
 
 
 class Opened(NamedTuple):
-    """Answer and result of one case; `said` has some or all keys of a diagnosis, with `unexplained` among the candidates."""
+    """Answer and result of one case; `diagnosis` has some or all keys of a diagnosis, with `unexplained` among the candidates."""
 
     name: str
     answer: dict[str, Any]
-    said: dict[str, Any]
+    diagnosis: dict[str, Any]
 
     @property
     def stratum(self) -> str:
@@ -51,26 +51,26 @@ class Opened(NamedTuple):
     @property
     def verdict(self) -> str:
         """The verdict of the result, or `fault`."""
-        return self.said["verdict"]
+        return self.diagnosis["verdict"]
 
     @property
     def told_outside(self) -> bool:
         """Whether the result reports that no known effect accounts for most of the gap."""
         if self.verdict != "partly":
             return self.verdict == "unexplained"
-        share = self.said["gap"].get("shrinkage")
+        share = self.diagnosis["gap"].get("shrinkage")
         return share is None or share < _MOST
 
     @property
     def named(self) -> frozenset[str]:
         """Effects that the result names."""
-        return frozenset(self.said["effects"])
+        return frozenset(self.diagnosis["effects"])
 
     @property
     def group(self) -> frozenset[str]:
         """The named effects, and all effects that the result cannot separate from one of them."""
         names = set(self.named)
-        for alike in self.said["not_distinguishable"]:
+        for alike in self.diagnosis["not_distinguishable"]:
             if self.named & set(alike):
                 names |= set(alike)
         return frozenset(names)
@@ -78,7 +78,7 @@ class Opened(NamedTuple):
     @property
     def ranked(self) -> list[tuple[str, float]]:
         """Candidates and their probabilities, the largest probability first."""
-        candidates = [(row["effect"], float(row["probability"] or 0.0)) for row in self.said["candidates"]]
+        candidates = [(row["effect"], float(row["probability"] or 0.0)) for row in self.diagnosis["candidates"]]
         return sorted(candidates, key=lambda pair: -pair[1])
 
     def probability(self, name: str) -> float:
@@ -103,8 +103,8 @@ class Opened(NamedTuple):
             "named": sorted(self.named),
             "group": sorted(self.group),
             "first": [{"effect": name, "probability": probability} for name, probability in self.ranked[:3]],
-            "shrinkage": self.said["gap"].get("shrinkage"),
-            "gap_left": self.said["gap"].get("with_effect"),
+            "shrinkage": self.diagnosis["gap"].get("shrinkage"),
+            "gap_left": self.diagnosis["gap"].get("with_effect"),
         }
 
 

@@ -67,7 +67,7 @@ def pooled(paths: Sequence[Path]) -> OpenedSet:
 
 def _row(opened_set: OpenedSet, case: Opened) -> dict[str, Any]:
     """A case as a readable row, with all inputs of its scores."""
-    row = case.row() | {"answer": case.answer, "said": _scored_of(case.said)}
+    row = case.row() | {"answer": case.answer, "said": _scored_of(case.diagnosis)}
     if opened_set.oracle is not None:
         row["oracle"] = opened_set.oracle.get(case.name)
     return row

@@ -89,8 +89,8 @@ def score(cases: Sequence[Opened], oracle: Oracle) -> Scores:
     pairs = judged(cases)
     named_one = [case for case in single if case.named]
     located = [f1(case) for case in (*single, *pair, *outside)]
-    shrunk = [value for case in (*single, *pair) if (value := case.said["gap"].get("shrinkage")) is not None]
-    seconds = [case.said["elapsed_s"] for case in cases if "elapsed_s" in case.said]
+    shrunk = [value for case in (*single, *pair) if (value := case.diagnosis["gap"].get("shrinkage")) is not None]
+    seconds = [case.diagnosis["elapsed_s"] for case in cases if "elapsed_s" in case.diagnosis]
     return Scores(
         cases=len(cases),
         faults=sum(case.verdict == "fault" for case in cases),
@@ -119,7 +119,7 @@ def score(cases: Sequence[Opened], oracle: Oracle) -> Scores:
         unclear=Unclear(
             rate([bool(case.truth & case.group) for case in unclear]),
             rate([len(case.group & set(case.answer["group"])) > 1 for case in unclear]),
-            rate([case.said["next_experiment"].get("gain") is not None for case in unclear]),
+            rate([case.diagnosis["next_experiment"].get("gain") is not None for case in unclear]),
         ),
         real_logs=of_singles([case for case in cases if case.stratum == "real-log"]),
         log_score=log_score(cases),
@@ -173,7 +173,7 @@ def _of_oracle(cases: Sequence[Opened], oracle: Oracle) -> Score | None:
     """Shrinkage of the named effects over shrinkage of the true effects; a result without a name counts as 0."""
     return ratio(
         [
-            (case.said["gap"].get("shrinkage") or 0.0, best)
+            (case.diagnosis["gap"].get("shrinkage") or 0.0, best)
             for case in cases
             if (best := oracle.get(case.name)) is not None and best > _LEAST_SHRINKAGE
         ]
@@ -187,7 +187,7 @@ def _coverage(cases: Sequence[Opened], oracle: Oracle) -> Score | None:
     """
     held: list[bool] = []
     for case in cases:
-        interval, best = case.said["gap"].get("interval_90"), oracle.get(case.name)
+        interval, best = case.diagnosis["gap"].get("interval_90"), oracle.get(case.name)
         if interval is not None and best is not None:
             held.append(interval[0] <= best <= interval[1])
     return rate(held)

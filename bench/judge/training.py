@@ -132,13 +132,13 @@ def _target(explained: Explained, effects: frozenset[str]) -> Floats:
 def _visible(example: Example) -> bool:
     """Whether the rig has no effect, or any witness shows one.
 
-    An effect below its detection limit is no effect to every witness, and `none` the right answer.
+    No witness can show an effect below its detection limit; then `none` is the right answer.
     """
     names, columns = explained_by(example.ledger)
-    own = max(
+    shown = max(
         (column[0] for effects, column in zip(names, columns, strict=True) if effects <= example.effects), default=0.0
     )
-    return not example.effects or own > _SEEN or columns[:, 0].max() > _MISLEADS
+    return not example.effects or shown > _SEEN or columns[:, 0].max() > _MISLEADS
 
 
 def _without_its_effect(example: Example, names: list[Names], values: Floats) -> Ledger | None:

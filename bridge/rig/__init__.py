@@ -10,6 +10,7 @@ derived  channels that its formulas derive from measured ones
 load     the device that it describes, by its adapter
 real     this device, opened, behind its guard
 check    the channels of a device with its exciter at rest
+conformance/  25 checks of an adapter with its device, or of a client on the bus
 adapters/  one file for each kind of device
 process  the loop on the bus: fade, latch, kept gain, missing commands, run number
 faults/  injected faults of sensors, clock and bus

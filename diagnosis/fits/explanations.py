@@ -24,7 +24,7 @@ Names = frozenset[str]
 # Starts that get two steps of a refit, of the rig as refitted and as described, and fits that go on to the end. Fewer: a right
 # effect is passed over, as a promise is rough. More: 0.3 s and 1 s of CPU each.
 _QUICK, _FULL, _FULL_PAIRS = (5, 4), 2, 1
-_SECOND = 4  # second effects on top of the best one that get two steps
+_SECOND = 4  # effects that get two steps on top of the best single effect
 _NEAR = 0.6  # of the remainder without effects: an effect that leaves more may win by a better valley of a jagged chi2
 # Pairs are tried where the best single effect leaves more than this many times a right explanation's remainder,
 _MUCH_LEFT = 1.3
@@ -62,8 +62,8 @@ class Search:
     def left(self) -> dict[Names, float]:
         """chi2 of every set of effects; by its start where it has no fit."""
         promised = {names: start.chi2 for names, start in self.promised.items()}
-        found = promised | {frozenset(fit.effects): fit.chi2 for fit in self.fits}
-        return {names: min(chi2, self.rig.fit.chi2) for names, chi2 in found.items()}  # an effect may have no size
+        known = promised | {frozenset(fit.effects): fit.chi2 for fit in self.fits}
+        return {names: min(chi2, self.rig.fit.chi2) for names, chi2 in known.items()}  # an effect may have no size
 
     def run(self, shown: Names, progress: Progress) -> None:
         """Predict every trial at two places, refit those that promise most, then pairs; effects that are `shown` as well."""
@@ -137,8 +137,8 @@ class Search:
             return screening.eased(*start, fitter.whitened(features, place.knee)[0])
 
         known = [tried for tried in place.moved if not set(tried[0].hypothesis.effects) & set(fit.effects)]
-        here = place.base if fit is place.fit else fitter.predicted(fit.deviations, fit.effects)
-        slope = fitter.whitened(here, place.knee)[1]
+        features = place.base if fit is place.fit else fitter.predicted(fit.deviations, fit.effects)
+        slope = fitter.whitened(features, place.knee)[1]
         promised = [screening.promised(trial, fitter.column(place.base, moved, slope)) for trial, moved in known]
         linear = best_of_each(sorted((start for start in promised if start), key=lambda start: start.chi2))
         points = [(start.deviations, start.hypothesis.tables(start.w)) for start in linear]
@@ -182,10 +182,10 @@ class Search:
                     number = LEVELS.get(axis.effect)
                     if axis.effect != name and number in nuisances.rig_names:  # the number can move instead
                         deviations[nuisances.rig_names.index(number)] += axis.value(w) / nuisances.tolerance[number]
-                own = [(axis, w) for axis, w in axes if axis.effect == name]
-                hypothesis = Hypothesis({name: form}, tuple(axis for axis, _ in own))
+                alone = [(axis, w) for axis, w in axes if axis.effect == name]
+                hypothesis = Hypothesis({name: form}, tuple(axis for axis, _ in alone))
                 deviations = np.clip(deviations, -self.rig.fitter.most, self.rig.fitter.most)
-                starts.append(Screened(hypothesis, deviations, np.array([w for _, w in own]), fit.chi2))
+                starts.append(Screened(hypothesis, deviations, np.array([w for _, w in alone]), fit.chi2))
         left = {frozenset(fit.effects): fit.chi2 for fit in singles}
         quick = each_beside(self._jobs, _quick, self.rig.fitter, starts)
         better = [fit for fit in quick if fit.chi2 < left.get(frozenset(fit.effects), math.inf)]

@@ -46,13 +46,13 @@ class Screening:
             change: of the whitened differences by the trial [compared].
 
         """
-        fit, own = self._fit, np.concatenate([self._fit.deviations, self._fit.w])
-        full = np.concatenate([change, np.zeros(len(own))])
+        fit, at = self._fit, np.concatenate([self._fit.deviations, self._fit.w])
+        full = np.concatenate([change, np.zeros(len(at))])
         direction = full - self._columns @ (self._inverse @ full)
         power = float(direction @ direction)
         if power < _LEAST_POWER:
             return None
-        rest = np.concatenate([fit.residual, -self._held * own])
+        rest = np.concatenate([fit.residual, -self._held * at])
         first = trial.hypothesis.coordinates[0]
         size = float(direction @ rest) / power
         size = min(max(size, 1.0 / _FURTHEST if first.logarithmic else -_FURTHEST), _FURTHEST)
@@ -77,11 +77,11 @@ class Screening:
 
         """
         count = len(deviations)
-        own, added = np.concatenate([deviations, w[: len(self._fit.w)]]), w[len(self._fit.w) :]
-        rest = np.concatenate([residual, -self._held * own])
-        moved = own + self._inverse @ rest
+        at, added = np.concatenate([deviations, w[: len(self._fit.w)]]), w[len(self._fit.w) :]
+        rest = np.concatenate([residual, -self._held * at])
+        moved = at + self._inverse @ rest
         moved[:count] = np.clip(moved[:count], -_FURTHEST_TOLERANCES, _FURTHEST_TOLERANCES)
-        left = rest - self._columns @ (moved - own)
-        held = prior_of(hypothesis, deviations)[len(own) :] * added
+        left = rest - self._columns @ (moved - at)
+        held = prior_of(hypothesis, deviations)[len(at) :] * added
         chi2 = float(left @ left + held @ held)
         return Screened(hypothesis, moved[:count], np.concatenate([moved[count:], added]), chi2)

@@ -13,7 +13,7 @@ from diagnosis.model.per_run import is_phase
 from diagnosis.model.rig import Effects
 from plant.effects.library import EFFECTS
 
-# An explanation that is no effect of the library: the described mass is wrong. Its probability is one of no effect.
+# The explanation that the described mass is wrong. The library has no such effect: its probability counts as no effect.
 MASS: Final = "mass"
 # Explanation -> number of the rig table that it changes. Both are one direction of the fit and share a derivative: with a
 # derivative for each, the number stays at its bound, the effect stays too small, and another effect is named.

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from diagnosis.fits.fit import Fit
-from diagnosis.fits.held_out import FAR_FOR_NO_GAP, MORE_THAN_RIGHT, HeldOut
+from diagnosis.fits.held_out import MORE_THAN_RIGHT, HeldOut
 from diagnosis.hypotheses.hypothesis import LEVELS, MASS, Hypothesis
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.judge.judge import Judged
@@ -50,7 +50,7 @@ def verdict_of(judged: Judged, model: Model, latent: tuple[str, ...]) -> tuple[K
         return "described", names
     least = {"unexplained": BEYOND, "no-gap": _FAR}.get(kind, math.inf)
     closing = {number.name for number in model.numbers if (number.share or 0.0) > _MOST and (number.off or 0.0) > least}
-    if closing and model.gap.retuned <= FAR_FOR_NO_GAP and not model.outside:
+    if closing and model.gap.retuned <= MORE_THAN_RIGHT and not model.outside:
         return "described", tuple(effect for effect, number in LEVELS.items() if number in closing and effect != MASS)
     if kind == "unexplained" and latent and not model.outside:
         return "partly", latent[:1]
@@ -62,7 +62,7 @@ def verdict_of(judged: Judged, model: Model, latent: tuple[str, ...]) -> tuple[K
 def _kind(judged: Judged, model: Model) -> Kind:
     complete = judged.complete >= _HALF
     if not judged.names:
-        return "no-gap" if complete and not model.gap.retuned > FAR_FOR_NO_GAP else "unexplained"
+        return "no-gap" if complete and not model.gap.retuned > MORE_THAN_RIGHT else "unexplained"
     if complete and model.fitted and not model.gap.with_effect > MORE_THAN_RIGHT:
         return "effect"
     # an explanation that predicts the held-out runs no better than the rig without effects explains nothing

@@ -122,7 +122,7 @@ def ranked(data: Reduced) -> Ranking:
         if differ:
             best.append(differ[int(evidences(data, differ).argmax())])
     return Ranking(
-        tuple(found_of(data, (i,)) for i in singles.values()), tuple(found_of(data, found) for found in best)
+        tuple(found_of(data, (i,)) for i in singles.values()), tuple(found_of(data, subset) for subset in best)
     )
 
 

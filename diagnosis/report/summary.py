@@ -55,7 +55,9 @@ def _sure(diagnosis: Diagnosis) -> Iterator[str]:
     by_number = diagnosis.verdict == "described" and not (known and known[0].effect in diagnosis.effects)
     if diagnosis.verdict == "described" and not by_number:
         yield ", ".join(shown[effect] for effect in diagnosis.effects)
-    if known and diagnosis.verdict == "unexplained":
+    if diagnosis.verdict == "unexplained" and diagnosis.gap.with_effect > MORE_THAN_RIGHT:
+        yield f"the held-out runs are {times(diagnosis.gap.with_effect)} noise floors off, more than a right answer leaves"
+    elif known and diagnosis.verdict == "unexplained":
         yield f"{percent(1.0 - diagnosis.complete)} that something outside the library acts"
     elif known:
         yield f"{percent(diagnosis.complete)} that nothing else acts"

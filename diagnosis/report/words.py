@@ -3,8 +3,7 @@
 import math
 from typing import Final
 
-from bridge.units import decimals_of, fixed_digits, interval, name_and_unit, percent, prefixed, quantity, times
-from diagnosis.fits.held_out import FAR_FOR_NO_GAP
+from bridge.units import decimals_of, fixed_digits, interval, name_and_unit, percent, prefixed, quantity
 from diagnosis.hypotheses.catalogue import CATALOGUE
 from diagnosis.latent.answer import MOST
 from diagnosis.latent.causes import NOISE, SCATTER
@@ -34,17 +33,9 @@ def headline(diagnosis: Diagnosis) -> str:
     return f"{diagnosis.verdict}: {answer(diagnosis)}"
 
 
-def is_undecided(diagnosis: Diagnosis) -> bool:
-    """Whether the fitted runs show no gap and the held-out runs do."""
-    gap = diagnosis.gap
-    return diagnosis.verdict == "no-gap" and bool(gap.files) and gap.retuned > FAR_FOR_NO_GAP
-
-
 def answer(diagnosis: Diagnosis) -> str:
     """The answer in one line, without the verdict."""
     if diagnosis.verdict == "no-gap":
-        if is_undecided(diagnosis):
-            return f"the fitted runs show no gap, but the held-out runs are {times(diagnosis.gap.retuned)} noise floors off"
         return "the described rig explains these runs within its tolerances"
     most = mostly(diagnosis)
     if diagnosis.verdict == "unexplained":

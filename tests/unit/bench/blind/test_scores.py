@@ -160,7 +160,7 @@ def test_places_are_compared_with_the_counterfactual():
 
 def test_baselines_answer_from_the_same_result():
     one = case("one-effect", ["drive-damping"], {"none": 1.0})
-    verdict_table = one.said | {
+    verdict_table = one.diagnosis | {
         "compared_features": 100,
         "candidates": [
             {"effect": "none", "probability": 1.0, "chi2": 60.0},
@@ -176,7 +176,7 @@ def test_baselines_answer_from_the_same_result():
             ],
         },
     }
-    one = one._replace(said=verdict_table)
+    one = one._replace(diagnosis=verdict_table)
     bic = baselines.lowest_bic(one)
     assert bic.named == {"drive-damping"}
     # 54.6 against 60 and 58.2
@@ -184,11 +184,11 @@ def test_baselines_answer_from_the_same_result():
         math.exp(-0.5 * (value - 50 - math.log(100))) for value in (60, 50 + math.log(100), 49 + 2 * math.log(100))
     ]
     assert bic.probability("none") == pytest.approx(weights[0] / sum(weights))
-    assert bic.said["gap"]["shrinkage"] == 0.7
+    assert bic.diagnosis["gap"]["shrinkage"] == 0.7
     assert baselines.parameters_only(one).verdict == "unexplained"
     answer = baselines.told(one, 0.75)
     assert (answer.named, answer.probability("drive-damping")) == ({"drive-damping"}, 1.0)
-    assert baselines.lowest_bic(one._replace(said=verdict_table | {"compared_features": 0})).verdict == "fault"
+    assert baselines.lowest_bic(one._replace(diagnosis=verdict_table | {"compared_features": 0})).verdict == "fault"
 
 
 def test_intervals():

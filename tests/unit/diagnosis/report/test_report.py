@@ -212,14 +212,19 @@ STIFFNESS = "drive stiffness 11.01 kN/m (90 %: 10.95 to 11.07), described 11.7 k
             "98 % that nothing else acts",
             "every other described",
         ),
-        ("unexplained", "no known effect accounts for it", "2 % that something outside the library acts", STIFFNESS),
-        ("no-gap", "the held-out runs are 5.9 noise floors off", "98 % that nothing else acts; leading", STIFFNESS),
+        (
+            "unexplained",
+            "no known effect accounts for it",
+            "the held-out runs are 5.9 noise floors off, more",
+            STIFFNESS,
+        ),
+        ("no-gap", "the described rig explains these runs", "98 % that nothing else acts; leading", STIFFNESS),
         ("not-finished", "the time ran out before any cause was tried", "nothing was judged", STIFFNESS),
     ],
 )
 def test_every_verdict_without_an_effect_has_its_words(verdict, answer, sure, numbers):
     made = made_up.diagnosis()
-    gap = made.gap._replace(shrinkage=None, interval_90=None)
+    gap = made.gap._replace(with_effect=5.9, shrinkage=None, interval_90=None)
     lines = by_label(made._replace(verdict=verdict, effects=(), gap=gap))
     assert answer in lines["answer"]
     assert lines["sure"].startswith(sure)
