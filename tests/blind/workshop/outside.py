@@ -41,8 +41,8 @@ OUTSIDE: dict[str, dict[str, Size]] = {
         "force_N": Size(0.25, 0.5, "F_s"), "every_s": Size(0.7, 1.7), "frequency_Hz": Size(15.0, 40.0),
         "decay_s": Size(0.04, 0.12),
     },
-    "force-cell-hysteresis": {"share": Size(0.6, 1.0), "half_N": Size(0.05, 0.12, "F_s")},
-    "exciter-dropouts": {"depth": Size(0.8, 1.0), "rate_Hz": Size(0.7, 1.5), "length_s": Size(0.1, 0.4)},
+    "force-cell-hysteresis": {"share": Size(0.6, 1.0), "half_N": Size(0.08, 0.18, "F_s")},
+    "exciter-dropouts": {"depth": Size(0.8, 1.0), "rate_Hz": Size(1.0, 2.2), "length_s": Size(0.1, 0.4)},
 }  # fmt: skip
 
 
