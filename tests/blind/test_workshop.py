@@ -48,11 +48,11 @@ def _busy(rig: Rig) -> Run:
     return Run(drive, ((2.0, 3.0, 3600.0, height_m), (3.0, 3.45, 2000.0, height_m)), 3.5, False, 30.0, 0.01, 0.5, 1.0)
 
 
-def _change(rig: Rig, one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> float:
+def _change(rig: Rig, run: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> float:
     """Largest rms difference of a signal, in drops of the force, lengths of a slip, or rms accelerations."""
     drop_N = rig.true["static_force_N"] - rig.true["coulomb_force_N"]
     scales = {"drive_force_N": drop_N, "mass_position_m": rig.units["slip"], "drive_position_m": rig.units["slip"]}
-    return max(float(np.sqrt(np.mean((one[k] - other[k]) ** 2)) / scales.get(k, other[k].std())) for k in SIGNALS)
+    return max(float(np.sqrt(np.mean((run[k] - other[k]) ** 2)) / scales.get(k, other[k].std())) for k in SIGNALS)
 
 
 @pytest.fixture(scope="module")

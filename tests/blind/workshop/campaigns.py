@@ -94,7 +94,7 @@ def _tones(kind: Kind, duration_s: float, random: np.random.Generator) -> tuple[
 
 
 def draw_campaign(kind: Kind, random: np.random.Generator) -> tuple[Run, ...]:
-    """Three to five runs: at least one that turns, one with vibration to fit, and one or two that are held out."""
+    """Three to five runs: at least one with a turn, one with vibration to fit, and one or two that are held out."""
     number = int(random.integers(3, 6))
     held_out = 2 if number == 5 else 1
     motions = [_turns, _steady, *(_MOTIONS[random.integers(len(_MOTIONS))] for _ in range(number - held_out - 2))]

@@ -17,7 +17,7 @@ _MAINS_HZ = 50.0
 
 
 def measure(rig: Rig, run: Run, effects: tuple[Drawn, ...], seed: list[int]) -> dict[str, np.ndarray]:
-    """Columns of a run with effects; `seed` is that of its noise and of its random events."""
+    """Columns of a run with effects; `seed` starts its noise and its random events."""
     present = [effect for effect in effects if effect.strength > 0.0]
     config = rig.config({e.name: of_library(e, rig, run.begun_s) for e in present if e.name in SIZES})
     others = {effect.name: effect.values(rig.units) for effect in present if effect.name not in SIZES}
@@ -63,7 +63,7 @@ def _simulate(rig: Rig, run: Run, params: Any, state: Any, actors: list[Actor]) 
     if not actors:
         run_blocks(params, state, drive_mps, frequency_Hz, amplitude_m, analogue, truth)
         return analogue
-    one, other = (np.empty((len(rows), samples)) for rows in (CHANNELS, TRUTH))
+    signals, hidden = (np.empty((len(rows), samples)) for rows in (CHANNELS, TRUTH))
     # views of one number each: an attribute of a record takes ten times as long, which would double the time of a run
     x, v, s_d, drive_N = (state[name] for name in ("x", "v", "s_d", "drive_N"))
     F_c, F_s = params["F_c"], params["F_s"]
@@ -85,9 +85,9 @@ def _simulate(rig: Rig, run: Run, params: Any, state: Any, actors: list[Actor]) 
         F_c[0], F_s[0] = now.level * nominal_N[0], now.level * nominal_N[1]
         speed_mps = now.drive_mps + (push_N[i + 1] - push_N[i]) / (k_d * length_s)
         run_blocks(
-            params, state, np.array([speed_mps]), frequency_Hz[i : i + 1], np.array([now.amplitude_m]), one, other
+            params, state, np.array([speed_mps]), frequency_Hz[i : i + 1], np.array([now.amplitude_m]), signals, hidden
         )
-        analogue[:, i * samples : (i + 1) * samples] = one
+        analogue[:, i * samples : (i + 1) * samples] = signals
     push_N = np.interp(np.arange(blocks * samples) + 1.0, np.arange(blocks + 1) * samples, push_N)
     analogue[0] -= (1.0 + p.force_ratio) * push_N
     analogue[4] -= push_N / k_d

@@ -65,7 +65,7 @@ def _motor_droop(n: Numbers, F_s: float, _start_m: float, _random: np.random.Gen
 
 
 def _drive_hesitation(n: Numbers, _F_s: float, _start_m: float, random: np.random.Generator) -> Actor:
-    """A follower loses its set points for a moment, stands, and catches up at three times its speed."""
+    """A follower loses its set points for a moment, stops, and catches up at three times its speed."""
     begins_s = _instants_s(random, n["rate_Hz"])
     missing_m = 0.0
 
@@ -137,7 +137,7 @@ def _oil_film(n: Numbers, _F_s: float, _start_m: float, _random: np.random.Gener
 
 
 def _press_shocks(n: Numbers, _F_s: float, _start_m: float, random: np.random.Generator) -> Actor:
-    """A press beside the bench shakes the slide with every stroke."""
+    """A press near the bench shakes the slide with every stroke."""
     first_s = random.uniform(0.0, n["every_s"])
 
     def act(now: Moment) -> None:

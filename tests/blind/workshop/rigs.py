@@ -1,4 +1,4 @@
-"""Three kinds of rig: what their owner states, and what a rig really is."""
+"""Three kinds of rig: the numbers that their owner states, and the true ones."""
 
 import math
 from typing import Any, NamedTuple
@@ -13,7 +13,7 @@ _VARIETY = 0.15  # relative half range of mass, stiffness and friction between t
 
 
 class Kind(NamedTuple):
-    """A kind of rig; `numbers` are those of a manifest with their relative tolerances, other pairs the ends of a range."""
+    """A kind of rig; `numbers` as in a manifest, each with its relative tolerance; other pairs are the ends of a range."""
 
     name: str
     numbers: dict[str, tuple[float, float]]
