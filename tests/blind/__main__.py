@@ -21,6 +21,7 @@ class GeneratorName(StrEnum):
 
     independent = "independent"
     independent_2 = "independent-2"
+    workshop = "workshop"
     plant = "plant"
 
 

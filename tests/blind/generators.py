@@ -1,4 +1,4 @@
-"""The generators of rigs for a blind set: a generator that shares nothing with the plant, and the plant itself."""
+"""The generators of rigs for a blind set: `plant` and `workshop` simulate with the plant, the others share nothing with it."""
 
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -56,6 +56,10 @@ def generator(name: str) -> Generator:
         from tests.blind.plant_cases import Plant
 
         return Plant()
+    if name == "workshop":
+        from tests.blind.workshop import Workshop
+
+        return Workshop()
     from tests.blind.generator import OUTSIDE_2
     from tests.blind.independent_cases import Independent
 
