@@ -47,7 +47,7 @@ class Scenario(RunTables):
             if of_rig != of_controller:
                 raise ValueError(f"controller.{name} = {of_controller}: must equal rig.solver.{name} = {of_rig}")
         refuse_out_of_travel(self.rig, self.duration_s)
-        for table in self.fault:
+        for table in [*self.fault, *(table for mutant in self.must_fail for table in mutant.fault)]:
             if 0.0 < self.duration_s <= table.from_s:
                 line = f"fault: {table.in_words()}: from_s = {table.from_s:g}: must be before the end of the run"
                 raise ValueError(f"{line}, duration_s = {self.duration_s:g}; begin it earlier, or run longer")
