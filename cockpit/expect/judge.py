@@ -74,8 +74,7 @@ class _Judge:
         )
 
     def _shown(self, value: float) -> str:
-        unit = unit_of(self._table.signal)
-        return f"{value:.6g}" if unit == "1" else f"{value:.6g} {unit}"
+        return in_words(Limits(value, math.inf), unit_of(self._table.signal)).removeprefix("at least ")
 
     def _window(self) -> str:
         return f", in {self._from_s:g} to {self._to_s:g} s"

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from bridge.config import Strict
 from bridge.rig.faults.table import FaultTable
 from bridge.tables.unit_words import known_unit
-from bridge.units import unit_of
+from bridge.units import prefixed, unit_of
 from bridge.wire.event_codes import EVENTS
 from bridge.wire.words import words
 from cockpit.figures.signals import SIGNALS, WORD_SIGNALS
@@ -28,16 +28,20 @@ _NUMBER = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*")
 
 _Time = Annotated[float, Field(ge=0, le=1e9)]
 _Limit = float | str  # a number in the unit of the signal's name, or a text such as "80 nm"
-_Words = Annotated[
-    list[str], BeforeValidator(lambda given: [given] if isinstance(given, str) else given), Field(min_length=1)
-]
 
 
-def _count(given: Any) -> Any:
+def _several(given: Any) -> Any:
+    return [given] if isinstance(given, str) else given
+
+
+def _range(given: Any) -> Any:
     return (given, given) if isinstance(given, int) and not isinstance(given, bool) else given
 
 
-_Count = Annotated[tuple[int, int], BeforeValidator(_count), Field(strict=False)]
+_Words = Annotated[list[str], Field(min_length=1), BeforeValidator(_several, json_schema_input_type=str | list[str])]
+_Count = Annotated[
+    tuple[int, int], Field(strict=False), BeforeValidator(_range, json_schema_input_type=int | tuple[int, int])
+]
 _Pair = Annotated[tuple[_Limit, _Limit], Field(strict=False)]
 
 
@@ -204,12 +208,18 @@ class MutantTable(Strict):
 
 
 def in_words(limits: Limits, unit: str) -> str:
-    """Limits as text."""
-    unit = "" if unit == "1" else f" {unit}"
-    low, high = limits
-    if math.isinf(low):
-        return f"at most {high:.6g}{unit}"
-    return f"at least {low:.6g}{unit}" if math.isinf(high) else f"{low:.6g} to {high:.6g}{unit}"
+    """Limits as text, with a prefix for the larger one."""
+    unit = "" if unit == "1" else unit
+    factor, unit = prefixed(max(abs(limit) for limit in limits if math.isfinite(limit)), unit)
+    low, high = (f"{limit * factor:.6g}" for limit in limits)
+    words = (
+        f"at most {high}"
+        if math.isinf(limits.low)
+        else f"at least {low}"
+        if math.isinf(limits.high)
+        else f"{low} to {high}"
+    )
+    return f"{words} {unit}".rstrip()
 
 
 def _si(limit: _Limit, signal: str) -> float:

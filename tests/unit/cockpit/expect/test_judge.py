@@ -65,7 +65,7 @@ def test_a_healthy_run(run: RunData, table: dict[str, Any], result: str) -> None
 def test_a_failure_has_value_limit_and_time(run: RunData) -> None:
     low = changed(run, "applied", amplitude_m=lambda column: column.__setitem__(1499, 5e-9))
     found = of(low, **AMPLITUDE)
-    assert (found.result, found.value, found.limit) == (FAILED, pytest.approx(5e-9), "1.5e-08 to 3e-08 m")
+    assert (found.result, found.value, found.limit) == (FAILED, pytest.approx(5e-9), "15 to 30 nm")
     assert found.at_s == pytest.approx(1.5)
     assert "1 of 1500 samples, the first at 1.5000 s" in found.why
 
