@@ -180,8 +180,8 @@ class _Judge:
             return self._made(UNTESTED, f"the window holds no sample of {name}")
         meets: Bools = np.isin(values, allowed)
 
-        def at_of(found: Bools) -> tuple[str, float]:
-            at = int(np.argmax(found))
+        def at_of(rows: Bools) -> tuple[str, float]:
+            at = int(np.argmax(rows))
             return word_of(column, int(values[at])), float(t_s[at])
 
         if table.until_s is not None:
@@ -201,20 +201,23 @@ class _Judge:
         return self._passed(f"{word} and no other than allowed", word, at_s, samples)
 
     def _event(self, wanted: Sequence[str]) -> Expected:
-        found = [(at_s, word) for word in wanted for at_s in self._record.events.get(word, ())]
-        inside = sorted(row for row in found if self._from_s <= row[0] <= self._to_s)
+        times = [(at_s, word) for word in wanted for at_s in self._record.events.get(word, ())]
+        inside = sorted(row for row in times if self._from_s <= row[0] <= self._to_s)
         names = " or ".join(wanted)
         if self._table.never:
             if inside:
                 at_s, word = inside[0]
                 return self._made(FAILED, f"{word} at {at_s:.4f} s, {counted(len(inside), 'event')}", word, at_s)
-            return self._passed(f"no {names}", None, None, self._blocks())
+            blocks = self._blocks()
+            if blocks is None:
+                return self._made(UNTESTED, "the log holds no block of the guard")
+            return self._passed(f"no {names}", None, None, blocks)
         if inside:
             at_s, word = inside[0]
             why = f"{word} {at_s - self._from_s:.4f} s after {self._from_s:g} s, limit {self._table.within_s:g} s"
             return self._passed(why, word, at_s, None)
         gap = self._gap(blocks) if (blocks := self._blocks()) is not None else "the log holds no block"
-        late = next((row for row in sorted(found) if row[0] > self._to_s), None)
+        late = next((row for row in sorted(times) if row[0] > self._to_s), None)
         after = f"; the next {late[1]} is at {late[0]:.4f} s" if late is not None else ""
         return self._made(UNTESTED if gap else FAILED, gap or f"no {names}{after}", None, late[0] if late else None)
 

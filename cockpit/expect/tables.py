@@ -46,7 +46,7 @@ _Pair = Annotated[tuple[_Limit, _Limit], Field(strict=False)]
 
 
 class Limits(NamedTuple):
-    """Lower and upper limit of a signal in its SI unit; infinite where there is none."""
+    """Lower and upper limit of a signal in its SI unit; infinite without one."""
 
     low: float
     high: float
@@ -87,8 +87,8 @@ class ExpectTable(Strict):
     def _is_an_expectation(self) -> "ExpectTable":
         kinds = [name for name in _KINDS if getattr(self, name) not in ("", None)]
         if len(kinds) != 1:
-            found = " and ".join(kinds) or "nothing to judge"
-            raise ValueError(f"{found} given: must be one of {', '.join(_KINDS)}; make an [[expect]] of each")
+            keys = " and ".join(kinds) or "nothing to judge"
+            raise ValueError(f"{keys} given: must be one of {', '.join(_KINDS)}; make an [[expect]] of each")
         self._refuse_other_keys(kinds[0])
         self._refuse_window()
         if self.signal:
@@ -229,15 +229,15 @@ def _si(limit: _Limit, signal: str) -> float:
         return float(limit)
     match = _NUMBER.fullmatch(limit)
     given = known_unit(match[2]) if match is not None and match[2] else None
-    own = known_unit(unit) if unit != "1" else None
-    if match is None or given is None or own is None or given[0] != own[0]:
+    si_unit = known_unit(unit) if unit != "1" else None
+    if match is None or given is None or si_unit is None or given[0] != si_unit[0]:
         rule = (
             "must be a number, as it has no unit"
             if unit == "1"
             else f"must be a number, or a text in a unit like {unit}"
         )
         raise ValueError(f"limit {limit!r} of {signal}: {rule}; change the limit")
-    return float(match[1]) * given[1] / own[1]
+    return float(match[1]) * given[1] / si_unit[1]
 
 
 def _refuse_word(key: str, word: str, known: Sequence[str] | set[str] | dict[str, Any]) -> None:

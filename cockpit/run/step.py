@@ -39,9 +39,9 @@ class StepTable(Strict):
     def _is_one_change(self) -> "StepTable":
         given = [name for name in ("command", "settings", "speed_mps", "load") if getattr(self, name) not in (None, [])]
         if len(given) != 1:
-            found = " and ".join(given) or "no change"
+            keys = " and ".join(given) or "no change"
             raise ValueError(
-                f"{found} given: must be one of command, settings, speed_mps, load; make a [[step]] of each"
+                f"{keys} given: must be one of command, settings, speed_mps, load; make a [[step]] of each"
             )
         for setting in self.settings:
             if not setting.startswith(_CONTROLLER) or "=" not in setting:

@@ -55,8 +55,8 @@ class Suite(NamedTuple):
         if not self.mutants:
             lines.append(f"tests    {counted(len(self.tests), 'test')}: {counts}")
         else:
-            found = len(self.tests) - len(self.survivors)
-            lines.append(f"mutants  {found} of {counted(len(self.tests), 'defect')} made a test fail")
+            caught = len(self.tests) - len(self.survivors)
+            lines.append(f"mutants  {caught} of {counted(len(self.tests), 'defect')} made a test fail")
             lines += [f"MISSED   {line}" for line in self.survivors]
             lines += [f"UNTESTED {name}: no [[must_fail]] is in the scenario" for name in self.without_mutants]
         if self.others:

@@ -64,10 +64,10 @@ def test_a_healthy_run(run: RunData, table: dict[str, Any], result: str) -> None
 
 def test_a_failure_has_value_limit_and_time(run: RunData) -> None:
     low = changed(run, "applied", amplitude_m=lambda column: column.__setitem__(1499, 5e-9))
-    found = of(low, **AMPLITUDE)
-    assert (found.result, found.value, found.limit) == (FAILED, pytest.approx(5e-9), "15 to 30 nm")
-    assert found.at_s == pytest.approx(1.5)
-    assert "1 of 1500 samples, the first at 1.5000 s" in found.why
+    result = of(low, **AMPLITUDE)
+    assert (result.result, result.value, result.limit) == (FAILED, pytest.approx(5e-9), "15 to 30 nm")
+    assert result.at_s == pytest.approx(1.5)
+    assert "1 of 1500 samples, the first at 1.5000 s" in result.why
 
 
 @pytest.mark.parametrize("table", [AMPLITUDE, RATIO, {"slips": 0}, {"surges": 0}, {"event": "FROZEN", "never": True}])
@@ -108,7 +108,15 @@ def test_nan_never_passes(run: RunData) -> None:
     assert of(lost, **speed | {"within": ["0.6 mm/s", "0.7 mm/s"]}).result == FAILED
 
 
-@pytest.mark.parametrize(("topic", "table"), [("applied", AMPLITUDE), ("state", RATIO), ("trace", {"surges": 0})])
+@pytest.mark.parametrize(
+    ("topic", "table"),
+    [
+        ("applied", AMPLITUDE),
+        ("state", RATIO),
+        ("trace", {"surges": 0}),
+        ("applied", {"event": "FROZEN", "never": True, "in_charge": False}),
+    ],
+)
 def test_an_absent_signal_is_untested(run: RunData, topic: str, table: dict[str, Any]) -> None:
     absent = run._replace(**{topic: getattr(run, topic)[:0]})
     assert of(absent, **table).result == UNTESTED
