@@ -14,6 +14,7 @@ from bridge.log.storage.parts import parts_of
 from bridge.log.storage.verdict_file import verdict_path
 from bridge.plain import print_line
 from bridge.results import strict_json
+from bridge.units import counted
 from bridge.wire.session import rig_security
 from cockpit.run.child_process import left_on_ctrl_c, stop_event, warn_without_priority
 from cockpit.run.run_tables import LogTable
@@ -100,6 +101,10 @@ def run_scenario(
         rig_security(scenario.bus)  # called here so that its warning is visible and its fault precedes every start
     if endless and in_process:
         _refuse_full_disk(path)
+    if isinstance(scenario, Scenario) and scenario.expect:
+        print_line(
+            f"expect   `stickslip test {name}` judges the {counted(len(scenario.expect), 'expectation')}; a run does not"
+        )
     if endless:
         print_line(f"{'simulating' if in_process else 'running'} until Ctrl-C; log {path}")
     interrupted, by, made = False, "Ctrl-C", _InProcessRun(None, [], stopped=False)
