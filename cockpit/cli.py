@@ -105,6 +105,13 @@ _PANELS: dict[str, dict[str, tuple[str, ...]]] = {
         ),
     },
     "Proof": {
+        "test": (
+            "testing.run_tests",
+            "stickslip test",
+            "stickslip test tests/ --jobs 4 --junit results.xml",
+            "stickslip test limits.toml --log runs/old.mcap",
+            "stickslip test --mutants",
+        ),
         "fault": (
             "proof.fault",
             "stickslip fault --list",

@@ -88,6 +88,13 @@ def _keep(bandwidth_Hz: float, period_s: float) -> float:
     return math.exp(-2.0 * math.pi * bandwidth_Hz * period_s)
 
 
+def set_load(params: Records, config: RigConfig, ratio: float) -> None:
+    """Set both friction forces to `ratio` times the forces that `build` makes of `config`."""
+    at_start, _ = build(config)
+    for name in ("F_c", "F_s"):
+        params[name] = ratio * at_start[name]
+
+
 def build(config: RigConfig) -> tuple[Records, Records]:
     """Derive the parameters and the state at rest, spring unloaded, from a rig configuration."""
     params = record(PARAMS)

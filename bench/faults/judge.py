@@ -22,6 +22,7 @@ from bridge.wire.inbox import Received
 from bridge.wire.messages import TRACE as TRACE_LAYOUT
 from bridge.wire.payloads import sequence_and_time
 from bridge.wire.topics import SENSORS, TRACE
+from cockpit.expect.events import word_of
 from cockpit.faults.catalogue import CatalogueEntry
 from cockpit.run.in_process import TimedAction
 from cockpit.run.scenario import Scenario, load_scenario
@@ -218,21 +219,13 @@ class _Ear:
             self._next_block = max(self._next_block, number + 1)
         elif received.topic.message is wire.Event:
             event = wire.Event.FromString(received.payload)
-            word = _word(event)
+            word = word_of(event)
             if word not in _NOT_TOLD:
                 self._first.setdefault(word, after_s)
 
     def told(self) -> list[Told]:
         """Each event, cause or reason once, with the time of its first report, in this order."""
         return [Told(word, after_s) for word, after_s in self._first.items()]
-
-
-def _word(event: wire.Event) -> str:
-    """The code of an event, or the cause that the guard names: `BEFORE -> STATE: CAUSE: help` or `CAUSE: help`."""
-    parts = event.text.split(": ")
-    if event.code in {"GUARD", "FAULT"} and len(parts) > 1:
-        return parts[1]
-    return parts[0] if event.code == "HELD_BACK" else event.code
 
 
 def refused(case: CatalogueEntry, fault: Fault) -> Outcome:

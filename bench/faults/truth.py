@@ -1,13 +1,12 @@
 """A run in simulated time with the true motion of its rig, block by block."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.topics import OPERATOR, Outgoing
+from bridge.wire.topics import Outgoing
 from cockpit.run.in_process import TimedAction
 from cockpit.run.scenario import Scenario
 from cockpit.run.simulated.run import SimulatedRun
@@ -60,12 +59,7 @@ class TruthRun(SimulatedRun):
     def __init__(self, scenario: Scenario, words: Sequence[TimedAction]) -> None:
         SimulatedRun.__init__(self, scenario)
         self._truths: list[tuple[float, float, float, float]] = []
-        for order in words:
-            self._stage.cue(order.t_ns, lambda order=order: self._send(order))
-
-    def _send(self, order: TimedAction) -> None:
-        command = wire.Operator(action=cast(Any, order.action), who="the operator")
-        self._hub.put("cockpit", OPERATOR, command.SerializeToString())
+        self.command(words)
 
     def plant_node(self, **settings: Any) -> PlantNode:
         """The rig, which appends the truth of each block."""

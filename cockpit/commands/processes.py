@@ -105,12 +105,13 @@ def _simulated(
 ) -> int:
     """Serve a simulated rig; returns the number of blocks. Raises Fault."""
     from cockpit.run.run_tables import refuse_faults
-    from cockpit.run.scenario import header, refuse_short_blocks
+    from cockpit.run.scenario import header, refuse_short_blocks, refuse_steps
     from plant.rig.app import run as simulate
 
     if not lockstep:
         refuse_short_blocks(made)
     refuse_faults(made, lockstep)
+    refuse_steps(made)
     described = header(made, "plant", lockstep)
     return simulate(
         made.rig,

@@ -2,6 +2,7 @@
 
 scenario, scenario_file     the model of a run of a simulated rig; its files as tables
 run_tables, device_run      the tables that every run has; the model of a run of a real rig
+step                        a change during a run, table [[step]]
 sensor_needs                sensors that a scenario needs, checked before the run
 run                         one run from its scenario to its verdict
 in_process, closed_loop     in one process, without a bus; plant and controller in turns, compiled

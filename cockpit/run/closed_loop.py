@@ -20,7 +20,7 @@ from controller.records import build as controller_records
 from plant.config import RigConfig
 from plant.inputs import Inputs, InputsAhead, RigInputs
 from plant.piezo import base_velocity_mps, delivered_share
-from plant.records import TRUTH, guard_records
+from plant.records import TRUTH, guard_records, set_load
 from plant.records import build as plant_records
 from plant.step import act, report
 
@@ -145,6 +145,10 @@ class ClosedLoop:
     def reconfigure(self, config: ControllerConfig) -> None:
         """Continue with another configuration of the controller and its present memory."""
         self._controller = controller_records(config)[0], self.controller_state
+
+    def set_load(self, ratio: float) -> None:
+        """Set the normal load, in multiples of the load at the start, from the next block on."""
+        set_load(self._plant[0], self._rig, ratio)
 
     def apply_order(self, action: int) -> None:
         """Give the rig an operator command, a `wire.Operator.Action`, before its next block."""

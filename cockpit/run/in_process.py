@@ -24,6 +24,7 @@ from bridge.wire.topics import (
 )
 from cockpit.run.closed_loop import ClosedLoop, Stretch
 from cockpit.run.scenario import Scenario, header
+from cockpit.run.step import configurations, timed_settings
 from controller.node import operator_events
 from controller.replay import Change
 from controller.telemetry import SNAPSHOT_EVERY, STATE_EVERY, plotted, snapshot
@@ -62,7 +63,8 @@ def run_onboard(
 
     Args:
         progress: called after every stretch of blocks with the simulated time [s].
-        changes, words: changes of the controller's configuration and operator commands, in order of time.
+        changes, words: changes of the controller's configuration and operator commands, in order of time, in addition
+            to the steps of the scenario.
         stopped: called before every stretch of blocks; True ends the run as at its full duration.
         judge: receives every message when it is written; the log is not read back.
 
@@ -77,7 +79,10 @@ def run_onboard(
     publish("plant", 0, "START", "lockstep")
     for code, text in notes(scenario.rig):
         publish("plant", 0, code, text)
-    ahead, due = list(changes), list(words)
+    ahead = [*changes, *map(Change._make, configurations(scenario.controller, scenario.step))]
+    ahead.sort(key=lambda change: change.t_ns)
+    due = sorted([*words, *actions_of(scenario)], key=lambda action: action.t_ns)
+    loads = sorted((step.t_ns, step.load) for step in scenario.step if step.load is not None)
     try:
         # the log is compressed and written while the next stretch is computed
         with ThreadPoolExecutor(max_workers=1) as writer:
@@ -85,6 +90,8 @@ def run_onboard(
             while loop.block < blocks and not stopped():
                 while ahead and _first_step(loop, ahead[0].t_ns) <= loop.block:
                     loop.reconfigure(ahead.pop(0).config)
+                while loads and _first_step(loop, loads[0][0]) <= loop.block:
+                    loop.set_load(loads.pop(0)[1])
                 events = 0
                 while due and _first_step(loop, due[0].t_ns) <= loop.block:
                     _, action, to_rig, to_controller = due.pop(0)
@@ -94,7 +101,7 @@ def run_onboard(
                         events = operator_events(events, action)
                 # a change of the configuration or an operator command also ends a stretch
                 ends = [blocks, (loop.block // _STRETCH_BLOCKS + 1) * _STRETCH_BLOCKS]
-                ends += [_first_step(loop, part[0].t_ns) for part in (ahead, due) if part]
+                ends += [_first_step(loop, part[0][0]) for part in (ahead, due, loads) if part]
                 made = loop.advance(min(ends) - loop.block, events)
                 if written is not None:
                     written.result()
@@ -115,6 +122,12 @@ def run_onboard(
         log.close()
 
 
+def actions_of(scenario: Scenario) -> list[TimedAction]:
+    """The operator commands among the steps of a scenario, in order of time."""
+    steps = [step for step in scenario.step if step.command is not None]
+    return [TimedAction(step.t_ns, wire.Operator.Action.Value(step.command or "STOP")) for step in steps]
+
+
 def _end(publish: "_Events", loop: ClosedLoop) -> None:
     t_ns = loop.block * loop.block_ns
     publish("plant", t_ns, "END", f"blocks={loop.block}")
@@ -124,6 +137,8 @@ def _end(publish: "_Events", loop: ClosedLoop) -> None:
 def log_of(scenario: Scenario, path: Path, about: dict[str, Any]) -> RunLog:
     """A new log of a run in one process, with its metadata and headers."""
     log = RunLog(path, lockstep=True, rotation=scenario.log.rotation)
+    if settings := timed_settings(scenario.step):
+        about = about | {"settings": [*about.get("settings", []), *settings]}
     log.add_metadata("run", about)
     for role in ("controller", "plant"):
         log.add_header(header(scenario, role, lockstep=True))

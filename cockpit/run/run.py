@@ -14,10 +14,11 @@ from bridge.log.storage.parts import parts_of
 from bridge.log.storage.verdict_file import verdict_path
 from bridge.plain import print_line
 from bridge.results import strict_json
+from bridge.units import counted
 from bridge.wire.session import rig_security
 from cockpit.run.child_process import left_on_ctrl_c, stop_event, warn_without_priority
 from cockpit.run.run_tables import LogTable, refuse_faults
-from cockpit.run.scenario import Scenario, load_scenario, refuse_short_blocks
+from cockpit.run.scenario import Scenario, load_scenario, refuse_short_blocks, refuse_steps
 from cockpit.run.writable import LOG, check_output, stamp_of
 
 if TYPE_CHECKING:
@@ -93,12 +94,18 @@ def run_scenario(
         refuse_short_blocks(scenario)
     if lockstep or not in_process:
         refuse_faults(scenario, lockstep)
+        if isinstance(scenario, Scenario):
+            refuse_steps(scenario)
     if not (lockstep or in_process):
         warn_without_priority()
     if not in_process:
         rig_security(scenario.bus)  # called here so that its warning is visible and its fault precedes every start
     if endless and in_process:
         _refuse_full_disk(path)
+    if isinstance(scenario, Scenario) and scenario.expect:
+        print_line(
+            f"expect   `stickslip test {name}` judges the {counted(len(scenario.expect), 'expectation')}; a run does not"
+        )
     if endless:
         print_line(f"{'simulating' if in_process else 'running'} until Ctrl-C; log {path}")
     interrupted, by, made = False, "Ctrl-C", _InProcessRun(None, [], stopped=False)

@@ -115,7 +115,7 @@ def ranked(data: Reduced) -> Ranking:
     singles: dict[str, int] = {}
     for i in order:
         singles.setdefault(data.terms[i].cause, i)
-    best = [(order[0],)]
+    best: list[tuple[int, ...]] = [(order[0],)]
     leading = list(dict.fromkeys([*singles.values(), *order]))[:_TRIED_TOGETHER]
     for sets in (combinations(leading, 2), ((*best[-1], i) for i in order)):
         differ = [subset for subset in sets if len({data.terms[i].cause for i in subset}) == len(subset)]

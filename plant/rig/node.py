@@ -20,7 +20,7 @@ from bridge.wire.topics import ANNOUNCE, Outgoing
 from plant.config import RigConfig
 from plant.inputs import RigInputs
 from plant.piezo import base_velocity_mps
-from plant.records import TRUTH, build, guard_records
+from plant.records import TRUTH, build, guard_records, set_load
 from plant.rig.exciter_faults import ExciterFaults
 from plant.step import act, report
 
@@ -92,6 +92,10 @@ class PlantNode(GuardedNode):
         )  # fmt: skip
         if not math.isfinite(self.truth[_VELOCITY, -1]):  # NaN anywhere in the state reaches the velocity within a step
             raise no_number(self._config, self.block - 1)
+
+    def set_load(self, ratio: float) -> None:
+        """Set the normal load, in multiples of the configured one, from the next block on."""
+        set_load(self._params, self._config, ratio)
 
     def let_go(self) -> None:
         """Drop all commands in force or delayed and enter DISARMED: the vibration fades to zero at the exciter's rate."""

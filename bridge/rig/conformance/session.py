@@ -8,7 +8,7 @@ import math
 import threading
 import time
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -236,7 +236,7 @@ class DeviceSession:
     def _keep(self, stage: Stage, block: DeviceBlock) -> None:
         """Add a block to a stage, with a copy of its samples, as an adapter may use its array again."""
         session, rig = self.session, self._rig
-        samples = block.samples
+        samples = cast("object", block.samples)  # an adapter may return anything
         due = f"{rig.sources} channels or more x {session.facts.samples} samples of float64"
         if not isinstance(samples, np.ndarray) or samples.dtype != np.float64 or samples.ndim != 2:
             kind = (

@@ -165,6 +165,7 @@ _RESULTS = {
     "rig box": "cockpit.commands.rig:Boxed",
     "status": "cockpit.live.status:Status",
     "fault": "cockpit.faults.injection:Injected",
+    "test": "cockpit.testing.suite:Suite",
     "soak": "cockpit.run.soak:Soaked",
     "certs": "cockpit.run.authority:Made",
     "replay": "cockpit.run.replay:ReplayResult",

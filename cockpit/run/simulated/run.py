@@ -1,7 +1,7 @@
 """A scenario in simulated time, with its faults: the unchanged loops of plant and controller, and the log."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, cast
 
@@ -9,14 +9,17 @@ from bridge.faults import Fault
 from bridge.rig.faults.kinds import PROCESS
 from bridge.rig.faults.table import FaultTable
 from bridge.rig.process import GuardedRig
+from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.complaints import BAD_MESSAGE, Complaints
 from bridge.wire.inbox import WAITING, Received
 from bridge.wire.session import LEASE_S
-from bridge.wire.topics import SENSORS, TOPICS
-from cockpit.run.in_process import log_of
+from bridge.wire.topics import OPERATOR, SENSORS, TOPICS
+from cockpit.run.in_process import TimedAction, actions_of, log_of
 from cockpit.run.scenario import Scenario
 from cockpit.run.simulated.stage import Hub, Player, Receive, Session, Stage, WaitingInbox
+from cockpit.run.step import configurations
 from controller.app import ControllerProcess
+from controller.config import ControllerConfig
 from controller.node import ControllerNode
 from plant.rig.node import PlantNode
 
@@ -30,6 +33,7 @@ class SimulatedRun:
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
+        self._config = scenario.controller
         self._stage = Stage()
         self._hub = Hub(self._stage)
         self._stop = threading.Event()
@@ -39,6 +43,29 @@ class SimulatedRun:
         faults = [table for table in scenario.fault if table.group == PROCESS]
         for table in faults:
             self._stage.cue(round(table.from_s * 1e9), lambda table=table: self._disturb(table))
+        self._loop_node: ControllerNode | None = None
+        self._rig_node: PlantNode | None = None
+        self.command(actions_of(scenario))
+        for t_ns, config in configurations(scenario.controller, scenario.step):
+            self._stage.cue(t_ns, lambda config=config: self._reconfigure(config))
+        for step in scenario.step:
+            if step.load is not None:
+                self._stage.cue(step.t_ns, lambda load=step.load: self._load(load))
+
+    def command(self, orders: Iterable[TimedAction]) -> None:
+        """Send operator commands at their times."""
+        for order in orders:
+            command = wire.Operator(action=cast(Any, order.action), who="the operator").SerializeToString()
+            self._stage.cue(order.t_ns, lambda command=command: self._hub.put("cockpit", OPERATOR, command))
+
+    def _reconfigure(self, config: ControllerConfig) -> None:
+        self._config = config
+        if self._loop_node is not None:
+            self._loop_node.reconfigure(config)
+
+    def _load(self, ratio: float) -> None:
+        if self._rig_node is not None:
+            self._rig_node.set_load(ratio)
 
     def listen(self, receive: Receive) -> None:
         """Receive every message of the run, as a recorder does."""
@@ -51,7 +78,7 @@ class SimulatedRun:
 
     def controller_node(self) -> ControllerNode:
         """Create the controller. A subclass may override this to run a rule in its place."""
-        return ControllerNode(self._scenario.controller)
+        return ControllerNode(self._config)
 
     def play(self, stopped: Callable[[], bool] = lambda: False) -> None:
         """Run to the end of the scenario; `stopped`, called at every turn, ends it like Ctrl-C. Raises the Fault of a process."""
@@ -90,6 +117,7 @@ class SimulatedRun:
             arm=scenario.arm and first,
             faults=scenario.fault if first else (),
         )
+        self._rig_node = node
         process = GuardedRig(node, cast(Any, Session(self._hub, "plant")), None)
 
         def work() -> None:
@@ -101,11 +129,12 @@ class SimulatedRun:
         self._players["plant"] = stage.enter(Player("plant", work))
 
     def _begin_controller(self) -> None:
-        scenario, stage = self._scenario, self._stage
+        stage = self._stage
         inbox = WaitingInbox(WAITING, stage)
         session = cast(Any, Session(self._hub, "controller"))
         self._hub.down.discard("controller")
-        process = ControllerProcess(scenario.controller, self.controller_node(), session, lockstep=False, inbox=inbox)
+        self._loop_node = node = self.controller_node()
+        process = ControllerProcess(self._config, node, session, lockstep=False, inbox=inbox)
         self._hub.announce("controller")
         self._players["controller"] = stage.enter(Player("controller", lambda: process.loop(self._stop, _GRANTED)))
 

@@ -1,0 +1,73 @@
+"""`stickslip test`: run scenarios with expectations, or judge them on an old log."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bridge.faults import Fault
+from cockpit.commands.as_json.option import Json, print_result
+from cockpit.commands.options import SharedOptions, command
+
+
+@command("settings", "seed")
+def run_tests(
+    shared: SharedOptions,
+    paths: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="[PATH]...", help="Scenarios with [[expect]], or folders; the shipped tests if not given."
+        ),
+    ] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes to use; all cores if not given.")] = None,
+    mutants: Annotated[
+        bool, typer.Option("--mutants", help="Run with each defect of [[must_fail]], under which a test has to fail.")
+    ] = False,
+    log: Annotated[
+        Path | None,
+        typer.Option(metavar="OLD.mcap", help="Run nothing: judge the expectations on this log of any rig."),
+    ] = None,
+    logs: Annotated[
+        Path, typer.Option(metavar="FOLDER", help="Folder for the logs of tests that did not pass.")
+    ] = Path("runs/tests"),
+    report: Annotated[Path | None, typer.Option("--junit", metavar="FILE.xml", help="Write JUnit XML.")] = None,
+    as_json: Json = None,
+) -> int:
+    """Run scenarios and judge their expectations; exit status 0: all passed, 1: one failed, 14: one was not tested."""
+    from joblib import cpu_count
+
+    from bridge.files import write_whole
+    from bridge.log.logfile import check_log_file
+    from cockpit.commands.diagnose_output import watched
+    from cockpit.run.child_process import end_like_ctrl_c
+    from cockpit.run.scenario_file import deploy_folder
+    from cockpit.run.writable import check_output, check_output_folder, writing
+    from cockpit.testing.junit import junit
+    from cockpit.testing.one import judge_old
+    from cockpit.testing.suite import Suite, cases_of, mutants_of
+    from cockpit.testing.suite import run_tests as run
+
+    end_like_ctrl_c()
+    if report is not None:
+        check_output("--junit", report, (".xml",))
+    check_output_folder("--logs", logs)
+    if log is not None and mutants:
+        raise Fault("CONFIG", "--mutants: needs runs with defects, which --log does not have; leave one of them out")
+    cases, others = cases_of(paths or [deploy_folder() / "tests"], shared.as_settings())
+    without: list[str] = []
+    if log is not None:
+        check_log_file(log)
+        tests = [judge_old(case, log) for case in cases]
+    else:
+        if mutants:
+            cases, without = mutants_of(cases)
+        with watched() as progress:
+            tests = run(
+                cases, jobs or cpu_count(), None if mutants else logs, lambda share, line: progress(line, share)
+            )
+    suite = Suite(tests, mutants, without, others)
+    if report is not None:
+        with writing(report):
+            write_whole(report, junit(suite))
+    print_result(as_json, suite, suite.in_words(), indent=1)
+    return suite.exit_status

@@ -1,0 +1,133 @@
+"""Many tests: the scenarios of files and folders, in processes; the result does not depend on their number."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableType]
+
+from bridge.config import read_toml
+from bridge.faults import FAULTS, Fault
+from bridge.kernel_cache import compile_once
+from bridge.results import in_json
+from bridge.units import counted
+from cockpit.expect.judge import FAILED, PASSED, UNTESTED
+from cockpit.run.scenario import load_scenario
+from cockpit.testing.one import ERROR, TestCase, Tested, run_test
+
+_ORDER = (PASSED, FAILED, UNTESTED, ERROR)
+
+
+class Suite(NamedTuple):
+    """Results of many tests, in the order of their files."""
+
+    tests: list[Tested]
+    mutants: bool  # each test ran with a defect, under which it has to fail
+    without_mutants: list[str]  # names of the tests that have no defect; empty for a run without mutants
+    others: int  # .toml files of the folders without [[expect]]
+
+    @in_json
+    def counts(self) -> dict[str, int]:
+        """Number of tests by result."""
+        counts = Counter(test.result for test in self.tests)
+        return {result: counts[result] for result in _ORDER}
+
+    @in_json
+    def survivors(self) -> list[str]:
+        """Defects under which no expectation failed, for a run with mutants."""
+        return (
+            [f"{test.name} with {test.defect}" for test in self.tests if test.result != FAILED] if self.mutants else []
+        )
+
+    @property
+    def exit_status(self) -> int:
+        """0: good; 1: a test failed, or a defect went unnoticed; 14: something was not tested."""
+        results = {test.result for test in self.tests}
+        failed = bool(self.survivors) if self.mutants else bool(results & {FAILED, ERROR})
+        untested = bool(self.without_mutants) if self.mutants else UNTESTED in results
+        return 1 if failed else FAULTS["NOT_JUDGED"].exit_status if untested else 0
+
+    def in_words(self) -> list[str]:
+        """Lines for the operator: each test, then the counts."""
+        lines = [line for test in self.tests for line in test.in_words()]
+        counts = ", ".join(f"{number} {result}" for result, number in self.counts.items() if number)
+        if not self.mutants:
+            lines.append(f"tests    {counted(len(self.tests), 'test')}: {counts}")
+        else:
+            caught = len(self.tests) - len(self.survivors)
+            lines.append(f"mutants  {caught} of {counted(len(self.tests), 'defect')} made a test fail")
+            lines += [f"MISSED   {line}" for line in self.survivors]
+            lines += [f"UNTESTED {name}: no [[must_fail]] is in the scenario" for name in self.without_mutants]
+        if self.others:
+            lines.append(f"skipped  {counted(self.others, '.toml file')} without [[expect]]")
+        return lines
+
+
+def cases_of(paths: Sequence[Path], settings: list[str]) -> tuple[list[TestCase], int]:
+    """The tests of files and folders, and the number of other .toml files in the folders. Raises Fault CONFIG.
+
+    A file in a folder is a test if it holds `[[expect]]` or cannot be read; a file that is named itself is always one.
+    """
+    files: list[Path] = []
+    others = 0
+    for path in paths:
+        if not path.exists():
+            raise Fault("CONFIG", f"{path}: does not exist: must be a scenario or a folder of them; give another path")
+        for file in sorted(path.rglob("*.toml")) if path.is_dir() else [path]:
+            if path.is_dir() and not _is_test(file):
+                others += 1
+            elif file not in files:
+                files.append(file)
+    if not files:
+        raise Fault("CONFIG", f"{', '.join(map(str, paths))}: holds no scenario with [[expect]]; add one to a scenario")
+    stems = Counter(file.stem for file in files)
+    names = [file.stem if stems[file.stem] == 1 else "-".join(file.with_suffix("").parts[-2:]) for file in files]
+    return [TestCase(name, file, settings) for name, file in zip(names, files, strict=True)], others
+
+
+def _is_test(file: Path) -> bool:
+    try:
+        return "expect" in read_toml(file)
+    except Fault:
+        return True  # reported as an error of this test
+
+
+def mutants_of(cases: Sequence[TestCase]) -> tuple[list[TestCase], list[str]]:
+    """A test for each defect of the scenarios, and the names of the scenarios without one. Raises Fault CONFIG."""
+    mutants: list[TestCase] = []
+    without: list[str] = []
+    for case in cases:
+        defects = load_scenario(str(case.file), case.settings).must_fail
+        mutants += [case._replace(mutant=number) for number in range(len(defects))]
+        without += [] if defects else [case.name]
+    return mutants, without
+
+
+def run_tests(
+    cases: Sequence[TestCase], jobs: int, keep: Path | None, progress: Callable[[float, str], None]
+) -> list[Tested]:
+    """Run tests in simulated time.
+
+    Args:
+        cases: the tests.
+        jobs: number of processes.
+        keep: folder for the logs of tests that did not pass; None: they are deleted.
+        progress: called with the share done and a line on the last test.
+
+    """
+    if cases and jobs > 1:
+        compile_once("the tests", lambda: run_test(cases[0], None))
+    done: list[Tested] = []
+    for tested in _each(cases, jobs, keep):
+        done.append(tested)
+        progress(len(done) / len(cases), tested.in_words()[0])
+    return done
+
+
+def _each(cases: Sequence[TestCase], jobs: int, keep: Path | None) -> Iterator[Tested]:
+    if jobs == 1:
+        yield from (run_test(case, keep) for case in cases)
+        return
+    parallel: Any = Parallel(n_jobs=jobs, return_as="generator")
+    yield from parallel(delayed(run_test)(case, keep) for case in cases)

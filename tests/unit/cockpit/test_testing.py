@@ -1,0 +1,122 @@
+"""`stickslip test`: results, exit status, kept logs, JUnit XML, mutants and old logs."""
+
+import json
+from pathlib import Path
+from xml.etree import ElementTree as Xml
+
+import jsonschema
+import pytest
+from typer.testing import CliRunner
+
+from bridge.log.logfile import read_run
+from cockpit.cli import app
+from cockpit.commands.as_json.schemas import FORMATS
+from cockpit.expect.judge import FAILED, UNTESTED
+from cockpit.run.scenario_file import deploy_folder
+from cockpit.testing.suite import cases_of, mutants_of, run_tests
+
+HEAD = 'duration_s = 0.6\narm = true\nrig = { file = "paper-c45-c45" }\n'
+GOOD = '[[expect]]\nname = "stroke"\nrequirement = "R-7"\nsignal = "amplitude_m"\nat_most = "28 nm"\n'
+BAD = '[[expect]]\nsignal = "amplitude_m"\nat_least = "28 nm"\nfrom_s = 0.3\n'
+DOUBTFUL = '[[expect]]\nsignal = "time_to_slip_s"\nat_least = 1.0\n'
+MUTANT = '[[must_fail]]\nabout = "more vibration"\nsettings = ["controller.limits.v_ratio={}"]\n'
+
+
+def call(*words: str) -> tuple[int, str]:
+    result = CliRunner().invoke(app, ["test", *words, "--jobs", "1"])
+    return result.exit_code, result.stdout
+
+
+def folder_of(tmp_path: Path, **texts: str) -> str:
+    folder = tmp_path / "tests"
+    folder.mkdir()
+    for name, text in texts.items():
+        (folder / f"{name}.toml").write_text(HEAD + text)
+    return str(folder)
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def test_results_exit_status_and_logs(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path, good=GOOD, bad=GOOD + BAD, doubtful=GOOD + DOUBTFUL, other="", broken="[[expect]]\n")
+    status, text = call(folder, "--junit", "r.xml", "--json", "r.json")
+    assert status == 1
+    assert "PASSED   good: 1 expectation" in text
+    assert "FAILED   bad: 1 FAILED, 1 PASSED" in text
+    assert "FAILED   amplitude_m at least 28 nm: 21." in text
+    assert "replay   stickslip replay runs/tests/bad.mcap" in text
+    assert "UNTESTED doubtful: 1 UNTESTED, 1 PASSED" in text
+    assert "ERROR    broken: CONFIG: broken.toml" in text
+    assert "skipped  1 .toml file without [[expect]]" in text
+    assert sorted(path.name for path in Path("runs/tests").iterdir()) == ["bad.mcap", "doubtful.mcap"]
+    suite = json.loads(Path("r.json").read_text())
+    jsonschema.validate(suite, FORMATS["test-result"].schema())
+    assert suite["counts"] == {"PASSED": 1, "FAILED": 1, "UNTESTED": 1, "ERROR": 1}
+    root = Xml.parse("r.xml").getroot()  # noqa: S314
+    assert (root.get("tests"), root.get("failures"), root.get("errors")) == ("4", "1", "2")
+    properties = {row.get("name"): row.get("value") for row in root.iterfind("testcase[@name='good']/properties/*")}
+    assert properties["requirement"] == "R-7"
+    assert properties["rig"] == "paper-c45-c45"
+
+
+def test_a_test_without_evidence_ends_with_14(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path, doubtful=DOUBTFUL)
+    assert call(folder)[0] == 14
+    status, text = call(f"{folder}/doubtful.toml", "--set", "expect=[]")
+    assert (status, "UNTESTED doubtful: no [[expect]]" in text) == (14, True)
+
+
+def test_an_old_log_is_judged_without_a_run(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path, bad=BAD)
+    call(folder)
+    before = read_run(Path("runs/tests/bad.mcap")).checksums
+    status, text = call(f"{folder}/bad.toml", "--log", "runs/tests/bad.mcap", "--set", "expect=[{ slips = 0 }]")
+    assert (status, "PASSED   bad" in text) == (0, True)
+    assert read_run(Path("runs/tests/bad.mcap")).checksums == before
+    status, text = call(
+        f"{folder}/bad.toml",
+        "--log",
+        "runs/tests/bad.mcap",
+        "--set",
+        "duration_s=5.0",
+        "--set",
+        "expect=[{ slips = 0, to_s = 5.0 }]",
+    )
+    assert (status, UNTESTED in text) == (14, True)
+
+
+def test_a_mutant_must_make_a_test_fail(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path, found=GOOD + MUTANT.format(1.7), missed=GOOD + MUTANT.format(1.25), without=GOOD)
+    status, text = call(folder, "--mutants")
+    assert status == 1
+    assert "mutants  1 of 2 defects made a test fail" in text
+    assert "MISSED   missed with more vibration" in text
+    assert "UNTESTED without: no [[must_fail]]" in text
+    assert not Path("runs").exists()
+    assert call(f"{folder}/without.toml", "--mutants")[0] == 14
+
+
+def test_a_folder_without_tests_is_refused(tmp_path: Path) -> None:
+    assert CliRunner().invoke(app, ["test", folder_of(tmp_path, other="")]).exit_code == 2
+    assert CliRunner().invoke(app, ["test", "nowhere"]).exit_code == 2
+
+
+@pytest.mark.slow
+def test_the_shipped_tests_pass_and_each_of_their_defects_is_found() -> None:
+    """Three of them; `make nightly` has all."""
+    cases, _ = cases_of([deploy_folder() / "tests"], [])
+    few = [case for case in cases if case.name in {"limits", "stop", "reverse"}]
+    assert [test.result for test in run_tests(few, 1, None, lambda _share, _line: None)] == ["PASSED"] * 3
+    mutants, without = mutants_of(cases)
+    assert not without
+    few = [case for case in mutants if case.name == "limits"]
+    assert {test.result for test in run_tests(few, 1, None, lambda _share, _line: None)} == {FAILED}
+
+
+@pytest.mark.nightly
+def test_all_shipped_tests_and_defects() -> None:
+    assert call()[0] == 0
+    assert call("--mutants")[0] == 0
