@@ -254,7 +254,7 @@ class DeviceSession:
         values = np.zeros((len(CHANNELS), session.facts.samples))
         for row, channel in enumerate(rig.channels[name] for name in CHANNELS):
             if channel.source is not None:
-                values[row] = channel.sign * channel.scale * samples[channel.source] + channel.offset
+                values[row] = channel.sign * channel.scale * block.samples[channel.source] + channel.offset
         self._number += 1 + block.lost
         session.lost += block.lost
         stage.append(
