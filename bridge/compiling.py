@@ -1,5 +1,6 @@
 """Compilation of kernels: progress on stderr, and a context in which a signal ends the command at once."""
 
+import signal
 import sys
 from collections.abc import Callable, Generator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -75,6 +76,16 @@ def note_done(kernels: set[object]) -> None:
 
 
 @contextmanager
+def _alarm_held() -> Generator[None]:
+    """A body after which SIGALRM, the end of a time budget, arrives: an exception within a compilation leaves half a kernel."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGALRM})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
 def compiling(module: str = "") -> Generator[str]:
     """Guard the compilation or loading of kernels and show its progress; yields the module of the outermost context.
 
@@ -85,7 +96,7 @@ def compiling(module: str = "") -> Generator[str]:
     _work.depth += 1
     _work.module = _work.module or module
     try:
-        with guard() if _work.depth == 1 else nullcontext():
+        with guard() if _work.depth == 1 else nullcontext(), _alarm_held():
             yield _work.module
     finally:
         _work.depth -= 1

@@ -76,3 +76,15 @@ def test_a_signal_ends_a_command_that_compiles(number: signal.Signals, name: str
         command.send_signal(number)
         assert command.wait(PATIENCE_S) == 130
         assert f"INTERRUPTED: stopped by {name} while kernels were compiled" in command.stderr.read()
+
+
+def test_the_end_of_a_time_budget_waits_for_the_end_of_a_compilation() -> None:
+    ended: list[int] = []
+    handler = signal.signal(signal.SIGALRM, lambda number, _: ended.append(number))
+    try:
+        with compiling.compiling("a"), compiling.compiling("b"):
+            signal.raise_signal(signal.SIGALRM)
+            assert not ended
+        assert ended == [signal.SIGALRM]
+    finally:
+        signal.signal(signal.SIGALRM, handler)
