@@ -185,7 +185,8 @@ class Search:
                 alone = [(axis, w) for axis, w in axes if axis.effect == name]
                 hypothesis = Hypothesis({name: form}, tuple(axis for axis, _ in alone))
                 deviations = np.clip(deviations, -self.rig.fitter.most, self.rig.fitter.most)
-                starts.append(Screened(hypothesis, deviations, np.array([w for _, w in alone]), fit.chi2))
+                at = deviations, np.array([w for _, w in alone])
+                starts.append(Screened(hypothesis, *at, fit.chi2, at))
         left = {frozenset(fit.effects): fit.chi2 for fit in singles}
         quick = each_beside(self._jobs, _quick, self.rig.fitter, starts)
         better = [fit for fit in quick if fit.chi2 < left.get(frozenset(fit.effects), math.inf)]
@@ -200,4 +201,4 @@ def refitted(fitter: Fitter, starts: Sequence[Screened], full: int, jobs: int = 
 
 
 def _quick(fitter: Fitter, start: Screened) -> Work[Fit]:
-    return fitter.quick(start.hypothesis, start.deviations, start.w)
+    return fitter.quick(start.hypothesis, ((start.deviations, start.w), start.before))

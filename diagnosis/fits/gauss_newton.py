@@ -158,9 +158,14 @@ class Fitter:
         """
         return together(self.predicted_many, [self.refitting(hypothesis, deviations, w)])[0]
 
-    def quick(self, hypothesis: Hypothesis, deviations: Floats, w: Floats) -> Work[Fit]:
-        """Fit a hypothesis in two steps; chi2 is under the compression of the gap."""
-        fit = yield from self.fitting(hypothesis, deviations, w, _QUICK)
+    def quick(self, hypothesis: Hypothesis, starts: Sequence[tuple[Floats, Floats]]) -> Work[Fit]:
+        """Fit a hypothesis in two steps, from the better of some starts; chi2 is under the compression of the gap."""
+        predicted = yield Question([(deviations, hypothesis.tables(w)) for deviations, w in starts])
+        left = [
+            self._placed(hypothesis, np.concatenate(start), features, FAR_KNEE).chi2
+            for start, features in zip(starts, predicted, strict=True)
+        ]
+        fit = yield from self.fitting(hypothesis, *starts[left.index(min(left))], _QUICK)
         return (yield from self._judging(fit))
 
     def _judging(self, fit: Fit) -> Work[Fit]:

@@ -27,6 +27,7 @@ class Screened(NamedTuple):
     deviations: Floats  # start of the nuisances, in tolerances [nuisances]
     w: Floats  # start of the coordinates [coordinates]
     chi2: float
+    before: tuple[Floats, Floats]  # deviations and coordinates from which the nuisances have moved
 
 
 class Screening:
@@ -84,4 +85,4 @@ class Screening:
         left = rest - self._columns @ (moved - at)
         held = prior_of(hypothesis, deviations)[len(at) :] * added
         chi2 = float(left @ left + held @ held)
-        return Screened(hypothesis, moved[:count], np.concatenate([moved[count:], added]), chi2)
+        return Screened(hypothesis, moved[:count], np.concatenate([moved[count:], added]), chi2, (deviations, w))
