@@ -16,12 +16,13 @@ def run_tests(
     paths: Annotated[
         list[Path] | None,
         typer.Argument(
-            metavar="[PATH]...", help="Scenarios with [[expect]], or folders; the shipped tests if not given."
+            metavar="[PATH]...", help=r"Scenarios with \[\[expect]], or folders; the shipped tests if not given."
         ),
     ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes to use; all cores if not given.")] = None,
     mutants: Annotated[
-        bool, typer.Option("--mutants", help="Run with each defect of [[must_fail]], under which a test has to fail.")
+        bool,
+        typer.Option("--mutants", help=r"Run with each defect of \[\[must_fail]], under which a test has to fail."),
     ] = False,
     log: Annotated[
         Path | None,

@@ -59,6 +59,8 @@ def _sure(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"the held-out runs are {times(diagnosis.gap.with_effect)} noise floors off, more than a right answer leaves"
     elif known and diagnosis.verdict == "unexplained":
         yield f"{percent(1.0 - diagnosis.complete)} that something outside the library acts"
+    elif known and any(finding.kind == "budget" for finding in diagnosis.findings):
+        yield "the time ended before everything was tried, so whether anything else acts is not judged"
     elif known:
         yield f"{percent(diagnosis.complete)} that nothing else acts"
     if known and not by_number:  # the judge counts a number within its bounds as `none`
@@ -85,7 +87,7 @@ def _held_out(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"{falls}, {closed_in_words(gap.shrinkage)} of it closed{between}"
     else:
         yield f"{kept}: {times(gap.nominal)} noise floors as described, {times(gap.retuned)} refitted (perfect: 1)"
-        if diagnosis.effects and diagnosis.verdict != "described":
+        if diagnosis.effects and diagnosis.verdict != "described" and gap.retuned <= MORE_THAN_RIGHT:
             yield "no gap is left to close there, so new data have not tested the name"
         if diagnosis.verdict == "unexplained" and gap.retuned <= 1.0:
             yield "the gap shows in the fitted runs alone"
@@ -98,7 +100,7 @@ def _others(diagnosis: Diagnosis) -> Iterator[str]:
         yield from [most] if (most := latent_answer(diagnosis)) else []
     if diagnosis.remainder is not None:
         yield remainder_in_words(diagnosis.remainder)
-    if diagnosis.effects and gap.with_effect > MORE_THAN_RIGHT:
+    if diagnosis.effects and gap.shrinkage is not None and gap.with_effect > MORE_THAN_RIGHT:
         yield f"a right explanation leaves about 1 on the held-out runs, not {times(gap.with_effect)}: something else acts too"
     if diagnosis.where and diagnosis.verdict in ("partly", "unexplained", "not-finished"):
         yield _where(diagnosis)

@@ -232,6 +232,17 @@ def test_every_verdict_without_an_effect_has_its_words(verdict, answer, sure, nu
     assert lines["held out"] == "run-04.parquet: 6.2 noise floors as described, 5.9 refitted (perfect: 1)"
 
 
+def test_an_answer_that_was_cut_short_claims_nothing_about_the_rest():
+    made = made_up.diagnosis()
+    gap = made.gap._replace(with_effect=5.9, shrinkage=None, interval_90=None)
+    cut = Finding("budget", "fits", "ended before every effect was tried")
+    lines = by_label(made._replace(verdict="partly", gap=gap, findings=(cut,)))
+    assert lines["sure"].startswith("the time ended before everything was tried")
+    assert "nothing else acts" not in " ".join(lines.values())
+    assert "something else acts" not in " ".join(lines.values())
+    assert "no gap is left" not in lines["held out"]
+
+
 def test_a_number_that_no_effect_stands_for_has_no_rival_candidates():
     made = made_up.diagnosis()._replace(verdict="described", effects=("static-level",), not_distinguishable=())
     assert by_label(made)["sure"] == "98 % that nothing else acts"
