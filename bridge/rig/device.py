@@ -57,9 +57,8 @@ class DeviceBlock(NamedTuple):
 class Part(ABC):
     """A connection whose exciter can be set."""
 
-    watchdog_s = (
-        0.0  # silence after which the device ends the vibration by itself, where the adapter knows it; 0: unknown
-    )
+    # silence after which the device ends the vibration by itself, where the adapter knows it; 0: unknown
+    watchdog_s = 0.0
     slowest_answer_s = 0.0  # longest time from `write` until the device executes it, beyond the block under way
 
     def __init__(self, setup: Setup) -> None:

@@ -50,9 +50,7 @@ class Explained(NamedTuple):
     """The explanations of a ledger, and the numbers that decide between them."""
 
     names: list[Names]
-    columns: (
-        Floats  # evidence in units of its error, whether it has a fit, whether it is one effect, two [explanations, 4]
-    )
+    columns: Floats  # evidence in units of its error; 1 for a fit, for one effect, for two [explanations, 4]
 
 
 def judge(ledger: Ledger) -> Judged:

@@ -18,9 +18,8 @@ OUTSIDE = frozenset({"acceleration-clock", "logger-clock"})
 _SHORTEST = 300
 _SPARE = 1.5  # by which the rows of a thinned relation still resolve more than its highest frequency
 _WAVES = 4  # half waves of a slow drift over a run
-RESOLUTION = (
-    1e-5  # least noise of a row, as a share of the static friction, or of the acceleration that it gives the slide
-)
+# least noise of a row, as a share of the static friction, or of the acceleration that it gives the slide
+RESOLUTION = 1e-5
 POSITION_HZ = 60.0  # content of a position, or of its second derivative, that is compared: above is noise of the sensor
 # Size of a large effect, as a share of the drive's critical damping, compliance, speed, or of the largest force. Ten times as
 # much or as little changes a log evidence by 2.3.

@@ -20,7 +20,7 @@ from bridge.config import Strict, validate
 from bridge.faults import Fault
 from bridge.rig.device import DeviceError, Exciter, Setup
 
-# From the makers' programming guides. The first ignores a trigger within a burst, so that the burst is aborted before.
+# Tried on the simulated generator alone. The first ignores a trigger within a burst, so that the burst is aborted before.
 DIALECTS: dict[str, dict[str, Any]] = {
     "agilent-33500": {
         "begin": [

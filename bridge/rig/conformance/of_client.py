@@ -17,7 +17,7 @@ from bridge.guard.config import VibrationLimits
 from bridge.rig.conformance import data, exciter
 from bridge.rig.conformance.heard import Block, Stage
 from bridge.rig.conformance.report import Check, Conformance, Measured, judged
-from bridge.rig.conformance.session import HALF_S, REST_S, STEP_S, STEPS, TONE_S, Facts, Session
+from bridge.rig.conformance.session import REST_S, Facts, Session, tones_and_steps
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.channels import CHANNELS
 from bridge.wire.payloads import parsed
@@ -157,14 +157,8 @@ class _Client:
             if self.session.has_guard and self._state not in _MAY_VIBRATE:
                 self._collect("not armed", 0.1, first_Hz, most_m)
                 self._arm()
-            for frequency_Hz in facts.tones_Hz:
-                self._collect(f"tone {frequency_Hz:g}", TONE_S + settled_s, frequency_Hz, most_m)
-                self._collect("zero", settled_s, frequency_Hz, 0.0)
-            self._collect("half", HALF_S + settled_s, first_Hz, 0.5 * most_m)
-            self._collect("zero", settled_s, first_Hz, 0.0)
-            for _ in range(STEPS):
-                self._collect("step", STEP_S + settled_s, first_Hz, most_m)
-                self._collect("zero", settled_s, first_Hz, 0.0)
+            for stage in tones_and_steps(facts, settled_s):
+                self._collect(*stage)
             if not self._lockstep:
                 self._collect("before silence", settled_s, first_Hz, most_m)
                 self._collect("silence", facts.watchdog_s + settled_s + 0.05, first_Hz, None)

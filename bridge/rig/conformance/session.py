@@ -7,7 +7,7 @@ import contextlib
 import math
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -122,6 +122,16 @@ class Session:
         return [block for stage in self.stages.get(name, []) for block in stage]
 
 
+def tones_and_steps(facts: Facts, settled_s: float) -> Iterator[tuple[str, float, float, float]]:
+    """The stages of any session that show frequency, amplitude and answer: name, time [s], frequency [Hz], amplitude [m]."""
+    first_Hz, most_m = facts.tones_Hz[0], facts.amplitude_m
+    loud = [(f"tone {tone_Hz:g}", TONE_S, tone_Hz, most_m) for tone_Hz in facts.tones_Hz]
+    loud += [("half", HALF_S, first_Hz, 0.5 * most_m), *[("step", STEP_S, first_Hz, most_m)] * STEPS]
+    for name, for_s, frequency_Hz, amplitude_m in loud:
+        yield name, for_s + settled_s, frequency_Hz, amplitude_m
+        yield "zero", settled_s, frequency_Hz, 0.0
+
+
 class DeviceSession:
     """Holds the session of a device."""
 
@@ -168,14 +178,8 @@ class DeviceSession:
         self._drain()
         self._collect("rest", REST_S, first_Hz, 0.0)
         self._pause()
-        for frequency_Hz in facts.tones_Hz:
-            self._collect(f"tone {frequency_Hz:g}", TONE_S + settled_s, frequency_Hz, most_m)
-            self._collect("zero", settled_s, frequency_Hz, 0.0)
-        self._collect("half", HALF_S + settled_s, first_Hz, 0.5 * most_m)
-        self._collect("zero", settled_s, first_Hz, 0.0)
-        for _ in range(STEPS):
-            self._collect("step", STEP_S + settled_s, first_Hz, most_m)
-            self._collect("zero", settled_s, first_Hz, 0.0)
+        for stage in tones_and_steps(facts, settled_s):
+            self._collect(*stage)
         if facts.has_line:
             self._collect("off", settled_s + 0.02, first_Hz, most_m, on=False)
         self._collect("before safe", settled_s, first_Hz, most_m)
