@@ -45,6 +45,10 @@ class Generator(Protocol):
         """An effect's formula and its numbers, for a reader of the key."""
         ...
 
+    def true_numbers(self, plan: Plan, seed: int) -> dict[str, float]:
+        """The numbers of the rig that `make` simulates, without its effects, by key of the manifest."""
+        ...
+
     def make(self, folder: Path, plan: Plan, seed: int) -> None:
         """Evidence; the same plan and seed give the same bytes, and without its effects the same rig without them."""
         ...

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.blind.generator import LIBRARY, OUTSIDE, Case, Effect, draw_effect, make
+from tests.blind.generator import LIBRARY, OUTSIDE, Case, Effect, draw_effect, make, numbers
 from tests.blind.generator.runs import PROTOCOL
 from tests.blind.generator.runs import Plan as RunPlan
 from tests.blind.generators import Plan
@@ -33,15 +33,21 @@ class Independent:
         return draw_effect(random, name)
 
     def formula(self, effect: Effect) -> str:
-        numbers = {name: float(value) for name, value in effect.numbers.items()}
-        return f"{effect.formula.name} {numbers}"
+        drawn = {name: float(value) for name, value in effect.numbers.items()}
+        return f"{effect.formula.name} {drawn}"
+
+    def true_numbers(self, plan: Plan, seed: int) -> dict[str, float]:
+        return numbers(_case(plan), seed)
 
     def make(self, folder: Path, plan: Plan, seed: int) -> None:
-        case = Case(
-            effects=plan.effects,
-            backbone=plan.backbone,
-            tolerances=plan.tolerances,
-            leave_out=plan.leave_out,
-            roughness=0.0 if plan.smooth else 1.0,
-        )
-        make(folder, case, seed, self._runs)
+        make(folder, _case(plan), seed, self._runs)
+
+
+def _case(plan: Plan) -> Case:
+    return Case(
+        effects=plan.effects,
+        backbone=plan.backbone,
+        tolerances=plan.tolerances,
+        leave_out=plan.leave_out,
+        roughness=0.0 if plan.smooth else 1.0,
+    )

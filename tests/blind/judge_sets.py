@@ -25,7 +25,6 @@ from bench.blind.baselines import lowest_bic
 from bench.blind.outcomes import Opened
 from bench.blind.sealing import evidence_hash
 from bridge.results import write_json
-from diagnosis.hypotheses.hypothesis import LEVELS
 from tests.blind import sizes
 from tests.blind.generator import OUTSIDE, OUTSIDE_2
 from tests.blind.generators import Generator, Plan
@@ -35,6 +34,7 @@ from tests.blind.plant_cases import Plant
 from tests.blind.real_logs import real_cases
 from tests.blind.sizing import Bench
 from tests.blind.strata import draw
+from tests.blind.wrong_number import EFFECT_OF, write_number
 from tests.real.evidences import AXIS, EVIDENCES, SLIDER
 
 SHARES = {"single": 0.4, "pair": 0.15, "none": 0.2, "outside": 0.15, "number": 0.1}
@@ -180,25 +180,17 @@ def _maker(source: Generator, plan: Plan, seed: int, kind: str, chosen: list[str
 
 def wrong_number(folder: Path, random: np.random.Generator) -> dict[str, Any]:
     """Change one number of the description by five to eight tolerances, and 8 % at least; return the change as an answer."""
-    path = folder / "manifest.toml"
-    text = path.read_text(encoding="utf-8")
-    rig = tomllib.loads(text)["rig"]
-    key = str(random.choice([key for key in (*_level_of(), "mass_kg") if key in rig]))
+    rig = tomllib.loads((folder / "manifest.toml").read_text(encoding="utf-8"))["rig"]
+    key = str(random.choice([key for key in (*EFFECT_OF, "mass_kg") if key in rig]))
     away = max(float(random.uniform(5.0, 8.0)) * rig["tolerance"][key], 0.08)
     up = bool(random.random() < 0.5)
     if key in {"coulomb_force_N", "static_force_N"}:  # static friction stays above the Coulomb friction
         room = rig["static_force_N"] / rig["coulomb_force_N"]
         up = key == "static_force_N" or (up and 1.0 + away < room)
     described = rig[key] * (1.0 + away if up else 1.0 / (1.0 + away))
-    path.write_text(text.replace(f"\n{key} = {rig[key]!r}\n", f"\n{key} = {described!r}\n", 1), encoding="utf-8")
-    effects = [_level_of()[key]] if key in _level_of() else []
-    return {"number": key, "effects": effects, "formulas": [f"{key} is {rig[key]:g}, described {described:g}"]}
-
-
-@cache
-def _level_of() -> dict[str, str]:
-    """The effect that names a wrong number, by its key."""
-    return {key: effect for effect, key in LEVELS.items()}
+    write_number(folder, key, described)
+    formula = f"{key} is {rig[key]:g}, described {described:g}"
+    return {"number": key, "effects": [EFFECT_OF[key]], "formulas": [formula]}
 
 
 def _opened(count: int, _seed: int) -> Iterator[Wanted]:
@@ -225,7 +217,7 @@ def _reopened(name: str, seed: int, row: Any, kind: str) -> Callable[[Path], dic
         case = next(case for case in _cases(name, seed) if case.seed == answer["counterfactual_seed"])
         strengths = {effect["name"]: effect["strength"] for effect in answer["effects"]}
         effects = tuple(effect.scaled(strengths[effect.name]) for effect in case.effects)
-        plan = Plan(effects, case.tolerances, case.leave_out, backbone=case.backbone)
+        plan = Plan(effects, case.tolerances, backbone=case.backbone)
         source.make(folder, plan, case.seed)
         opened_case = Opened(row["case"], answer, row["said"])
         probabilities = {candidate["effect"]: candidate["probability"] for candidate in row["said"]["candidates"]}
@@ -246,7 +238,8 @@ def _reopened(name: str, seed: int, row: Any, kind: str) -> Callable[[Path], dic
 
 @cache
 def _cases(name: str, seed: int) -> list[Any]:
-    return draw(Independent(outside=OUTSIDE_2) if name == "independent-2" else Independent(), 200, seed)
+    # twice as many as at that time, as single effects were half of a set
+    return draw(Independent(outside=OUTSIDE_2) if name == "independent-2" else Independent(), 400, seed)
 
 
 def _measured(_count: int, _seed: int) -> Iterator[Wanted]:

@@ -18,10 +18,10 @@ from bridge.faults import Fault
 from bridge.results import write_json
 from diagnosis.version import tool_version
 from tests.blind.generators import Effect, Generator, Plan, generator
-from tests.blind.real_logs import real_cases
 from tests.blind.sizes import OPENED, Sizes, known_sizes, write_sizes
 from tests.blind.sizing import Bench
-from tests.blind.strata import FEWEST, REAL, TARGETS, Drawn, draw
+from tests.blind.strata import FEWEST, TARGETS, Drawn, draw
+from tests.blind.wrong_number import EFFECT_OF, describe_wrong
 
 Progress = Callable[[str, float], None]
 _ASKED, _ANSWERS, _SET = "asked.txt", "answers", "set"  # in the folder of an unfinished set
@@ -29,6 +29,7 @@ _TRIES = 3  # strengths that are tried; more come closer to the target and take 
 _NEAR_ENOUGH = 1.4  # factor around the target within which no further strength is tried
 _WEAKEST = 0.01  # strength
 _INVISIBLE = 0.02  # detection limits that the search counts at least, as its steps divide by this number
+VERDICTS = {"no-gap": "no-gap", "outside": "unexplained", "wrong-number": "described"}  # of the other kinds: effect
 _ONE_TIME_S = 946_684_800  # time of every file, 2000-01-01, so that no time shows the order of making
 
 
@@ -116,9 +117,7 @@ def made(
 
 
 def _one(source: Generator, case: Drawn, folder: Path, known: Sizes) -> tuple[str, Answer]:
-    if case.stratum == REAL:
-        return folder.name, _real(case, folder)
-    plan = Plan((), case.tolerances, case.leave_out, backbone=case.backbone)
+    plan = Plan((), case.tolerances, backbone=case.backbone)
     sizes: list[Sized] = []
     cells: list[list[Any]] = []
     if case.effects:
@@ -136,7 +135,12 @@ def _one(source: Generator, case: Drawn, folder: Path, known: Sizes) -> tuple[st
         }
         for one, target in zip(sizes, case.targets, strict=True)
     ]
-    return folder.name, _answer(case, effects, cells)
+    number = None
+    if case.stratum == "wrong-number":
+        number = describe_wrong(folder, source.true_numbers(plan, case.seed), np.random.default_rng(case.seed))
+        formula = f"{number['name']} is {number['true']:g}, described as {number['described']:g}"
+        effects = [{"name": EFFECT_OF[number["name"]], "formula": formula, "strength": None, "detectability": None}]
+    return folder.name, _answer(case, effects, cells, number)
 
 
 def sized(
@@ -160,14 +164,6 @@ def sized(
         else:
             sizes.append(size(lambda one: bench.detectability(made((one,))), effect, target, source.strongest))
     return sizes, bench.cells(made(tuple(size.effect for size in sizes)))
-
-
-def _real(case: Drawn, folder: Path) -> Answer:
-    """Write a fault in a measured log; neither the fault's size in detection limits nor the log's own gap is known."""
-    one = list(real_cases(np.random.default_rng(case.seed)))[case.number]
-    one.write(folder)
-    effects = [{"name": name, "formula": str(one.numbers), "detectability": None} for name in one.effects]
-    return _answer(case._replace(group=one.effects), effects, [])
 
 
 def size(worth: Callable[[Effect], float], effect: Effect, target: float, strongest: float) -> Sized:
@@ -197,14 +193,15 @@ def _four_digits(value: float) -> float:
     return float(f"{value:.4g}")
 
 
-def _answer(case: Drawn, effects: list[dict[str, Any]], cells: list[list[Any]]) -> Answer:
+def _answer(
+    case: Drawn, effects: list[dict[str, Any]], cells: list[list[Any]], number: dict[str, Any] | None
+) -> Answer:
     return {
         "stratum": case.stratum,
-        "verdict": {"no-gap": "no-gap", "outside": "unexplained"}.get(case.stratum, "effect"),
+        "verdict": VERDICTS.get(case.stratum, "effect"),
         "effects": effects,
-        "group": list(case.group),
+        "number": number,
         "tolerances": case.tolerances,
-        "leave_out": list(case.leave_out),
         "backbone": case.backbone,
         "counterfactual_seed": case.seed,
         "cells": cells,

@@ -5,7 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.synthetic.folder import make_evidence
+from diagnosis.evidence.manifest import rig_numbers
+from diagnosis.synthetic import folder as synthetic
+from diagnosis.synthetic.folder import Case, make_evidence, paper_rig
 from tests.blind.generators import Plan
 from tests.blind.plant_sizes import EFFECT_SIZES, Sizes, possible
 from tests.made_protocols import case_of
@@ -56,10 +58,18 @@ class Plant:
     def formula(self, effect: PlantEffect) -> str:
         return str(effect.numbers)
 
+    def true_numbers(self, plan: Plan, seed: int) -> dict[str, float]:
+        case, described = self._case(plan), paper_rig()
+        of_rig, _ = np.random.SeedSequence(seed).spawn(2)
+        table = synthetic._rig_table(described, case.drive, case.tolerances)  # noqa: SLF001
+        return rig_numbers(synthetic._draw_rig(np.random.default_rng(of_rig), described, table, case).config)  # noqa: SLF001
+
     def make(self, folder: Path, plan: Plan, seed: int) -> None:
+        make_evidence(folder, self._case(plan), seed)
+
+    def _case(self, plan: Plan) -> Case:
         effects = {effect.name: effect.numbers for effect in plan.effects}
-        case = case_of(self._protocol, effects, leave_out=plan.leave_out, spread=plan.tolerances, rough=not plan.smooth)
-        make_evidence(folder, case, seed)
+        return case_of(self._protocol, effects, leave_out=plan.leave_out, spread=plan.tolerances, rough=not plan.smooth)
 
 
 def drawn(random: np.random.Generator, name: str, sizes: Sizes) -> PlantEffect:

@@ -9,6 +9,8 @@ from bench.blind.outcomes import Opened, opened
 from tests import made_up
 from tests.blind.generators import Plan
 
+MANIFEST = made_up.MANIFEST.replace("\n[[run]]", "\n[rig.tolerance]\ncoulomb_force_N = 0.03\n\n[[run]]")
+
 
 class Bump(NamedTuple):
     """An effect."""
@@ -36,9 +38,12 @@ class StandIn:
     def formula(self, effect: Bump) -> str:
         return f"bump {effect.strength}"
 
+    def true_numbers(self, plan: Plan, seed: int) -> dict[str, float]:  # noqa: ARG002
+        return {"coulomb_force_N": 14.2}
+
     def make(self, folder: Path, plan: Plan, seed: int) -> None:  # noqa: ARG002
         made_up.evidence_folder(folder)
-        (folder / "manifest.toml").write_text(made_up.MANIFEST)  # the same whatever the folder's name
+        (folder / "manifest.toml").write_text(MANIFEST)  # the same whatever the folder's name
         path = folder / "run-01.csv"
         rows = path.read_text().splitlines()
         more_N = sum(effect.strength for effect in plan.effects)

@@ -34,7 +34,6 @@ def tool(part, tmp_path_factory):
         patch.setattr(making, "generator", lambda _name: Independent(RUNS))
         patch.setattr(making, "sized", known)
         patch.setattr(making, "draw", lambda *asked: [case for case in strata.draw(*asked) if case.seed in part.seeds])
-        patch.setattr(strata, "_real_faults", lambda: 0)  # measured logs have separate tests
         asked = ("--cases", CASES, "--seed", SEED, "--out", sealed, "--key", key, "--jobs", 1)
         succeeds(making_app, "make", *asked)
     succeeds(app, "blind", "run", sealed, "--jobs", part.jobs)

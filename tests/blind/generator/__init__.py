@@ -10,10 +10,10 @@ case.py      a case, from seed to folder
 Signs as in the paper: a force is positive when it pulls in +x. The sources of the formulas are named next to them.
 """
 
-from tests.blind.generator.case import Case, make, simulate
+from tests.blind.generator.case import Case, make, numbers, simulate
 from tests.blind.generator.effect import Effect
 from tests.blind.generator.library import LIBRARY, draw_effect
 from tests.blind.generator.outside import OUTSIDE
 from tests.blind.generator.outside_2 import OUTSIDE_2
 
-__all__ = ["LIBRARY", "OUTSIDE", "OUTSIDE_2", "Case", "Effect", "draw_effect", "make", "simulate"]
+__all__ = ["LIBRARY", "OUTSIDE", "OUTSIDE_2", "Case", "Effect", "draw_effect", "make", "numbers", "simulate"]

@@ -14,7 +14,7 @@ from tests.blind.generator.chain import draw_chain, measure
 from tests.blind.generator.effect import Effect, Signals
 from tests.blind.generator.evidence import COLUMNS, file_name, manifest, write_run
 from tests.blind.generator.kernel import SAMPLE_RATE_HZ, STATES, SUBSTEPS, integrate, place_force_N, spring_force_N
-from tests.blind.generator.rig import Start, draw_rig, draw_starts
+from tests.blind.generator.rig import DESCRIBED, Start, draw_rig, draw_starts
 from tests.blind.generator.runs import PROTOCOL, Plan, Tracks, tracks_of
 from tests.blind.generator.surface import STEP_m, draw_surface, track_m
 
@@ -120,6 +120,12 @@ def _run(params: np.ndarray, level: np.ndarray, start: Start, force: float, trac
         "vibration_frequency_Hz": tracks.frequency_Hz,
         "vibration_amplitude_m": tracks.commanded_m[:-1],
     }
+
+
+def numbers(case: Case, seed: int) -> dict[str, float]:
+    """The numbers of the rig of a case without its effects, by key of the manifest."""
+    params = draw_rig(_stream(seed, "rig"), case.backbone, case.tolerances)
+    return {name: float(params[name][0]) for name in DESCRIBED}
 
 
 def simulate(case: Case, seed: int, plans: tuple[Plan, ...] = PROTOCOL, finer: int = 1) -> list[Signals]:

@@ -44,6 +44,10 @@ class Workshop:
         numbers = effect.scaled(max(effect.strength, 1e-9)).values(dict.fromkeys((n.unit for n in effect.numbers), 1.0))
         return f"{formula}; {', '.join(f'{name} = {value:.4g}{units[name]}' for name, value in numbers.items())}"
 
+    def true_numbers(self, plan: Plan, seed: int) -> dict[str, float]:
+        """The numbers of the rig, by key of the manifest."""
+        return self.bench(plan, seed)[0].true
+
     def make(self, folder: Path, plan: Plan, seed: int) -> None:
         """Evidence; the same plan and seed give the same bytes, and without its effects the same rig without them."""
         rig, campaign = self.bench(plan, seed)
