@@ -92,7 +92,7 @@ blind: $(READY) ## hours; what has a result is not done again: make blind CASES=
 	@test -e $(BLIND) || $(BIN)/python -m tests.blind make --cases $(CASES) --seed $(SEED) --out $(BLIND) \
 		--key $(BLIND).key.json --generator $(GENERATOR)
 	@$(BIN)/python -m bench blind run $(BLIND)
-	@$(BIN)/python -m bench blind score $(BLIND) --key $(BLIND).key.json --baselines --json $(BLIND).json --report $(BLIND).html
+	@$(BIN)/python -m bench blind score $(BLIND) --key $(BLIND).key.json --oracle --json $(BLIND).json --report $(BLIND).html
 
 real: $(READY) ## some minutes; needs the public logs in ../shared/data: make real OUT=runs/real ARGS="--known"
 	@$(BIN)/python -m tests.real --out $(or $(OUT),runs/real) $(ARGS)

@@ -38,8 +38,8 @@ FORMATS = {
     for form in (
         Format("bank", "A family of the bank of `python -m bench control`, as in bench/control/scenarios.", _bank),
         Format(
-            "blind-scores-2",
-            "`python -m bench blind score --json` and `blind pool --json`, format blind-scores/2.",
+            "blind-scores-3",
+            "`python -m bench blind score --json` and `blind pool --json`, format blind-scores/3.",
             "bench.blind.pooling:BlindScores",
         ),
         Format("bench-control-result", "`python -m bench control --json`.", "bench.control.result:BankResult"),

@@ -8,7 +8,7 @@ intervals       rates with Wilson's interval, means and ratios with the interval
 calibration     whether 80 % means 80 %
 locating        whether the diagnosis finds the gap where the effect is
 scoring         all scores of one method over one set
-baselines       simpler methods for comparison, which answer from numbers that the diagnosis computes anyway
+rivals          the methods of `python -m bench judge` on the same cases
 oracle          how far the true effects close the gap when their names are known
 pooling         kept scores of several sets read and scored together
 table, report   the scores as text; as one HTML file with pictures (template: report.html.j2)

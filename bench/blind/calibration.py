@@ -1,19 +1,16 @@
 """Whether the probabilities are right: of the answers at 80 %, 80 % should be right."""
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from bench.blind.intervals import Score, bootstrapped, mean, rate
+from bench.blind.intervals import Score, bootstrapped, rate
 from bench.blind.outcomes import Opened
 
-_BINS = 10  # most bins
+_BINS = 5  # most bins
 _FEWEST_IN_BIN = 10  # fewest cases in a bin; with fewer, chance alone makes its rate
 _DRAWS = 1000  # random sets of answers for the error by chance alone
-# Lowest probability in the log score. Smaller: a single certain mistake is the whole score. Larger: such mistakes cost little.
-_LEAST_PROBABILITY = 1e-6
 
 
 class Bin(NamedTuple):
@@ -61,17 +58,6 @@ def error_of_perfect(pairs: Sequence[tuple[float, bool]]) -> Score | None:
     drawn = [_error([(p, bool(random.random() < p)) for p, _ in pairs]) for _ in range(_DRAWS)]
     low, high = np.quantile(drawn, (0.025, 0.975))
     return Score(float(np.mean(drawn)), float(low), float(high), len(pairs))
-
-
-def log_score(cases: Sequence[Opened]) -> Score | None:
-    """Mean logarithm of the probability of the right candidate, over every case with one right answer; 0 is perfect."""
-    return mean(
-        [
-            math.log(max(case.probability(case.right_candidate), _LEAST_PROBABILITY))
-            for case in cases
-            if case.right_candidate is not None
-        ]
-    )
 
 
 def _error(pairs: Sequence[tuple[float, bool]]) -> float:

@@ -20,9 +20,14 @@ blind_app = typer.Typer(
     help="How good is the diagnosis? Sealed cases, diagnosed without the answers, scored.",
     no_args_is_help=True,
 )
-SetArgument = Annotated[Path, typer.Argument(metavar="DIR", help="A set that `python -m tests.blind make` made.")]
+SetArgument = Annotated[
+    Path, typer.Argument(metavar="DIR", help="A set that `python -m tests.blind make` made, or a folder of sets.")
+]
+Rival = Annotated[list[str], typer.Option(help="A method of `python -m bench judge` to compare with. Repeatable.")]
 Jobs = Annotated[int | None, typer.Option(min=1, help="Processes to use; all cores if not given.")]
-Key = Annotated[Path, typer.Option(help="The key file with the answers, outside DIR.")]
+Key = Annotated[
+    Path, typer.Option(help="The key file, outside DIR; of several sets the folder of their keys, SET.key.")
+]
 Report = Annotated[Path | None, typer.Option(metavar="FILE", help="Write a report, one .html file.")]
 
 
@@ -34,22 +39,30 @@ class SetDone(NamedTuple):
 
 
 @blind_app.command("run")
-def blind_run(folder: SetArgument, jobs: Jobs = None, as_json: Json = None) -> None:
+def blind_run(folder: SetArgument, rival: Rival = [], jobs: Jobs = None, as_json: Json = None) -> None:  # noqa: B006
     """Diagnose every case that has no result yet, without the key. A stopped run continues with the next call."""
 
     def work() -> None:
         from joblib import cpu_count
 
+        from bench.blind.opening import sets_of
+        from bench.blind.rivals import ask_rivals
         from bench.blind.running import missing, run
         from cockpit.commands.diagnose_output import in_a_line, watched
 
         end_like_ctrl_c()
-        todo = len(missing(folder))
+        sets = sets_of(folder).values()
+        todo = sum(len(missing(one)) for one in sets)
         began = time.monotonic()
-        with writing(), watched() as progress, closing(run(folder, jobs or cpu_count())) as outcomes:
-            for done, outcome in enumerate(outcomes, 1):
-                left_min = (time.monotonic() - began) / done * (todo - done) / 60.0
-                progress(f"{done} of {todo}, {left_min:.0f} min left: {in_a_line(outcome)}", done / todo)
+        done = 0
+        with writing(), watched() as progress:
+            for one in sets:
+                with closing(run(one, jobs or cpu_count())) as outcomes:
+                    for outcome in outcomes:
+                        done += 1
+                        left_min = (time.monotonic() - began) / done * (todo - done) / 60.0
+                        progress(f"{done} of {todo}, {left_min:.0f} min left: {in_a_line(outcome)}", done / todo)
+                ask_rivals(one, rival, jobs or cpu_count(), progress)
         words = [f"all cases have results    {folder}", f"next    python -m bench blind score {folder} --key KEY"]
         print_result(as_json, SetDone(str(folder), todo), words)
 
@@ -62,7 +75,8 @@ def blind_score(
     key: Key,
     as_json: Json = None,
     report: Report = None,
-    baselines: Annotated[bool, typer.Option("--baselines", help="Score the oracle too: half a minute a case.")] = False,
+    rival: Rival = [],  # noqa: B006
+    oracle: Annotated[bool, typer.Option("--oracle", help="Ask the oracle too: half a minute a case.")] = False,
     partial: Annotated[bool, typer.Option("--partial", help="Score although results are missing.")] = False,
     jobs: Jobs = None,
 ) -> None:
@@ -71,19 +85,21 @@ def blind_score(
     def work() -> None:
         from joblib import cpu_count
 
-        from bench.blind.opening import open_set, with_oracle
+        from bench.blind.opening import compared, open_sets, sets_of
+        from bench.judge.methods import known
         from cockpit.commands.diagnose_output import watched
 
         end_like_ctrl_c()
+        known(rival)
         for option, path in (("--json", as_json), ("--report", report)):
             refuse_to_lose([key], "the key", option, path)
         if report is not None:
             check_output("--report", report, PAGE)
         with writing(), watched() as progress:
-            opened_set = open_set(folder, key, partial)
-            if baselines:
-                opened_set = with_oracle(opened_set, folder, jobs or cpu_count(), progress)
-        _told(opened_set, folder.name, as_json, report, [])
+            sets = open_sets(folder, key, partial)
+            for name, path in sets_of(folder).items():
+                sets[name] = compared(sets[name], path, rival, oracle, jobs or cpu_count(), progress)
+        _told(sets, as_json, report, [])
 
     carry_out(work, as_json)
 
@@ -99,26 +115,29 @@ def blind_pool(
     """Score several opened sets of one version together, or one again, from the files of their scores."""
 
     def work() -> None:
-        from bench.blind.pooling import pooled
+        from bench.blind.pooling import read_sets
 
         for option, path in (("--json", as_json), ("--report", report)):
             refuse_to_lose(files, "one of the files to read", option, path)
         if report is not None:
             check_output("--report", report, PAGE)
-        _told(pooled(files), ", ".join(path.stem for path in files), as_json, report, files)
+        _told(read_sets(files), as_json, report, files)
 
     carry_out(work, as_json)
 
 
-def _told(opened_set: "OpenedSet", name: str, as_json: Path | None, report: Path | None, files: list[Path]) -> None:
-    from bench.blind.opening import scored
+def _told(sets: "dict[str, OpenedSet]", as_json: Path | None, report: Path | None, files: list[Path]) -> None:
+    from bench.blind.opening import scored, together
     from bench.blind.pooling import kept_scores
     from bench.blind.report import write_report
-    from bench.blind.table import table
+    from bench.blind.table import TOOL, table
 
+    opened_set = together(sets)
     methods = scored(opened_set)
+    by_set = {Path(name).stem: scored(one)[TOOL] for name, one in sets.items()}
     with writing():  # before printing, as a closed pipe ends the program there
         if report is not None:
-            write_report(methods, opened_set.sealed, name, report, files)
-    words = [table(methods, opened_set.sealed), *(["", f"report     {report}"] if report is not None else [])]
-    print_result(as_json, kept_scores(opened_set, methods), words)
+            write_report(methods, by_set, opened_set.sealed, report, files)
+    text = table(methods, by_set, opened_set.sealed)
+    words = [text, *(["", f"report     {report}"] if report is not None else [])]
+    print_result(as_json, kept_scores(opened_set, methods, by_set), words)

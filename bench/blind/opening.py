@@ -1,15 +1,15 @@
-"""From a set, its key and its results to the scores of the diagnosis and of the methods for comparison."""
+"""From sets, their keys and their results to the scores of the diagnosis and of its rivals."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from bench.blind import baselines
 from bench.blind.oracle import oracle
 from bench.blind.outcomes import Opened, opened
+from bench.blind.rivals import Rivals, answered, ask_rivals
 from bench.blind.running import missing, results
 from bench.blind.scoring import Oracle, Scores, score
-from bench.blind.sealing import mark_opened, opened_answers
+from bench.blind.sealing import SET, mark_opened, opened_answers
 from bench.blind.table import TOOL
 from bridge.faults import Fault
 
@@ -23,13 +23,27 @@ class OpenedSet(NamedTuple):
     sealed: bool  # True if no answer was known when the results were made
     tool: str  # version of the diagnosis that made the results
     oracle: Oracle | None = None  # share of the gap that the true effects close, by case; None: not computed
+    rivals: Rivals = {}
 
 
-def open_set(folder: Path, key: Path, partial: bool) -> OpenedSet:
-    """Check every hash, open the answers and mark the set.
+def sets_of(folder: Path) -> dict[str, Path]:
+    """The set in this folder, or all sets in folders of it, by name."""
+    inside = {path.parent.name: path.parent for path in sorted(folder.glob(f"*/{SET}"))}
+    return {folder.name: folder} if (folder / SET).is_file() or not inside else inside
 
-    Raises Fault SEAL_BROKEN for a wrong hash, and BAD_SET for missing results unless `partial`; a set that raises stays unopened.
+
+def open_sets(folder: Path, key: Path, partial: bool) -> dict[str, OpenedSet]:
+    """Check every hash, open the answers and mark the sets; the keys of several sets are KEY/<set>.key.
+
+    Raises Fault SEAL_BROKEN for a wrong hash, and BAD_SET for missing results unless `partial`; then all sets stay unopened.
     """
+    sets = sets_of(folder)
+    keys = {name: key if path == folder else key / f"{name}.key" for name, path in sets.items()}
+    checked = {name: _checked(path, keys[name], partial) for name, path in sets.items()}
+    return {name: one._replace(sealed=mark_opened(sets[name]) and one.sealed) for name, one in checked.items()}
+
+
+def _checked(folder: Path, key: Path, partial: bool) -> OpenedSet:
     answers = opened_answers(folder, key)
     left = missing(folder)
     if len(left) == len(answers) or (left and not partial):
@@ -41,22 +55,47 @@ def open_set(folder: Path, key: Path, partial: bool) -> OpenedSet:
     published = any(answer.get("published", True) for answer in answers.values())
     # `blind run` makes results of one version only
     tool = str(next(iter(outcomes.values())).get("tool", "unknown"))
-    return OpenedSet(cases, mark_opened(folder) and not published, tool)
+    return OpenedSet(cases, not published, tool)
 
 
-def with_oracle(opened_set: OpenedSet, folder: Path, jobs: int, progress: Progress) -> OpenedSet:
-    """The set with the answers of the oracle, which needs its own computation."""
-    return opened_set._replace(oracle=oracle(folder, opened_set.cases, jobs, progress))
+def compared(
+    opened_set: OpenedSet, folder: Path, rivals: list[str], ask_oracle: bool, jobs: int, progress: Progress
+) -> OpenedSet:
+    """The set with the answers of rivals, and of the oracle, which needs its own computation."""
+    opened_set = opened_set._replace(rivals=ask_rivals(folder, rivals, jobs, progress))
+    return opened_set._replace(oracle=oracle(folder, opened_set.cases, jobs, progress)) if ask_oracle else opened_set
+
+
+def together(sets: Mapping[str, OpenedSet]) -> OpenedSet:
+    """All cases as one set. Raises Fault BAD_SET where versions differ or a case is in two of the sets."""
+    tools = {one.tool for one in sets.values()}
+    if len(tools) > 1:
+        line = f"{', '.join(sets)}: results of the versions {' and '.join(sorted(tools))}: must be of one;"
+        raise Fault("BAD_SET", f"{line} score each for itself")
+    seen: dict[int, str] = {}  # by the seed of a case, as a case that was made a second time has another name
+    for name, one in sets.items():
+        for case in one.cases:
+            if (other := seen.setdefault(case.answer["counterfactual_seed"], name)) != name:
+                raise Fault("BAD_SET", f"{name}: case {case.name} is in {other} too: must be in one; leave one out")
+    asked = all(one.oracle is not None for one in sets.values())
+    methods = dict.fromkeys(method for one in sets.values() for method in one.rivals)
+    return OpenedSet(
+        [case for one in sets.values() for case in one.cases],
+        all(one.sealed for one in sets.values()),
+        tools.pop(),
+        {name: closed for one in sets.values() for name, closed in (one.oracle or {}).items()} if asked else None,
+        {
+            method: {name: answer for one in sets.values() for name, answer in one.rivals.get(method, {}).items()}
+            for method in methods
+        },
+    )
 
 
 def scored(opened_set: OpenedSet) -> dict[str, Scores]:
-    """Scores by method, the diagnosis first."""
-    cases, best = opened_set.cases, opened_set.oracle
-    methods = {
-        TOOL: cases,
-        "parameters": [baselines.parameters_only(case) for case in cases],
-        "BIC": [baselines.lowest_bic(case) for case in cases],
+    """Scores by method, the diagnosis first; those of a rival over the cases that it was asked about."""
+    cases, best = opened_set.cases, opened_set.oracle or {}
+    others = {
+        method: [answered(case, answers[case.name]) for case in cases if case.name in answers]
+        for method, answers in opened_set.rivals.items()
     }
-    if best is not None:
-        methods["oracle"] = [baselines.told(case, best.get(case.name)) for case in cases]
-    return {name: score(answers, best or {}) for name, answers in methods.items()}
+    return {name: score(chosen, best) for name, chosen in ({TOOL: cases} | others).items()}

@@ -1,10 +1,11 @@
 """One opened case: the true answer, and the result of a method."""
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
-OTHER_NAMES = ("none", "unexplained")
-_MOST = 0.5  # closed share of the held-out gap from which "partly" counts as a name, not as "unexplained"
+_MOST = 0.5  # closed share of the held-out gap from which a name counts, below it the gap counts as unexplained
+_NEAR = 0.02  # relative distance within which a found number is right
 # the result of a case that ended in a fault: no answer, so every score counts the case as wrong
 _NOTHING_SAID: dict[str, Any] = {
     "verdict": "fault",
@@ -18,7 +19,7 @@ _NOTHING_SAID: dict[str, Any] = {
 
 
 class Opened(NamedTuple):
-    """Answer and result of one case; `diagnosis` has some or all keys of a diagnosis, with `unexplained` among the candidates."""
+    """Answer and result of one case; `diagnosis` has some or all keys of a diagnosis."""
 
     name: str
     answer: dict[str, Any]
@@ -41,12 +42,10 @@ class Opened(NamedTuple):
 
     @property
     def right_candidate(self) -> str | None:
-        """The candidate that should have the whole probability; None where several are right or the right one is unknown."""
-        if self.stratum in {"indistinguishable", "real-log"}:
-            return None
-        if self.answer["verdict"] == "effect":
-            return next(iter(self.truth)) if len(self.truth) == 1 else None
-        return "none" if self.answer["verdict"] == "no-gap" else "unexplained"
+        """The candidate that should have the whole probability; None where several are right, or a described number is wrong."""
+        if self.stratum == "one-effect":
+            return next(iter(self.truth))
+        return {"no-gap": "none", "outside": "unexplained"}.get(self.stratum)
 
     @property
     def verdict(self) -> str:
@@ -56,10 +55,27 @@ class Opened(NamedTuple):
     @property
     def told_outside(self) -> bool:
         """Whether the result reports that no known effect accounts for most of the gap."""
-        if self.verdict != "partly":
+        if not self.named:
             return self.verdict == "unexplained"
         share = self.diagnosis["gap"].get("shrinkage")
-        return share is None or share < _MOST
+        return self.verdict == "partly" if share is None else share < _MOST
+
+    @property
+    def number_named(self) -> bool:
+        """Whether the result reports that the number whose description is wrong was described wrong."""
+        return self.verdict == "described" and self._found is not None
+
+    @property
+    def number_right(self) -> bool:
+        """Whether it also gives the true value of this number."""
+        true = self.answer["number"]["true"]
+        return self.number_named and abs((self._found or math.nan) / true - 1.0) <= _NEAR
+
+    @property
+    def _found(self) -> float | None:
+        """Value that the result gives for the number whose description is wrong."""
+        found = {row["name"]: row["found"] for row in self.diagnosis.get("numbers", ())}
+        return found.get(self.answer["number"]["name"])
 
     @property
     def named(self) -> frozenset[str]:
@@ -77,9 +93,20 @@ class Opened(NamedTuple):
 
     @property
     def ranked(self) -> list[tuple[str, float]]:
-        """Candidates and their probabilities, the largest probability first."""
-        candidates = [(row["effect"], float(row["probability"] or 0.0)) for row in self.diagnosis["candidates"]]
-        return sorted(candidates, key=lambda pair: -pair[1])
+        """Candidates, with `unexplained`, and their probabilities, the largest probability first."""
+        shares = self._candidates
+        if "complete" in self.diagnosis:  # diagnosis/3; in diagnosis/2 `unexplained` is a candidate
+            shares = with_unexplained(self.diagnosis["candidates"], self.diagnosis["complete"])
+        return sorted(shares.items(), key=lambda pair: -pair[1])
+
+    @property
+    def leading(self) -> list[str]:
+        """The candidates of the result, the most probable first."""
+        return sorted(self._candidates, key=lambda name: -self._candidates[name])
+
+    @property
+    def _candidates(self) -> dict[str, float]:
+        return {row["effect"]: float(row["probability"] or 0.0) for row in self.diagnosis["candidates"]}
 
     def probability(self, name: str) -> float:
         """Probability of one candidate; 0 where the result does not list it."""
@@ -98,7 +125,7 @@ class Opened(NamedTuple):
             "case": self.name,
             "kind": self.stratum,
             "effects": [{key: effect.get(key) for key in keys} for effect in self.answer["effects"]],
-            "channels_left_out": self.answer["leave_out"],
+            "number": self.answer.get("number"),
             "verdict": self.verdict,
             "named": sorted(self.named),
             "group": sorted(self.group),
@@ -112,11 +139,6 @@ def opened(name: str, answer: dict[str, Any], result: dict[str, Any]) -> Opened:
     """A case from its answer and the content of its result file."""
     if "fault" in result:
         return Opened(name, answer, dict(_NOTHING_SAID))
-    if "complete" in result:  # diagnosis/3; in diagnosis/2 `unexplained` is a candidate
-        shares = with_unexplained(result["candidates"], result["complete"])
-        rows = {row["effect"]: row for row in result["candidates"]}
-        candidates = [rows.get(effect, {"effect": effect}) | {"probability": share} for effect, share in shares.items()]
-        result = result | {"candidates": candidates}
     return Opened(name, answer, _NOTHING_SAID | result)
 
 

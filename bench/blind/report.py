@@ -18,12 +18,14 @@ if TYPE_CHECKING:
 _DPI = 110.0
 
 
-def write_report(methods: dict[str, Scores], sealed: bool, name: str, path: Path, files: Iterable[Path] = ()) -> None:
+def write_report(
+    methods: dict[str, Scores], by_set: dict[str, Scores], sealed: bool, path: Path, files: Iterable[Path] = ()
+) -> None:
     """Write the page, with the hashes of the `files` of the scores at its foot. Raises OSError."""
     tool = methods[TOOL]
     page = filled_page(
         Path(__file__).with_name("report.html.j2"),
-        f"Blind score of {name}",
+        f"Blind score of {', '.join(by_set)}",
         provenance(files).footer(),
         headline=headline(tool, sealed),
         methods=list(methods),
@@ -33,7 +35,7 @@ def write_report(methods: dict[str, Scores], sealed: bool, name: str, path: Path
             ("Does 80 % mean 80 %?", png(_reliability(tool), _DPI)),
             ("Wrong answers", png(_confusions(tool), _DPI)),
         ],
-        text=table(methods, sealed),
+        text=table(methods, by_set, sealed),
     )
     write_whole(path, page)
 

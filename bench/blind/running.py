@@ -1,8 +1,10 @@
 """Every case of a sealed set diagnosed by the product itself, without the key. A case with a result is not diagnosed again."""
 
 import json
+import time
 from collections.abc import Generator
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +13,8 @@ from bridge.faults import Fault
 from bridge.results import strict_json, write_json
 from diagnosis import diagnose_many as many
 from diagnosis.diagnose_many import EvidenceFolder, FolderResult
+from diagnosis.evidence.folder import Evidence
+from diagnosis.result import Diagnosis
 from diagnosis.version import tool_version
 
 FAULT_FORMAT = "fault/1"
@@ -41,15 +45,23 @@ def run(folder: Path, jobs: int) -> Generator[FolderResult]:
             )
             raise Fault("BAD_SET", f"{line} continue with that version, or delete {folder / RESULTS} and start again")
     sources = [EvidenceFolder(name, folder / name) for name in missing(folder)]
-    with closing(many.diagnose_many(sources, jobs, "", many.real_diagnose, shared=False)) as outcomes:
+    diagnose = partial(_in_cpu_time, many.real_diagnose)
+    with closing(many.diagnose_many(sources, jobs, "", diagnose, shared=False)) as outcomes:
         for outcome in outcomes:
             write_json(result_file(folder, outcome.source.name), _as_json(outcome) | {"tool": tool})
             yield outcome
 
 
+def _in_cpu_time(diagnose: many.Diagnose, evidence: Evidence, progress: many.Progress, jobs: int) -> Diagnosis:
+    before_s = time.process_time()
+    diagnosis = diagnose(evidence, progress, jobs)
+    return diagnosis._replace(elapsed_s=round(time.process_time() - before_s, 2))
+
+
 def _as_json(outcome: FolderResult) -> dict[str, Any]:
     if outcome.diagnosis is not None:
-        return strict_json(outcome.diagnosis)
+        table = strict_json(outcome.diagnosis)
+        return table | {"cpu_s": table.pop("elapsed_s")}  # as `_in_cpu_time` measured
     code, line = outcome.fault or ("", "")
     return {"format": FAULT_FORMAT, "fault": code, "line": line}
 

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
-from bench.blind.calibration import Bin, calibration_error, error_of_perfect, judged, log_score, reliability
-from bench.blind.intervals import Score, mean, rate, ratio
+import numpy as np
+
+from bench.blind.calibration import Bin, calibration_error, error_of_perfect, judged, reliability
+from bench.blind.intervals import Score, bootstrapped, mean, rate, ratio
 from bench.blind.locating import f1
-from bench.blind.outcomes import OTHER_NAMES, Opened
-from diagnosis.model.sensor_chain import SENSOR_EFFECTS
+from bench.blind.outcomes import Opened
 
 _SURE = 0.8  # probability above which an answer counts as sure
 _VISIBLE = 2.0  # detection limits from which an effect counts as visible
@@ -32,14 +33,6 @@ class Singles(NamedTuple):
     wrong: Score | None  # an effect is named, and the true effect is not in its group
 
 
-class Unclear(NamedTuple):
-    """Scores of cases whose channels cannot separate a group of effects."""
-
-    in_group: Score | None  # the true effect is in the named group
-    group_told: Score | None  # the result gives two or more effects of the true group together
-    experiment: Score | None  # the result proposes a run that would separate the leading explanations
-
-
 class Scores(NamedTuple):
     """All scores of one method."""
 
@@ -51,28 +44,20 @@ class Scores(NamedTuple):
     by_effect: dict[str, Singles]
     by_backbone: dict[str, Singles]
     false_alarms: Score | None
-    false_alarms_wide: Score | None  # false alarms of rigs drawn from wider tolerances than usual
-    outside_caught: Score | None  # effect outside the library: "unexplained", or "partly" with less than half closed
-    outside_caught_visible: Score | None  # the same for effects of 2 detection limits or more
-    outside_named: Score | None  # effect outside the library, but the result names an effect
-    sure_of_wrong_name: Score | None  # an effect that the rig lacks has p > 0.8; real logs do not count
-    sure_of_wrong_answer: Score | None  # a wrong answer, "none" and "unexplained" included, has p > 0.8
-    named_wrong: Score | None  # effects are named, and none of the true effects is in the group
     pair_f1: Score | None
-    pair_exact: Score | None
-    pair_one_right: Score | None
-    unclear: Unclear
-    real_logs: Singles  # sensor faults added to measured logs, whose gaps are unknown
-    log_score: Score | None
+    outside_caught: Score | None  # effect outside the library: "unexplained", or the named effects close less than half
+    number_named: Score | None  # wrong number of the description: "described", with this number
+    number_right: Score | None  # the same, and its value is within 2 % of the true one
+    sure_of_wrong_name: Score | None  # an effect that the rig lacks has p > 0.8; rigs without a gap do not count
     calibration_error: Score | None
     calibration_error_of_perfect: Score | None  # error of perfect probabilities by chance, for so many cases
     reliability: tuple[Bin, ...]
-    sensor_or_physics: Score | None  # the named effect is of the right kind: sensor or rig
     locating_f1: Score | None
     shrinkage: Score | None  # mean share of the held-out gap that the named effects close
     shrinkage_of_oracle: Score | None
     interval_coverage: Score | None
-    seconds: Score | None
+    cpu_median_s: Score | None
+    cpu_95_s: Score | None  # 95 % of the cases need less
     confusions: tuple[tuple[str, str, int], ...]  # wrong answers: truth, answer, number of cases
 
 
@@ -82,15 +67,12 @@ def score(cases: Sequence[Opened], oracle: Oracle) -> Scores:
     no_gap = [case for case in cases if case.stratum == "no-gap"]
     outside = [case for case in cases if case.stratum == "outside"]
     pair = [case for case in cases if case.stratum == "two-effects"]
-    unclear = [case for case in cases if case.stratum == "indistinguishable"]
-    made = [case for case in cases if case.stratum != "real-log"]
-    one_right = [case for case in made if case.right_candidate is not None]
+    number = [case for case in cases if case.stratum == "wrong-number"]
     visible = [case for case in single if case.detectability >= _VISIBLE]
     pairs = judged(cases)
-    named_one = [case for case in single if case.named]
     located = [f1(case) for case in (*single, *pair, *outside)]
     shrunk = [value for case in (*single, *pair) if (value := case.diagnosis["gap"].get("shrinkage")) is not None]
-    seconds = [case.diagnosis["elapsed_s"] for case in cases if "elapsed_s" in case.diagnosis]
+    cpu_s = [case.diagnosis["cpu_s"] for case in cases if case.diagnosis.get("cpu_s") is not None]
     return Scores(
         cases=len(cases),
         faults=sum(case.verdict == "fault" for case in cases),
@@ -106,32 +88,20 @@ def score(cases: Sequence[Opened], oracle: Oracle) -> Scores:
             for name in sorted({case.answer["backbone"] for case in visible if case.answer["backbone"]})
         },
         false_alarms=rate([case.verdict != "no-gap" for case in no_gap]),
-        false_alarms_wide=rate([case.verdict != "no-gap" for case in no_gap if case.answer["tolerances"] > 1.0]),
-        outside_caught=rate([case.told_outside for case in outside]),
-        outside_caught_visible=rate([case.told_outside for case in outside if case.detectability >= _VISIBLE]),
-        outside_named=rate([bool(case.named) for case in outside]),
-        sure_of_wrong_name=rate([_sure_of(case, effects_only=True) for case in made]),
-        sure_of_wrong_answer=rate([_sure_of(case, effects_only=False) for case in one_right]),
-        named_wrong=rate([bool(case.group) and not (case.truth & case.group) for case in one_right]),
         pair_f1=mean([case.set_f1 for case in pair]),
-        pair_exact=rate([case.named == case.truth for case in pair]),
-        pair_one_right=rate([bool(case.named & case.truth) for case in pair]),
-        unclear=Unclear(
-            rate([bool(case.truth & case.group) for case in unclear]),
-            rate([len(case.group & set(case.answer["group"])) > 1 for case in unclear]),
-            rate([case.diagnosis["next_experiment"].get("gain") is not None for case in unclear]),
-        ),
-        real_logs=of_singles([case for case in cases if case.stratum == "real-log"]),
-        log_score=log_score(cases),
+        outside_caught=rate([case.told_outside for case in outside]),
+        number_named=rate([case.number_named for case in number]),
+        number_right=rate([case.number_right for case in number]),
+        sure_of_wrong_name=rate([_sure_of_wrong_name(case) for case in (*single, *pair, *outside, *number)]),
         calibration_error=calibration_error(pairs),
         calibration_error_of_perfect=error_of_perfect(pairs),
         reliability=tuple(reliability(pairs)),
-        sensor_or_physics=rate([_class(case.named) == _class(case.truth) for case in named_one]),
         locating_f1=mean([value for value in located if value is not None]),
         shrinkage=mean(shrunk),
         shrinkage_of_oracle=_of_oracle(single, oracle),
         interval_coverage=_coverage(single, oracle),
-        seconds=mean(seconds),
+        cpu_median_s=bootstrapped(cpu_s, lambda sample: float(np.median(sample))),
+        cpu_95_s=bootstrapped(cpu_s, lambda sample: float(np.quantile(sample, 0.95))),
         confusions=_confusions(cases),
     )
 
@@ -140,8 +110,8 @@ def of_singles(cases: Sequence[Opened]) -> Singles:
     """The scores of cases with one effect of the library."""
     return Singles(
         alarm=rate([case.verdict in {"effect", "partly", "described", "unexplained"} for case in cases]),
-        top_1=rate([frozenset(name for name, _ in case.ranked[:1]) == case.truth for case in cases]),
-        top_3=rate([case.truth <= {name for name, _ in case.ranked[:3]} for case in cases]),
+        top_1=rate([case.truth == set(case.leading[:1]) for case in cases]),
+        top_3=rate([case.truth <= set(case.leading[:3]) for case in cases]),
         in_group=rate([case.truth <= case.group for case in cases]),
         group_size=mean([float(len(case.group)) for case in cases if case.named]),
         wrong=rate([bool(case.group) and not case.truth <= case.group for case in cases]),
@@ -157,16 +127,8 @@ def _by_detectability(cases: Sequence[Opened]) -> dict[str, Singles]:
     return by_size
 
 
-def _sure_of(case: Opened, effects_only: bool) -> bool:
-    right = case.truth if effects_only else {case.right_candidate}
-    return any(
-        probability > _SURE and name not in right and not (effects_only and name in OTHER_NAMES)
-        for name, probability in case.ranked
-    )
-
-
-def _class(names: frozenset[str]) -> frozenset[bool]:
-    return frozenset(name in SENSOR_EFFECTS for name in names)
+def _sure_of_wrong_name(case: Opened) -> bool:
+    return any(p > _SURE and name not in {*case.truth, "none", "unexplained"} for name, p in case.ranked)
 
 
 def _of_oracle(cases: Sequence[Opened], oracle: Oracle) -> Score | None:
@@ -198,11 +160,11 @@ def _confusions(cases: Sequence[Opened]) -> tuple[tuple[str, str, int], ...]:
     for case in cases:
         answer = "+".join(sorted(case.named)) or case.verdict
         truth = "+".join(sorted(case.truth)) or "no-gap"
-        right = (
-            case.named == case.truth if case.answer["verdict"] == "effect" else case.verdict == case.answer["verdict"]
-        )
-        if case.stratum == "indistinguishable":
-            right = bool(case.truth & case.group)
+        right = case.verdict == case.answer["verdict"]
+        if case.stratum == "wrong-number":
+            right = case.number_named
+        elif case.answer["verdict"] == "effect":
+            right = case.named == case.truth
         if not right:
             counts[truth, answer] += 1
     return tuple((truth, answer, count) for (truth, answer), count in counts.most_common())

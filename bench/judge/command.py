@@ -6,7 +6,6 @@ from typing import Annotated, Any, Literal, NamedTuple
 import typer
 
 from bench.judge.scoring import Figures
-from bridge.faults import Fault
 from cockpit.commands.as_json.option import Json, carry_out, print_result
 from cockpit.run.child_process import end_like_ctrl_c
 from cockpit.run.writable import writing
@@ -33,13 +32,12 @@ def judge(
 
     def work() -> None:
         from bench.judge.cases import read_cases
-        from bench.judge.methods import Given, ask, methods
+        from bench.judge.methods import Given, ask, known, methods
         from bench.judge.scoring import Outcome, by_method, case_table, summary
         from cockpit.commands.diagnose_output import watched
 
         end_like_ctrl_c()
-        if unknown := set(method) - methods().keys():
-            raise Fault("CONFIG", f"--method {min(unknown)}: no such method; there are {', '.join(methods())}")
+        known(method)
         names = method or list(methods())
         cases = read_cases(folder, set_, half)
         outcomes: list[Outcome] = []

@@ -19,6 +19,7 @@ from diagnosis.processes import one_thread
 from diagnosis.version import NOT_JUDGED, definitions_digest
 
 Answer = dict[str, float]
+NOT_KEPT = "not kept"  # fault of a method that needs kept data which are missing
 _ROOT = Path(__file__).parents[2]
 _READERS = ("diagnosis/evidence", "diagnosis/features", "diagnosis/gap", "diagnosis/model")
 
@@ -51,6 +52,12 @@ def methods() -> dict[str, Method]:
         "lines": Method(lines.answer, (*_READERS, "bench/judge/lines.py", "bench/judge/columns.py")),
         "trees": Method(trees.answer, (*_READERS, "plant", "bench/judge/trees.py", "bench/judge/features.py")),
     }
+
+
+def known(names: Sequence[str]) -> None:
+    """Raise Fault CONFIG where one of the names is no method."""
+    if unknown := [name for name in names if name not in methods()]:
+        raise Fault("CONFIG", f"{unknown[0]}: no such method; there are {', '.join(methods())}")
 
 
 @cache
@@ -104,7 +111,7 @@ def _asked(folder: Path, name: str, case: Case, budget_s: float | None) -> Given
     except Fault as error:
         answer, fault = {}, str(error)
     if answer is None:
-        return Given(name, case.name, {}, None, "not kept")
+        return Given(name, case.name, {}, None, NOT_KEPT)
     probabilities = dict(answer)
     cpu_s = probabilities.pop("cpu_s", _cpu_s() - before)
     if bad := {key: value for key, value in probabilities.items() if not 0.0 <= value <= 1.0 + 1e-9}:

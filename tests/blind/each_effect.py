@@ -68,10 +68,8 @@ def _one(kind: str, random: np.random.Generator, ask_oracle: bool) -> dict[str, 
             {"name": one.name, "formula": SOURCE.formula(one), "detectability": round(worth, 3)}
             for one, worth in zip(effects, limits, strict=True)
         ],
-        "group": names if len(names) == 1 else [],
         "tolerances": 1.0,
         "backbone": None,
-        "leave_out": [],
         "cells": [],
     }
     return {"answer": answer, "said": verdict, "oracle": oracle}
@@ -113,4 +111,4 @@ if __name__ == "__main__":
     both = [case.set_f1 for case in cases if case.stratum == TWO and case.detectability >= VISIBLE]
     if both:
         print(f"{len(both)} pairs have two effects of {VISIBLE:g} limits or more: mean F1 {np.mean(both):.2f}.")
-    print(table({TOOL: score(seen, oracle)}, sealed=False))
+    print(table({TOOL: score(seen, oracle)}, {}, sealed=False))

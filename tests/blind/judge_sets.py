@@ -21,8 +21,7 @@ from typing import Any, NamedTuple
 import joblib
 import numpy as np
 
-from bench.blind.baselines import lowest_bic
-from bench.blind.outcomes import Opened
+from bench.blind.pooling import lowest_bic
 from bench.blind.sealing import evidence_hash
 from bridge.results import write_json
 from tests.blind import sizes
@@ -219,7 +218,6 @@ def _reopened(name: str, seed: int, row: Any, kind: str) -> Callable[[Path], dic
         effects = tuple(effect.scaled(strengths[effect.name]) for effect in case.effects)
         plan = Plan(effects, case.tolerances, backbone=case.backbone)
         source.make(folder, plan, case.seed)
-        opened_case = Opened(row["case"], answer, row["said"])
         probabilities = {candidate["effect"]: candidate["probability"] for candidate in row["said"]["candidates"]}
         return {
             "kind": kind,
@@ -229,7 +227,7 @@ def _reopened(name: str, seed: int, row: Any, kind: str) -> Callable[[Path], dic
             "formulas": [effect["formula"] for effect in answer["effects"]],
             "kept": {
                 "verdict then": {"outside": probabilities.pop("unexplained", 0.0), **probabilities},
-                "BIC then": dict(lowest_bic(opened_case).ranked),
+                "BIC then": lowest_bic(row["said"]),
             },
         }
 

@@ -61,8 +61,8 @@ class Plant:
     def true_numbers(self, plan: Plan, seed: int) -> dict[str, float]:
         case, described = self._case(plan), paper_rig()
         of_rig, _ = np.random.SeedSequence(seed).spawn(2)
-        table = synthetic._rig_table(described, case.drive, case.tolerances)  # noqa: SLF001
-        return rig_numbers(synthetic._draw_rig(np.random.default_rng(of_rig), described, table, case).config)  # noqa: SLF001
+        table = synthetic._rig_table(described, case.drive, case.tolerances)
+        return rig_numbers(synthetic._draw_rig(np.random.default_rng(of_rig), described, table, case).config)
 
     def make(self, folder: Path, plan: Plan, seed: int) -> None:
         make_evidence(folder, self._case(plan), seed)

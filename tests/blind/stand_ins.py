@@ -8,6 +8,7 @@ import numpy as np
 from bench.blind.outcomes import Opened, opened
 from tests import made_up
 from tests.blind.generators import Plan
+from tests.blind.making import VERDICTS
 
 MANIFEST = made_up.MANIFEST.replace("\n[[run]]", "\n[rig.tolerance]\ncoulomb_force_N = 0.03\n\n[[run]]")
 
@@ -70,15 +71,13 @@ def _first_N(folder: Path) -> float:
 
 def case(stratum, there, probabilities, named=None, groups=(), detectability=3.0, verdict=None, **more) -> Opened:
     """A case; by default `named` is the leading candidate."""
-    right = {"no-gap": "no-gap", "outside": "unexplained"}.get(stratum, "effect")
     answer = {
         "stratum": stratum,
-        "verdict": right,
+        "verdict": VERDICTS.get(stratum, "effect"),
         "effects": [{"name": name, "detectability": detectability} for name in there],
-        "group": list(there),
+        "number": more.pop("number", None),
         "tolerances": 1.0,
         "backbone": "lugre",
-        "leave_out": [],
         "counterfactual_seed": more.pop("seed", 1),
         "cells": more.pop("cells", []),
     }
@@ -92,7 +91,6 @@ def case(stratum, there, probabilities, named=None, groups=(), detectability=3.0
         "not_distinguishable": [list(group) for group in groups],
         "where": more.pop("where", []),
         "gap": {"shrinkage": 0.8, "interval_90": [0.7, 0.9]},
-        "next_experiment": {"gain": 3.0},
-        "elapsed_s": 10.0,
+        "cpu_s": 10.0,
     }
     return opened(more.pop("name", "a"), answer, said | more)

@@ -8,8 +8,8 @@ import pytest
 from typer.testing import CliRunner
 
 from bench.app import app
-from bench.blind.opening import OpenedSet, scored
-from bench.blind.pooling import kept_scores, pooled
+from bench.blind.opening import OpenedSet, scored, together
+from bench.blind.pooling import kept_scores, read_sets
 from bridge.faults import FAULTS
 from bridge.results import write_json
 from tests.blind.stand_ins import case
@@ -19,31 +19,29 @@ WHERE = [
     {"signal": "drive_force_N", "regime": "slip", "band_Hz": [low, 5], "run": "run-01", "share": share}
     for low, share in ((0, 0.5), (5, 0.1), (50, 0.2))
 ]
-CHI2 = {
-    "compared_features": 100,
-    "candidates": [
-        {"effect": "none", "probability": 0.2, "chi2": 60.0, "form": ""},
-        {"effect": "drive-damping", "probability": 0.8, "chi2": 50.0, "parameters": {"a": {"value": 1.0}}},
-    ],
-}
 
 
 def opened_set(number: int) -> OpenedSet:
     damped, probabilities = ["drive-damping"], {"drive-damping": 0.8}
     seed = 10 * number
     cases = [
-        case("one-effect", damped, probabilities, name=f"a{number}", seed=seed, cells=CELLS, where=WHERE, **CHI2),
+        case("one-effect", damped, probabilities, name=f"a{number}", seed=seed, cells=CELLS, where=WHERE),
         case("no-gap", [], {"none": 0.9}, name=f"b{number}", seed=seed + 1),
         case("outside", ["loose-screw"], {"unexplained": 0.6, "none": 0.4}, name=f"c{number}", seed=seed + 2),
     ]
-    return OpenedSet(cases, sealed=True, tool="1", oracle={f"a{number}": 0.85})
+    rivals = {"BIC": {f"a{number}": {"none": 0.3, "drive-damping": 0.7, "cpu_s": 2.0}}}
+    return OpenedSet(cases, sealed=True, tool="1", oracle={f"a{number}": 0.85}, rivals=rivals)
 
 
 def kept(folder: Path, number: int, **other) -> Path:
     sealed_set = opened_set(number)._replace(**other)
     path = folder / f"{number}.json"
-    write_json(path, kept_scores(sealed_set, scored(sealed_set)))
+    write_json(path, kept_scores(sealed_set, scored(sealed_set), {}))
     return path
+
+
+def pooled(*files):
+    return together(read_sets(files))
 
 
 def pool(*files):
@@ -53,18 +51,21 @@ def pool(*files):
 @pytest.mark.slow
 def test_scores_are_the_same_again(tmp_path):
     sealed_set = opened_set(1)
-    assert scored(pooled([kept(tmp_path, 1)])) == scored(sealed_set)
+    assert scored(pooled(kept(tmp_path, 1))) == scored(sealed_set)
     without = sealed_set._replace(oracle=None)
-    assert scored(pooled([kept(tmp_path, 2, oracle=None)])).keys() == scored(without).keys()
+    assert scored(pooled(kept(tmp_path, 2, oracle=None))) == scored(
+        without._replace(cases=opened_set(2).cases, rivals=opened_set(2).rivals)
+    )
 
 
 @pytest.mark.slow
 def test_several_sets_count_as_one(tmp_path):
     files = [kept(tmp_path, number) for number in (1, 2)]
-    together, alone = scored(pooled(files)), scored(opened_set(1))
-    assert list(together) == list(alone) == ["diagnosis", "parameters", "BIC", "oracle"]
+    together, alone = scored(pooled(*files)), scored(opened_set(1))
+    assert list(together) == list(alone) == ["diagnosis", "BIC"]
     for name, scores in together.items():
         assert scores.cases == 2 * alone[name].cases
+        assert scores.cpu_median_s.value == (2.0 if name == "BIC" else 10.0)
         assert scores.visible.top_1.n == 2
         assert scores.visible.top_1.value == alone[name].visible.top_1.value
     assert together["diagnosis"].shrinkage_of_oracle.value == pytest.approx(0.8 / 0.85)
@@ -72,7 +73,7 @@ def test_several_sets_count_as_one(tmp_path):
     assert result.exit_code == 0, result.output
     assert result.stdout.startswith("6 cases (sealed set, opened once)")
     assert "1, 2" in (tmp_path / "both.html").read_text()
-    assert pool(tmp_path / "both.json").stdout == result.stdout.split("\n\nreport")[0] + "\n"
+    assert pool(tmp_path / "both.json").stdout.startswith(result.stdout.split("\n\ndiagnosis, by set")[0])
 
 
 @pytest.mark.slow
@@ -83,7 +84,8 @@ def test_one_opened_set_makes_all_development_data(tmp_path):
 
 @pytest.mark.slow
 def test_a_score_that_one_set_lacks_is_left_out_of_the_pool(tmp_path):
-    assert "oracle" not in scored(pooled([kept(tmp_path, 1), kept(tmp_path, 2, oracle=None)]))
+    scores = scored(pooled(kept(tmp_path, 1), kept(tmp_path, 2, oracle=None)))["diagnosis"]
+    assert scores.shrinkage_of_oracle is None
 
 
 @pytest.mark.slow
@@ -97,7 +99,7 @@ def test_files_that_cannot_be_pooled_are_refused(tmp_path):
 
     again = tmp_path / "again.json"
     again.write_text(one.read_text().replace('"a1"', '"d1"'))  # the same rigs under new case names
-    assert f"{again}: case d1 is in {one} too: must be in one; leave one file out" in refused(one, again)
+    assert f"{again}: case d1 is in {one} too: must be in one; leave one out" in refused(one, again)
     assert "results of the versions 1 and 2: must be of one" in refused(one, kept(tmp_path, 2, tool="2"))
     assert "No such file" in refused(tmp_path / "nothing.json")
     bad = tmp_path / "bad.json"
@@ -107,7 +109,7 @@ def test_files_that_cannot_be_pooled_are_refused(tmp_path):
     cut.write_bytes(gzip.compress(b"{}" * 100)[:-9])
     assert "cannot be read: " in refused(cut)
     bad.write_text('{"format": "blind-scores/1"}')
-    assert "format = 'blind-scores/1': must be 'blind-scores/2'" in refused(bad)
+    assert "format = 'blind-scores/1': must be 'blind-scores/3'" in refused(bad)
     table = json.loads(one.read_text())
     del table["cases"][0]["answer"]
     bad.write_text(json.dumps(table))

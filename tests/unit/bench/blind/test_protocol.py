@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 from bench.app import app
 from bench.blind import sealing
+from bench.judge import methods
 from bridge.faults import FAULTS
 from cockpit.entry import main
 from diagnosis import diagnose_many as many
@@ -89,6 +90,9 @@ def test_nothing_in_the_set_reveals_the_answers(made):
 def test_the_key_holds_every_kind_of_case(made):
     by_name = answers(made)
     assert {case["stratum"] for case in by_name.values()} == set(strata.SHARES)
+    wrong = next(case for case in by_name.values() if case["stratum"] == "wrong-number")
+    assert (wrong["verdict"], wrong["effects"][0]["name"]) == ("described", "coulomb-level")
+    assert (wrong["number"]["name"], wrong["number"]["true"]) == ("coulomb_force_N", 14.2)
     single = next(case for case in by_name.values() if case["stratum"] == "one-effect")
     [effect] = single["effects"]
     assert effect["detectability"] == pytest.approx(min(effect["target"], 4.0 * 1.5), rel=0.25)
@@ -123,9 +127,9 @@ def test_bad_arguments_make_nothing(made, tmp_path):
         assert word in result.stderr
     assert {path.name for path in tmp_path.iterdir()} == {"set", "key.json", "key.sizes.toml"}
     assert make(tmp_path, out=tmp_path / "other", key=tmp_path / "k", generator="nobody").exit_code == 2
-    result = blind("run", tmp_path)
+    result = blind("run", tmp_path / "nothing")
     assert result.exit_code == 2
-    assert f"{tmp_path / 'set.json'}: cannot be read" in result.stderr
+    assert f"{tmp_path / 'nothing' / 'set.json'}: cannot be read" in result.stderr
     result = blind("score", made / "set", "--key", made / "set" / "set.json")
     assert result.exit_code == 2
     assert "must be 'blind-key/1'" in result.stderr
@@ -302,11 +306,47 @@ def test_a_set_is_scored_once(done):
     path = next((done / "set" / "results").iterdir())
     path.unlink()
     assert blind("run", done / "set", "--jobs", 1).exit_code == 0
-    path.write_text(path.read_text().replace('"elapsed_s": 1.0', '"elapsed_s": 2.0'))
+    path.write_text(path.read_text().replace('"cpu_s": ', '"cpu_s": 1'))
     again = score(done, "--json", done / "scores.json")
     assert "DEVELOPMENT DATA" in again.stdout
     assert json.loads((done / "scores.json").read_text())["sealed"] is False
     assert json.loads((done / "set" / "opened.json").read_text()) == opened
+
+
+@pytest.mark.slow
+def test_several_sets_are_scored_as_one_and_none_is_opened_without_all_results(tmp_path):
+    keys, sets = tmp_path / "keys", tmp_path / "sets"
+    keys.mkdir()
+    for seed, name in enumerate(("plant", "workshop")):
+        assert make(tmp_path, seed=seed, out=sets / name, key=keys / f"{name}.key").exit_code == 0
+    assert blind("run", sets / "plant", "--jobs", 1).exit_code == 0
+    assert blind("score", sets, "--key", keys).exit_code == FAULTS["BAD_SET"].exit_status
+    assert not (sets / "plant" / "opened.json").exists()
+    assert blind("run", sets, "--jobs", 1).exit_code == 0
+    result = blind("score", sets, "--key", keys, "--json", tmp_path / "scores.json")
+    assert result.stdout.startswith(f"{2 * CASES} cases (sealed set, opened once)")
+    scores = json.loads((tmp_path / "scores.json").read_text())
+    assert {name: one["cases"] for name, one in scores["by_set"].items()} == {"plant": CASES, "workshop": CASES}
+    assert all((sets / name / "opened.json").exists() for name in scores["by_set"])
+
+
+@pytest.mark.slow
+def test_rivals_see_the_evidence_alone_and_are_asked_once(done, monkeypatch):
+    asked = []
+
+    def answer(folder, _budget_s):
+        asked.append(folder.name)
+        return {"drive-backlash": 0.9, "none": 0.1, "cpu_s": 4.0}
+
+    monkeypatch.setattr(methods, "methods", lambda: {"lines": methods.Method(answer, ("bench/judge/lines.py",))})
+    assert blind("run", done / "set", "--rival", "lines", "--jobs", 1).exit_code == 0
+    assert sorted(asked) == sorted(answers(done))
+    assert "no such method" in score(done, "--rival", "trees").stderr
+    assert not (done / "set" / "opened.json").exists()
+    assert score(done, "--rival", "lines", "--json", done / "scores.json").exit_code == 0
+    assert len(asked) == CASES
+    scores = json.loads((done / "scores.json").read_text())["methods"]["lines"]
+    assert (scores["false_alarms"]["value"], scores["cpu_median_s"]["value"]) == (1.0, 4.0)
 
 
 @pytest.mark.slow
@@ -346,7 +386,7 @@ def test_changed_answers_and_evidence_are_refused(done):
         assert not (done / "set" / "opened.json").exists()
 
     table = json.loads(whole)
-    table["cases"][name]["answer"]["group"] = ["drive-damping"]
+    table["cases"][name]["answer"]["verdict"] = "effect and more"
     key.write_text(json.dumps(table))
     refused("the answer was changed after it was sealed")
     table = json.loads(whole)

@@ -1,15 +1,17 @@
 """Scores by hand, on made-up answers and results."""
 
 import math
+import tomllib
 
 import numpy as np
 import pytest
 
-from bench.blind import baselines
-from bench.blind.calibration import calibration_error, error_of_perfect, log_score, reliability
+from bench.blind.calibration import calibration_error, error_of_perfect, reliability
 from bench.blind.intervals import Score, bootstrapped, mean, rate, ratio
 from bench.blind.locating import f1
 from bench.blind.outcomes import opened
+from bench.blind.pooling import lowest_bic
+from bench.blind.rivals import answered
 from bench.blind.scoring import score
 from bench.blind.table import ScoreRow, table
 from bridge.config import validate
@@ -17,12 +19,14 @@ from bridge.results import strict_json
 from diagnosis.synthetic.folder import paper_rig
 from plant.config import RigConfig
 from plant.effects.library import EFFECTS
+from tests import made_up
 from tests.blind.generators import Plan
 from tests.blind.making import size
 from tests.blind.plant_cases import Plant, drawn
 from tests.blind.plant_sizes import EFFECT_SIZES, possible
 from tests.blind.stand_ins import Bump, StandIn, case
 from tests.blind.strata import counts, draw
+from tests.blind.wrong_number import describe_wrong
 
 
 @pytest.mark.parametrize(
@@ -32,15 +36,25 @@ from tests.blind.strata import counts, draw
         ("partly", 0.3, True),
         ("partly", None, True),
         ("partly", 0.7, False),
-        ("effect", 0.3, False),
+        ("effect", 0.3, True),
+        ("effect", None, False),
+        ("no-gap", None, False),
     ],
 )
-def test_partly_counts_as_outside_where_less_than_half_is_named(verdict, share, outside):
-    verdict_table = {"verdict": verdict, "effects": ["drive-damping"], "gap": {"shrinkage": share}}
+def test_what_closes_less_than_half_of_the_gap_counts_as_outside(verdict, share, outside):
+    effects = ["drive-damping"] * (verdict in {"partly", "effect"})
+    verdict_table = {"verdict": verdict, "effects": effects, "gap": {"shrinkage": share}}
     assert (
         opened("a", {"effects": [], "verdict": "unexplained", "stratum": "outside"}, verdict_table).told_outside
         is outside
     )
+
+
+def described(wrong: float, found: float | None) -> dict:
+    """A wrong drive stiffness, which is 10000 N/m, and the value that the result gives for it."""
+    numbers = [] if found is None else [{"name": "drive_stiffness_N_per_m", "found": found}]
+    number = {"name": "drive_stiffness_N_per_m", "described": wrong, "true": 10000.0}
+    return {"number": number, "numbers": numbers, "verdict": "described"}
 
 
 def test_scores_by_hand():
@@ -59,7 +73,9 @@ def test_scores_by_hand():
         case("outside", ["loose-screw"], {"unexplained": 0.7, "none": 0.3}),
         case("outside", ["loose-screw"], {"none": 0.95, "unexplained": 0.05}, detectability=1.0),
         case("two-effects", ["drive-damping", "coulomb-level"], {"drive-damping": 0.5, "none": 0.5}),
-        case("indistinguishable", ["drive-damping"], {"drive-damping": 0.5, "none": 0.5}),
+        case("wrong-number", ["drive-stiffness"], {"drive-stiffness": 0.9, "none": 0.1}, **described(11700.0, 10010.0)),
+        case("wrong-number", ["drive-stiffness"], {"drive-stiffness": 0.9, "none": 0.1}, **described(11700.0, 10300.0)),
+        case("wrong-number", ["drive-stiffness"], {"drive-backlash": 0.9, "none": 0.1}, **described(11700.0, None)),
         opened("broken", case("one-effect", ["drive-damping"], {"none": 1.0}).answer, {"fault": "X", "line": "y"}),
     ]
     scores = score(cases, {"right": 0.85})
@@ -74,28 +90,24 @@ def test_scores_by_hand():
     assert scores.by_backbone["lugre"].top_1.n == 4
     assert scores.false_alarms.value == 0.5
     assert scores.outside_caught.value == 0.5
-    assert (scores.outside_caught_visible.value, scores.outside_caught_visible.n) == (1.0, 1)
-    assert scores.outside_named.value == 0.0
-    # the delay of the second case and the damping of the second rig without a gap
+    assert (scores.number_named.value, scores.number_right.value) == (2 / 3, 1 / 3)
+    # the delay of the second case and the backlash of the last wrong number
     assert (scores.sure_of_wrong_name.value, scores.sure_of_wrong_name.n) == (2 / 11, 11)
-    assert scores.sure_of_wrong_answer.value == 4 / 9
-    assert scores.named_wrong.value == 2 / 9
     assert scores.pair_f1.value == pytest.approx(2 / 3)
-    assert scores.pair_exact.value == 0.0
-    assert scores.pair_one_right.value == 1.0
-    assert scores.unclear.in_group.value == 1.0
-    assert scores.unclear.experiment.value == 1.0
-    assert scores.sensor_or_physics.value == pytest.approx(2 / 3)
     assert scores.shrinkage_of_oracle.value == pytest.approx(0.8 / 0.85)
     assert scores.interval_coverage.value == 1.0
     assert scores.faults == 1
-    assert scores.seconds.value == 10.0
+    assert (scores.cpu_median_s.value, scores.cpu_95_s.value) == (10.0, 10.0)
     assert ("coulomb-level", "drive-backlash", 1) in scores.confusions
-    text = table({"diagnosis": scores, "BIC": score([baselines.lowest_bic(case) for case in cases], {})}, sealed=True)
-    assert text.startswith("11 cases (sealed set, opened once): right effect first in 25 %")
+    rival = score([answered(case, {"drive-damping": 0.6, "none": 0.4}) for case in cases], {})
+    text = table({"diagnosis": scores, "BIC": rival}, {"plant": scores, "workshop": rival}, sealed=True)
+    assert text.startswith("13 cases (sealed set, opened once): right effect first in 25 %")
     assert "coulomb-level -> drive-backlash" in text
     marked = [line.split("  ")[0] for line in text.splitlines() if "missed" in line]
-    assert "top-1, 2 limits or more" in marked
+    assert "first, 2 limits or more" in marked
+    by_set = text[text.index("by set") :].splitlines()
+    assert by_set[0].split()[2:] == ["plant", "workshop"]
+    assert by_set[1].split()[-6:] == ["0.25", "of", "4", "0.75", "of", "4"]
     assert "group size, 2 limits or more" not in marked
     assert strict_json({"diagnosis": scores})["diagnosis"]["visible"]["top_1"]["n"] == 4
 
@@ -113,9 +125,6 @@ def test_a_bar_is_not_reached_by_rounding(bar: str, reached: float, missed: floa
 
 
 def test_probabilities_are_judged():
-    sure = [case("one-effect", ["drive-damping"], {"drive-damping": 0.9, "none": 0.1}) for _ in range(10)]
-    assert log_score(sure).value == pytest.approx(math.log(0.9))
-    assert log_score([case("no-gap", [], {"drive-damping": 1.0, "none": 0.0})]).value == pytest.approx(math.log(1e-6))
     pairs = [(0.8, i < 8) for i in range(10)] + [(0.5, i < 1) for i in range(10)]
     # one bin is right, in the other 50 % means 10 %
     assert calibration_error(pairs).value == pytest.approx(0.2)
@@ -158,37 +167,59 @@ def test_places_are_compared_with_the_counterfactual():
     assert f1(case("one-effect", ["drive-damping"], {"none": 1.0}, where=where)) is None
 
 
-def test_baselines_answer_from_the_same_result():
-    one = case("one-effect", ["drive-damping"], {"none": 1.0})
-    verdict_table = one.diagnosis | {
-        "compared_features": 100,
-        "candidates": [
-            {"effect": "none", "probability": 1.0, "chi2": 60.0},
-            {"effect": "drive-damping", "probability": 0.0, "chi2": 50.0, "parameters": {"a": {}}},
-            {"effect": "drive-hardening", "probability": 0.0, "chi2": 49.0, "parameters": {"a": {}, "b": {}}},
-            {"effect": "coulomb-level", "probability": 0.0, "chi2": None},
-        ],
-        "gap": {
-            "retuned": 3.0,
-            "compared": [
-                {"who": "drive-damping", "shrinkage": 0.7, "interval_90": [0.6, 0.8]},
-                {"who": "parameters alone", "shrinkage": 0.0, "interval_90": None},
-            ],
-        },
-    }
-    one = one._replace(diagnosis=verdict_table)
-    bic = baselines.lowest_bic(one)
-    assert bic.named == {"drive-damping"}
+@pytest.mark.parametrize(
+    ("answer", "verdict", "named", "outside"),
+    [
+        ({"drive-damping": 0.6, "none": 0.4}, "effect", {"drive-damping"}, False),
+        ({"drive-damping": 0.4, "none": 0.3, "drive-backlash": 0.3}, "partly", {"drive-damping"}, True),
+        ({"drive-damping + drive-backlash": 0.7, "none": 0.3}, "effect", {"drive-damping", "drive-backlash"}, False),
+        ({"drive-damping": 0.9, "none": 0.1, "outside": 0.5}, "unexplained", set(), True),
+        ({"none": 0.6, "drive-damping": 0.4}, "no-gap", set(), False),
+        ({}, "fault", set(), False),
+    ],
+)
+def test_a_rivals_answer_counts_like_a_result(answer, verdict, named, outside):
+    one = answered(case("outside", ["loose-screw"], {"none": 1.0}), answer | {"cpu_s": 3.0})
+    assert (one.verdict, one.named, one.told_outside) == (verdict, named, outside)
+    if answer:
+        assert one.diagnosis["cpu_s"] == 3.0
+
+
+def test_bic_answers_from_the_refits_of_a_kept_result():
+    candidates = [
+        {"effect": "none", "chi2": 60.0, "parameters": []},
+        {"effect": "drive-damping", "chi2": 50.0, "parameters": ["a"]},
+        {"effect": "drive-hardening", "chi2": 49.0, "parameters": ["a", "b"]},
+        {"effect": "coulomb-level", "chi2": None, "parameters": []},
+    ]
+    answer = lowest_bic({"candidates": candidates, "compared_features": 100})
     # 54.6 against 60 and 58.2
     weights = [
         math.exp(-0.5 * (value - 50 - math.log(100))) for value in (60, 50 + math.log(100), 49 + 2 * math.log(100))
     ]
-    assert bic.probability("none") == pytest.approx(weights[0] / sum(weights))
-    assert bic.diagnosis["gap"]["shrinkage"] == 0.7
-    assert baselines.parameters_only(one).verdict == "unexplained"
-    answer = baselines.told(one, 0.75)
-    assert (answer.named, answer.probability("drive-damping")) == ({"drive-damping"}, 1.0)
-    assert baselines.lowest_bic(one._replace(diagnosis=verdict_table | {"compared_features": 0})).verdict == "fault"
+    assert answer["none"] == pytest.approx(weights[0] / sum(weights))
+    assert answer.keys() == {"none", "drive-damping", "drive-hardening"}
+    assert lowest_bic({"candidates": []}) == {}
+
+
+def test_a_wrong_number_is_far_from_the_true_one_and_the_rig_still_sticks(tmp_path):
+    true = {"mass_kg": 1.5, "coulomb_force_N": 14.0, "static_force_N": 16.0}
+    changed = set()
+    for seed in range(40):
+        text = made_up.RIG + "[rig.tolerance]\nmass_kg = 0.005\ncoulomb_force_N = 0.03\nstatic_force_N = 0.03\n"
+        (tmp_path / "manifest.toml").write_text(text)
+        number = describe_wrong(tmp_path, true, np.random.default_rng(seed))
+        after = tomllib.loads((tmp_path / "manifest.toml").read_text())["rig"]
+        before = tomllib.loads(text)["rig"]
+        assert {key for key in after if after[key] != before[key]} == {number["name"]}
+        assert (after[number["name"]], true[number["name"]]) == (number["described"], number["true"])
+        distance = math.log(number["described"] / number["true"])
+        assert max(5.0 * before["tolerance"][number["name"]], 0.0769) < abs(distance) + 1e-3 < 0.61
+        assert after["static_force_N"] >= 1.06 * after["coulomb_force_N"]
+        changed.add((number["name"], distance > 0.0))
+    assert changed == {
+        ("mass_kg", True), ("mass_kg", False), ("coulomb_force_N", False), ("static_force_N", True),
+    }  # fmt: skip
 
 
 def test_intervals():
@@ -221,12 +252,9 @@ def test_an_effect_is_made_as_strong_as_it_should_be_seen():
 
 
 def test_a_set_has_every_kind_and_every_effect():
-    estimate = counts(200, True, 12)
-    assert sum(estimate.values()) == 200
-    assert estimate == {
-        "no-gap": 30, "one-effect": 100, "two-effects": 24, "outside": 24, "indistinguishable": 16, "real-log": 6,
-    }  # fmt: skip
-    assert counts(200, False, 0)["one-effect"] == 130
+    three = [counts(67, True), counts(67, True), counts(66, False)]
+    together = {kind: sum(one[kind] for one in three) for kind in three[0]}
+    assert together == {"no-gap": 40, "one-effect": 80, "two-effects": 30, "outside": 30, "wrong-number": 20}
     cases = draw(Plant(), 60, 1)
     single = [case.effects[0].name for case in cases if case.stratum == "one-effect"]
     assert set(single) == set(Plant.library)
