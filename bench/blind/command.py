@@ -52,17 +52,17 @@ def blind_run(folder: SetArgument, rival: Rival = [], jobs: Jobs = None, as_json
 
         end_like_ctrl_c()
         sets = sets_of(folder).values()
-        todo = sum(len(missing(one)) for one in sets)
+        todo = sum(len(missing(path)) for path in sets)
         began = time.monotonic()
         done = 0
         with writing(), watched() as progress:
-            for one in sets:
-                with closing(run(one, jobs or cpu_count())) as outcomes:
+            for path in sets:
+                with closing(run(path, jobs or cpu_count())) as outcomes:
                     for outcome in outcomes:
                         done += 1
                         left_min = (time.monotonic() - began) / done * (todo - done) / 60.0
                         progress(f"{done} of {todo}, {left_min:.0f} min left: {in_a_line(outcome)}", done / todo)
-                ask_rivals(one, rival, jobs or cpu_count(), progress)
+                ask_rivals(path, rival, jobs or cpu_count(), progress)
         words = [f"all cases have results    {folder}", f"next    python -m bench blind score {folder} --key KEY"]
         print_result(as_json, SetDone(str(folder), todo), words)
 
@@ -134,7 +134,7 @@ def _told(sets: "dict[str, OpenedSet]", as_json: Path | None, report: Path | Non
 
     opened_set = together(sets)
     methods = scored(opened_set)
-    by_set = {Path(name).stem: scored(one)[TOOL] for name, one in sets.items()}
+    by_set = {Path(name).stem: scored(part)[TOOL] for name, part in sets.items()}
     with writing():  # before printing, as a closed pipe ends the program there
         if report is not None:
             write_report(methods, by_set, opened_set.sealed, report, files)

@@ -40,7 +40,7 @@ def open_sets(folder: Path, key: Path, partial: bool) -> dict[str, OpenedSet]:
     sets = sets_of(folder)
     keys = {name: key if path == folder else key / f"{name}.key" for name, path in sets.items()}
     checked = {name: _checked(path, keys[name], partial) for name, path in sets.items()}
-    return {name: one._replace(sealed=mark_opened(sets[name]) and one.sealed) for name, one in checked.items()}
+    return {name: part._replace(sealed=mark_opened(sets[name]) and part.sealed) for name, part in checked.items()}
 
 
 def _checked(folder: Path, key: Path, partial: bool) -> OpenedSet:
@@ -68,31 +68,31 @@ def compared(
 
 def together(sets: Mapping[str, OpenedSet]) -> OpenedSet:
     """All cases as one set. Raises Fault BAD_SET where versions differ or a case is in two of the sets."""
-    tools = {one.tool for one in sets.values()}
+    tools = {part.tool for part in sets.values()}
     if len(tools) > 1:
         line = f"{', '.join(sets)}: results of the versions {' and '.join(sorted(tools))}: must be of one;"
         raise Fault("BAD_SET", f"{line} score each for itself")
     seen: dict[int, str] = {}  # by the seed of a case, as a case that was made a second time has another name
-    for name, one in sets.items():
-        for case in one.cases:
+    for name, part in sets.items():
+        for case in part.cases:
             if (other := seen.setdefault(case.answer["counterfactual_seed"], name)) != name:
                 raise Fault("BAD_SET", f"{name}: case {case.name} is in {other} too: must be in one; leave one out")
-    asked = all(one.oracle is not None for one in sets.values())
-    methods = dict.fromkeys(method for one in sets.values() for method in one.rivals)
+    asked = all(part.oracle is not None for part in sets.values())
+    methods = dict.fromkeys(method for part in sets.values() for method in part.rivals)
     return OpenedSet(
-        [case for one in sets.values() for case in one.cases],
-        all(one.sealed for one in sets.values()),
+        [case for part in sets.values() for case in part.cases],
+        all(part.sealed for part in sets.values()),
         tools.pop(),
-        {name: closed for one in sets.values() for name, closed in (one.oracle or {}).items()} if asked else None,
+        {name: closed for part in sets.values() for name, closed in (part.oracle or {}).items()} if asked else None,
         {
-            method: {name: answer for one in sets.values() for name, answer in one.rivals.get(method, {}).items()}
+            method: {name: answer for part in sets.values() for name, answer in part.rivals.get(method, {}).items()}
             for method in methods
         },
     )
 
 
 def scored(opened_set: OpenedSet) -> dict[str, Scores]:
-    """Scores by method, the diagnosis first; those of a rival over the cases that it was asked about."""
+    """Scores by method, the diagnosis first; a rival is scored over the cases that it answered."""
     cases, best = opened_set.cases, opened_set.oracle or {}
     others = {
         method: [answered(case, answers[case.name]) for case in cases if case.name in answers]

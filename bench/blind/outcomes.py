@@ -63,19 +63,19 @@ class Opened(NamedTuple):
     @property
     def number_named(self) -> bool:
         """Whether the result reports that the number whose description is wrong was described wrong."""
-        return self.verdict == "described" and self._found is not None
+        return self.verdict == "described" and self._value is not None
 
     @property
     def number_right(self) -> bool:
         """Whether it also gives the true value of this number."""
         true = self.answer["number"]["true"]
-        return self.number_named and abs((self._found or math.nan) / true - 1.0) <= _NEAR
+        return self.number_named and abs((self._value or math.nan) / true - 1.0) <= _NEAR
 
     @property
-    def _found(self) -> float | None:
+    def _value(self) -> float | None:
         """Value that the result gives for the number whose description is wrong."""
-        found = {row["name"]: row["found"] for row in self.diagnosis.get("numbers", ())}
-        return found.get(self.answer["number"]["name"])
+        values = {row["name"]: row["found"] for row in self.diagnosis.get("numbers", ())}
+        return values.get(self.answer["number"]["name"])
 
     @property
     def named(self) -> frozenset[str]:

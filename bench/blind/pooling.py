@@ -101,11 +101,11 @@ def _read(path: Path) -> OpenedSet:
         raise Fault("BAD_SET", f"{path}: cases: {error} is missing or has the wrong type; {_MADE_BY}") from None
 
 
-def lowest_bic(said: Mapping[str, Any]) -> dict[str, float]:
+def lowest_bic(result: Mapping[str, Any]) -> dict[str, float]:
     """Probabilities of none and of single effects by BIC over the refits in a kept result; empty where it has none."""
     from bench.judge.refits import by_bic
 
-    refits = [row for row in said["candidates"] if row["chi2"] is not None]
+    refits = [row for row in result["candidates"] if row["chi2"] is not None]
     return by_bic(
-        {row["effect"]: (row["chi2"], len(row["parameters"])) for row in refits}, said.get("compared_features", 0)
+        {row["effect"]: (row["chi2"], len(row["parameters"])) for row in refits}, result.get("compared_features", 0)
     )

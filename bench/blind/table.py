@@ -89,7 +89,7 @@ def table(methods: dict[str, Scores], by_set: dict[str, Scores], sealed: bool) -
         lines += ["", f"{f'{TOOL}, by set':32}" + "".join(f" {name:>20.20}" for name in by_set)]
         for row in rows(by_set):
             if any(score is not None for score in row.scores):
-                cells = ("-" if one is None else f"{one.value:.2f} of {one.n}" for one in row.scores)
+                cells = ("-" if score is None else f"{score.value:.2f} of {score.n}" for score in row.scores)
                 lines.append(f"{row.name:32}" + "".join(f" {cell:>20}" for cell in cells))
     for title, part in (
         ("by detectability, in limits", tool.by_detectability),

@@ -55,7 +55,7 @@ def methods() -> dict[str, Method]:
 
 
 def known(names: Sequence[str]) -> None:
-    """Raise Fault CONFIG where one of the names is no method."""
+    """Raise Fault CONFIG for the name of a method that does not exist."""
     if unknown := [name for name in names if name not in methods()]:
         raise Fault("CONFIG", f"{unknown[0]}: no such method; there are {', '.join(methods())}")
 
