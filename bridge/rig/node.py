@@ -2,10 +2,8 @@
 
 import contextlib
 import math
-import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +13,7 @@ from bridge.guard.check import gain_report
 from bridge.guard.core import NO_COMMAND
 from bridge.guard.states import LEAVE, apply_order
 from bridge.kernel_cache import compile_once
-from bridge.rig.device import Device, DeviceBlock, DeviceError
+from bridge.rig.device import Device, DeviceBlock, DeviceError, reason_of, wrong_shape
 from bridge.rig.faults.schedule import Faults
 from bridge.rig.rate import RateWatch
 from bridge.rig.step import begin, clipped, device_memory, end, fill
@@ -300,16 +298,14 @@ class DeviceNode(GuardedNode):
         """A block for the kernels; None for a block of another shape, or with a vibration that is not finite."""
         if block is None:
             return None
-        samples = np.ascontiguousarray(block.samples, np.float64)
-        needed, numbers = self._device.setup.channels, (block.frequency_Hz, block.amplitude)
-        if samples.ndim != 2 or len(samples) < needed or samples.shape[1] != self._samples:
-            due = f"must be {needed} channels or more x {self._samples}"
-            self._problems.append(("DEVICE_DATA", f"samples of shape {samples.shape}: {due}: dropped", 1))
+        if wrong := wrong_shape(block.samples, self._device.setup):
+            self._problems.append(("DEVICE_DATA", f"{wrong}: dropped", 1))
             return None
+        numbers = block.frequency_Hz, block.amplitude
         if not all(map(math.isfinite, numbers)):
             self._problems.append(("DEVICE_DATA", f"a vibration of {numbers}: dropped", 1))
             return None
-        return block._replace(samples=samples)
+        return block._replace(samples=np.ascontiguousarray(block.samples, np.float64))
 
     def _note_block(self, block: DeviceBlock) -> None:
         if block.lost:
@@ -421,11 +417,3 @@ class DeviceNode(GuardedNode):
         """Bring the exciter to rest and disconnect."""
         self._rest()
         self._device.close()
-
-
-def reason_of(error: Exception) -> str:
-    """The reason of a failed call. An adapter may be foreign code: its error must not end the loop of the guard."""
-    if isinstance(error, DeviceError):
-        return str(error)
-    place = traceback.extract_tb(error.__traceback__)[-1]
-    return f"{Path(place.filename).name}, line {place.lineno}: {type(error).__name__}: {error}"
