@@ -11,11 +11,11 @@ from bridge.guard.records import ExciterLimits, build
 from bridge.guard.wide import protection
 from bridge.rig.derived import Derived
 from bridge.rig.device import Device, reason_of
+from bridge.rig.device_node import DeviceNode
 from bridge.rig.faults.schedule import Faults
 from bridge.rig.faults.table import FaultTable
 from bridge.rig.file import DeviceRig
 from bridge.rig.load import device_of
-from bridge.rig.node import DeviceNode
 from bridge.rig.process import Served
 from bridge.rig.step import device_memory
 from bridge.wire.channels import CHANNELS, SENSOR_CHANNELS
