@@ -16,8 +16,8 @@ DONE = usable_folder() / mark_of("tests", Path(__file__))
 def control(folder: Path) -> None:
     """Plant, device, controller, log and replay."""
     from bridge.log.logfile import read_run
+    from bridge.rig.device_node import DeviceNode
     from bridge.rig.faults.schedule import Faults
-    from bridge.rig.node import DeviceNode
     from cockpit.run.in_process import run_onboard
     from cockpit.run.replay import changes_of
     from cockpit.run.scenario import load_scenario

@@ -1,7 +1,8 @@
 """A rig of any kind behind its guard, as a process on the bus. Nothing here knows the plant or an adapter.
 
 device   the contract of a device: converter and exciter, together or each alone
-node     a rig behind its guard, block by block: `GuardedNode`; around a device: `DeviceNode`
+node     a rig of any kind behind its guard, block by block
+device_node  a device behind its guard
 step     a block between its messages, compiled; the plant's loop calls the same parts
 rate     the measured rate of a device
 watch    faults that show in the times of its blocks, and in the vibration that it executes

@@ -9,7 +9,7 @@ import numpy as np
 from bridge.arrays import Floats
 from bridge.results import in_json
 from bridge.rig.derived import Derived
-from bridge.rig.device import Device, DeviceError
+from bridge.rig.device import Device, reason_of, wrong_shape
 from bridge.rig.file import DeviceRig
 from bridge.wire.channels import CHANNELS, SENSOR_CHANNELS
 
@@ -73,7 +73,7 @@ class RigCheck(NamedTuple):
         ]
         if self.answer_s:
             lines.append(f"exciter  answers in {self.answer_s * 1e3:.1f} ms")
-        for row in self.channels:
+        for row in self.channels if self.blocks else []:
             shown = f"{row.lowest:.4g} to {row.highest:.4g}, noise {row.noise:.3g}, hum {row.hum:.3g}"
             lines.append(f"channel  {row.name:<18} {'absent' if row.absent else shown}")
         lines += [f"problem  {problem.place}: {problem.text}; {problem.remedy}" for problem in self.problems]
@@ -126,14 +126,17 @@ def _listen(device: Device, seconds: float) -> _Heard:
             problems = device.problems()
             begun = begun or (block is not None and not block.waiting)  # not with blocks from before
             heard.dropped = problems[-1][1] if problems else heard.dropped
+            if block is not None and (wrong := wrong_shape(block.samples, device.setup)):
+                heard.failure = wrong
+                break
             if block is not None and begun:
                 heard.samples.append(block.samples)
                 heard.at_s.append(time.monotonic())
                 heard.lost += block.lost if len(heard.samples) > 1 else 0
             if device.pace == "computer":
                 time.sleep(device.block_s)
-    except DeviceError as error:
-        heard.failure = str(error)
+    except Exception as error:  # an adapter may be foreign code
+        heard.failure = reason_of(error)
     device.safe()
     return heard
 
@@ -151,16 +154,17 @@ def _of_device(device: Device, heard: _Heard, rate_Hz: float, gap_s: float) -> l
     problems: list[Problem] = []
     stated_Hz = device.setup.sample_rate_Hz
     if heard.failure:
-        problems.append(Problem("device", heard.failure, "check its supply and its cable"))
-    if len(heard.samples) < 2:
+        text, _, remedy = heard.failure.partition("; ")
+        problems.append(Problem("device", text, remedy or "check its supply and its cable"))
+    elif heard.dropped:
+        problems.append(Problem("device", f"bad data: {heard.dropped}", "compare its frames with [converter]"))
+    elif len(heard.samples) < 2:
         problems.append(Problem("device", "it sends no blocks", "check that it samples, and [device] of the rig file"))
-    elif rate_Hz and abs(rate_Hz / stated_Hz - 1.0) > _RATE:
+    if rate_Hz and abs(rate_Hz / stated_Hz - 1.0) > _RATE:
         text = f"it makes {rate_Hz:.0f} samples a second, the rig file states {stated_Hz:.0f}"
         problems.append(Problem("device", text, f"set converter.sample_rate_Hz to {float(f'{rate_Hz:.4g}'):g}"))
     if heard.lost:
         problems.append(Problem("device", f"{heard.lost} blocks were lost", "lower its rate, or use a faster link"))
-    if heard.dropped:
-        problems.append(Problem("device", f"bad data: {heard.dropped}", "compare its frames with [converter]"))
     if gap_s > _JITTER_BLOCKS * device.block_s:
         text = f"a block came {gap_s * 1e3:.0f} ms after the one before"
         problems.append(Problem("device", text, "end other programs, or shorten the device's own buffer"))

@@ -5,10 +5,13 @@ Calls come from one thread, in this order: `open`, then `write` and `read` in tu
 in front of the device; the device's own watchdog ends the vibration when this process is gone.
 """
 
+import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
+
+import numpy as np
 
 from bridge.arrays import Floats, Records
 from bridge.wire.messages import ANNOUNCE
@@ -32,6 +35,14 @@ class DeviceError(Exception):
         self.code = code
 
 
+def reason_of(error: Exception) -> str:
+    """The reason of a failed call. An adapter may be foreign code: its error must not end the loop of the guard."""
+    if isinstance(error, DeviceError):
+        return str(error)
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{Path(place.filename).name}, line {place.lineno}: {type(error).__name__}: {error}"
+
+
 class Setup(NamedTuple):
     """The facts of the rig file that an adapter receives."""
 
@@ -42,6 +53,15 @@ class Setup(NamedTuple):
     channels: int  # number of channels that the rig file uses
     has_enable_line: bool  # whether `enable` switches the amplifier
     in_volts: bool = False  # whether amplitudes are volts, as the rig file has `stroke_m_per_V`
+
+
+def wrong_shape(samples: Any, setup: Setup) -> str:
+    """The reason why the samples of a block cannot be used; empty: they can."""
+    shape = np.shape(samples)  # an adapter may return anything
+    if len(shape) == 2 and shape[0] >= setup.channels and shape[1] == setup.samples_per_block:
+        return ""
+    due = f"{setup.channels} channels or more x {setup.samples_per_block} samples"
+    return f"samples of shape {shape}: must be {due}; compare the adapter with [channels] and [converter]"
 
 
 class DeviceBlock(NamedTuple):

@@ -10,15 +10,20 @@ from bridge.guard.absent import absent
 from bridge.guard.records import ExciterLimits, build
 from bridge.guard.wide import protection
 from bridge.rig.derived import Derived
-from bridge.rig.device import DeviceError
+from bridge.rig.device import Device, reason_of
+from bridge.rig.device_node import DeviceNode
 from bridge.rig.faults.schedule import Faults
 from bridge.rig.faults.table import FaultTable
 from bridge.rig.file import DeviceRig
 from bridge.rig.load import device_of
-from bridge.rig.node import DeviceNode
 from bridge.rig.process import Served
 from bridge.rig.step import device_memory
 from bridge.wire.channels import CHANNELS, SENSOR_CHANNELS
+from bridge.wire.clock import time
+
+# Longest wait for the first block. Smaller: a program that starts shows a wrong frame only after the rig runs. Larger: the
+# process of a rig whose device is silent joins the bus as much later.
+_FIRST_BLOCK_S = 1.0
 
 
 def served(rig: DeviceRig, folder: Path, faults: Sequence[FaultTable] = (), seed: int = 0) -> Served:
@@ -35,11 +40,23 @@ def open_node(rig: DeviceRig, folder: Path, run: int, faults: Sequence[FaultTabl
     device = device_of(rig, folder)
     guard = build(rig.guard, _exciter(rig), run, absent=absent(rig.channels), derived=rig.derived)
     injected = Faults(faults, seed, rig.converter.block_s, rig.converter.samples_per_block)
-    try:
+    try:  # an adapter may be foreign code
         device.open()
-    except DeviceError as error:
-        raise Fault("NO_DEVICE", f"{rig.name}: {error}") from None
+        try:
+            _hear_first_block(device)
+        except BaseException:
+            device.close()
+            raise
+    except Exception as error:
+        raise Fault("NO_DEVICE", f"{rig.name}: {reason_of(error)}") from None
     return DeviceNode(device, guard, injected, calibration(rig), rig.exciter.stroke_m_per_V or 1.0, Derived(rig))
+
+
+def _hear_first_block(device: Device) -> None:
+    """Wait for a block of a device with a clock, which may be silent at first. Raises DeviceError: it cannot be this rig's."""
+    until_s = time.monotonic() + _FIRST_BLOCK_S
+    while device.pace == "device" and device.read() is None and time.monotonic() < until_s:
+        pass
 
 
 def notes(rig: DeviceRig, watchdog_s: float = 0.0) -> list[tuple[str, str]]:

@@ -41,19 +41,20 @@ def rig_check(
     """Check the device of a rig with its exciter at rest; exit status 0: ok, 1: problems, each with a remedy."""
     from bridge.faults import Fault
     from bridge.rig.check import check
-    from bridge.rig.device import DeviceError
+    from bridge.rig.device import reason_of
     from bridge.rig.load import device_of
     from cockpit.run.device_run import load_device_rig
 
     made, folder = load_device_rig(rig, shared.settings)
     device = device_of(made, folder)
-    try:
+    try:  # an adapter may be foreign code
         device.open()
-        result = check(device, made, seconds)
-    except DeviceError as error:
-        raise Fault("NO_DEVICE", f"{made.name}: {error}") from None
-    finally:
-        device.close()
+        try:
+            result = check(device, made, seconds)
+        finally:
+            device.close()
+    except Exception as error:
+        raise Fault("NO_DEVICE", f"{made.name}: {reason_of(error)}") from None
     print_result(as_json, result, result.in_words())
     return 0 if result.ok else 1
 

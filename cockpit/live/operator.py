@@ -110,7 +110,11 @@ def send_command(bus_config: BusConfig, name: str, dial_s: float | None = None) 
         if action == wire.Operator.STOP:
             exchange.hear_for(_KEPT_S)
         alone = action in _ARMS and bool(bus.wait_for(["controller"], _KEPT_S))
+        has_rig = exchange.applied is None and not bus.wait_for(["plant"], _KEPT_S)
     last = exchange.applied
+    if has_rig:
+        remedy = CUT_AMPLIFIER if action in _QUIETING else "end it; `stickslip rig check` gives the reason"
+        raise Fault("NO_PEER", f"{where}: the rig has sent no block: its device must send blocks; {remedy}")
     if last is None:
         line = f"{where}: no rig publishes `applied` messages: --prefix must equal the prefix of the run"
         raise Fault("NO_PEER", f"{line}; {CUT_AMPLIFIER if action in _QUIETING else 'give the --prefix of the run'}")

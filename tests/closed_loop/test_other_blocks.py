@@ -8,9 +8,9 @@ import pytest
 from bridge.faults import Fault
 from bridge.guard.records import ExciterLimits, build
 from bridge.rig.adapters import stream
+from bridge.rig.device_node import DeviceNode
 from bridge.rig.faults.schedule import Faults
 from bridge.rig.load import device_of
-from bridge.rig.node import DeviceNode
 from bridge.rig.real import calibration
 from bridge.wire.clock import time
 from cockpit.run.device_run import load_device_run

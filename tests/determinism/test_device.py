@@ -4,8 +4,8 @@ import pytest
 
 from bridge.arrays import Records
 from bridge.guard.states import ARM
+from bridge.rig.device_node import DeviceNode
 from bridge.rig.faults.schedule import Faults
-from bridge.rig.node import DeviceNode
 from bridge.wire.messages import APPLIED, sensor_block
 from cockpit.run.scenario import Scenario, load_scenario
 from controller.node import ControllerNode

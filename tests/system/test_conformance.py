@@ -10,7 +10,7 @@ import pytest
 
 from tests.patience import PATIENCE_S
 from tests.system.ports import free_endpoint
-from tests.unit.bridge.rig.boxes import boxed, table, toml
+from tests.unit.bridge.rig.boxes import boxed
 
 STICKSLIP = [sys.executable, "-m", "cockpit"]
 
@@ -25,10 +25,12 @@ def failed(result: dict[str, Any]) -> list[str]:
     return [row["name"] for row in result["checks"] if row["status"] == "FAILED"]
 
 
-def test_a_box_passes_every_check_that_needs_no_clock(tmp_path: Path) -> None:
+def test_a_box_with_the_rig_file_of_the_guide_passes_every_check_that_needs_no_clock(tmp_path: Path) -> None:
     rig, junit = tmp_path / "mine.toml", tmp_path / "report.xml"
+    guide = (Path(__file__).parents[2] / "docs/guides/connect-a-rig.md").read_text(encoding="utf-8")
+    text = guide.partition("```toml\n")[2].partition("```")[0]
     with boxed(tmp_path) as port:
-        rig.write_text(toml(table(device={"address": f"127.0.0.1:{port}", "waits": True})))
+        rig.write_text(text.replace('127.0.0.1:9000"', f'127.0.0.1:{port}"\nwaits = true'))
         status, result = conformance(str(rig), "--junit", str(junit))
     assert (status, failed(result), len(result["checks"])) == (0, [], 25)
     assert {row["name"] for row in result["checks"] if row["status"] == "skipped"} == {"rate", "watchdog", "close"}

@@ -27,6 +27,7 @@ import numpy as np
 from pydantic import model_validator
 
 from bridge.config import Strict, validate
+from bridge.faults import Fault
 from bridge.rig.device import Device, DeviceBlock, DeviceError, Setup
 
 _MARK, _COMMAND_MARK = b"SSR1", b"SSC1"
@@ -48,6 +49,7 @@ class StreamSettings(Strict):
     address: str = ""
     command: list[str] = []
     waits: bool = False  # a simulated device makes a block only after a command
+    channels: int = 0  # of a frame, if it has more than the rig file uses; 0: as many
 
     @model_validator(mode="after")
     def _is_one(self) -> "StreamSettings":
@@ -68,8 +70,12 @@ class Adapter(Device):
         super().__init__(setup)
         self._settings = validate(StreamSettings, dict(setup.settings), "device")
         self.pace = "caller" if self._settings.waits else "device"
-        self._shape = setup.samples_per_block, setup.channels
-        self._size = _HEAD.size + 4 * setup.samples_per_block * setup.channels
+        channels = self._settings.channels or setup.channels
+        if channels < setup.channels:
+            rule = f"must be {setup.channels} or more, as the rig file has source = {setup.channels - 1}; raise it"
+            raise Fault("CONFIG", f"device.channels = {channels}: {rule}, or change the source")
+        self._shape = setup.samples_per_block, channels
+        self._size = _HEAD.size + 4 * setup.samples_per_block * channels
         self._begin_of_frame = _MARK + (self._size - _LENGTH_BYTES).to_bytes(4, "little")
         self._expected: int | None = None  # number of the next block; None before the first one
         self._problems: list[tuple[str, str]] = []
@@ -144,6 +150,8 @@ class Adapter(Device):
             self._drop(at, "DEVICE_DATA", f"{at} bytes between two frames")
             _, length, number, frequency_Hz, amplitude = _HEAD.unpack_from(self._bytes)
             if length != self._size - _LENGTH_BYTES:
+                if self._expected is None:
+                    raise DeviceError(self._misfit(length), "DEVICE_DATA")
                 made, due = length + _LENGTH_BYTES, self._size
                 text = f"a frame of {made} bytes, where {self._shape} samples and channels make {due}"
                 self._drop(len(_MARK), "BLOCK_SHORT" if made < due else "DEVICE_DATA", text)
@@ -163,6 +171,20 @@ class Adapter(Device):
         if at < 0 and len(self._bytes) >= len(_MARK):
             self._drop(len(self._bytes) - len(_MARK) + 1, "DEVICE_DATA", "bytes without a frame")
         return None
+
+    def _misfit(self, length: int) -> str:
+        """The reason why the first frame does not fit, and the line to change."""
+        samples, channels = self._shape
+        numbers, rest = divmod(length + _LENGTH_BYTES - _HEAD.size, 4)
+        remedies: list[str] = []
+        if not rest and numbers % samples == 0:
+            sent = numbers // samples
+            remedies.append(f"set device.channels = {sent}" if sent > channels else f"use no source above {sent - 1}")
+        if not rest and numbers % channels == 0:
+            remedies.append(f"set converter.samples_per_block = {numbers // channels}")
+        remedy = ", or ".join(remedies) or "compare the frames with [converter] and [channels]"
+        ours = f"{samples} samples x {channels} channels = {samples * channels}"
+        return f"the first frame has {numbers} numbers, the rig file {ours}; {remedy}"
 
     def _drop(self, count: int, code: str, why: str) -> None:
         if not count:

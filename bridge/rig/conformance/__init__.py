@@ -4,6 +4,7 @@ heard    the blocks of a session, and the tone in them
 session  one session with an open device: rest, tones, steps, and each way to end a vibration
 data     the checks of blocks and channels
 exciter  the checks of the vibration
+both     the 19 checks that both sides share
 of_device, of_client  the 25 checks of a device, and of a client on the bus
 report   the results, as lines and as JUnit
 """

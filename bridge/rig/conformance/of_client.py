@@ -14,7 +14,8 @@ from pydantic import TypeAdapter, ValidationError
 
 from bridge.faults import Fault
 from bridge.guard.config import VibrationLimits
-from bridge.rig.conformance import data, exciter
+from bridge.rig.conformance import exciter
+from bridge.rig.conformance.both import ends, shared
 from bridge.rig.conformance.heard import Block, Stage
 from bridge.rig.conformance.report import Check, Conformance, Measured, judged
 from bridge.rig.conformance.session import REST_S, Facts, Session, tones_and_steps
@@ -47,52 +48,20 @@ def _header(session: Session) -> Measured:
     return Measured(True, "read", "schema 1 to 3, block_s, samples_per_block")
 
 
-_BLOCKS = ("header", "shape")
-_SAMPLES = (*_BLOCKS, "missing", "filled", "values")
-_TONE = (*_BLOCKS, "channels", "answers")
-_VIBRATION = (*_TONE, "amplitude", "frequency")
+_REMEDIES = {
+    "shape": "fill every channel of a SensorBlock with samples_per_block samples, an absent one with zeros",
+    "numbers": "count `sequence` from 0 without a gap, and t_ns in samples",
+    "rate": "correct block_s of the header, or the clock of the rig",
+    "repeated": "send each block once",
+    "amplitude": "take amplitude_m in metres of displacement; check the unit of base_accel_mps2",
+    "answer-time": "let the command that answers block n act in block n + 1",
+}
+_SHARED = shared(("header",), _REMEDIES)
+_VIBRATION = ends(_SHARED)
 CHECKS = (
     Check("header", "answer queries of header/plant, as in PROTOCOL.md", _header),
-    Check(
-        "shape",
-        "fill every channel of a SensorBlock with samples_per_block samples, an absent one with zeros",
-        data.shape,
-        ("header",),
-    ),
-    Check("numbers", "count `sequence` from 0 without a gap, and t_ns in samples", data.numbers, _BLOCKS),
-    Check("rate", "correct block_s of the header, or the clock of the rig", data.rate, _BLOCKS),
-    Check("missing", "check the plug of the channel", data.missing, _BLOCKS),
-    Check("filled", "mark missing samples as NaN, never as zeros or as the last sample", data.filled, _BLOCKS),
-    Check("repeated", "send each block once", data.repeated, _BLOCKS),
-    Check("values", "check plug and unit of the channel, or state it as absent in the header", data.values, _BLOCKS),
-    Check("positions", "correct plug, sign or unit of the two positions", data.positions, _SAMPLES),
-    Check(
-        "force",
-        "correct the sign of drive_force_N: positive pulls the slide forward",
-        data.force,
-        (*_SAMPLES, "positions"),
-    ),
-    Check(
-        "slide-acceleration",
-        "correct plug, sign or unit of mass_accel_mps2",
-        data.slide_acceleration,
-        (*_SAMPLES, "positions"),
-    ),
-    Check("rest", "start with the exciter at rest", exciter.rest, _BLOCKS),
-    Check("armed", "vibrate in ARMED and ACTIVE only", exciter.armed, _BLOCKS),
-    Check("channels", "correct the plugs: the base's accelerometer is another channel", exciter.channels, _BLOCKS),
-    Check("answers", "carry out the newest valid command; check the exciter's cable", exciter.answers, _BLOCKS),
-    Check("order", "send the blocks in the order of time, and number lost ones", data.order, (*_TONE, "repeated")),
-    Check("frequency", "take frequency_Hz in hertz", exciter.frequency, _TONE),
-    Check(
-        "amplitude",
-        "take amplitude_m in metres of displacement; check the unit of base_accel_mps2",
-        exciter.amplitude,
-        _TONE,
-    ),
-    Check("reported", "send in `applied` the vibration that the exciter executes", exciter.reported, _VIBRATION),
-    Check("answer-time", "let the command that answers block n act in block n + 1", exciter.answer_time, _VIBRATION),
-    Check("zero", "end the vibration for an amplitude of 0", exciter.zero, _VIBRATION),
+    *_SHARED,
+    Check("armed", "vibrate in ARMED and ACTIVE only", exciter.armed, ("header", "shape")),
     Check("ramp", "change the amplitude by limits.slew_m_per_s at most", exciter.ramp, _VIBRATION),
     Check("limit", "hold the amplitude at limits.amplitude_max_m", exciter.limit, _VIBRATION),
     Check("silence", "ramp to zero without a fresh command", exciter.silence, _VIBRATION),

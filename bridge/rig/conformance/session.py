@@ -15,9 +15,8 @@ import numpy as np
 from bridge.guard.absent import absent
 from bridge.guard.config import VibrationLimits, merged_bands_Hz
 from bridge.rig.conformance.heard import Block, Stage
-from bridge.rig.device import Device, DeviceBlock
+from bridge.rig.device import Device, DeviceBlock, DeviceError, reason_of
 from bridge.rig.file import DeviceRig
-from bridge.rig.node import reason_of
 from bridge.wire.channels import CHANNELS
 
 REST_S, TONE_S, HALF_S, STEP_S = 3.0, 0.3, 0.2, 0.04
@@ -196,7 +195,10 @@ class DeviceSession:
         try:
             return function()
         except Exception as error:
-            self.session.failures.setdefault(name, reason_of(error))
+            if isinstance(error, DeviceError) and error.code == "DEVICE_DATA":
+                self.session.bad_block = str(error)
+            else:
+                self.session.failures.setdefault(name, reason_of(error))
             raise _Ended(name) from None
         finally:
             self._calling = None
@@ -223,7 +225,8 @@ class DeviceSession:
         until_s = time.monotonic() + _PATIENCE_S
         while (block := self._read()) is None:
             if time.monotonic() > until_s:
-                self.session.failures.setdefault("read", f"no block within {_PATIENCE_S:g} s")
+                why = "".join(f", {problem}" for problem in self.session.problems[-1:])
+                self.session.failures.setdefault("read", f"no block within {_PATIENCE_S:g} s{why}")
                 raise _Ended
         return block
 

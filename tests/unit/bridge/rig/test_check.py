@@ -180,8 +180,10 @@ def test_a_bad_device_is_one_problem(checked: Callable[..., RigCheck], facts: di
 
 
 def test_a_device_that_fails_is_reported_with_its_reason(checked: Callable[..., RigCheck]) -> None:
-    problems = checked(failure="the cable is out").problems
-    assert [problem.text for problem in problems] == ["the cable is out", "it sends no blocks"]
+    (problem,) = checked(failure="the cable is out").problems
+    assert problem.text == "the cable is out"
+    (problem,) = checked(failure="the first frame has 2 numbers; set device.channels = 2").problems
+    assert problem.remedy == "set device.channels = 2"
 
 
 @pytest.mark.slow

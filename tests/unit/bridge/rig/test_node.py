@@ -11,9 +11,9 @@ from bridge.guard.records import ExciterLimits, build
 from bridge.guard.states import ARM
 from bridge.rig.derived import Derived
 from bridge.rig.device import Device, DeviceBlock, DeviceError, Setup
+from bridge.rig.device_node import DeviceNode
 from bridge.rig.faults.schedule import Faults
 from bridge.rig.faults.table import FaultTable
-from bridge.rig.node import DeviceNode
 from bridge.rig.real import calibration
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.clock import time

@@ -99,9 +99,40 @@ def test_lost_repeated_and_broken_frames_are_counted(
 
 
 def test_a_frame_of_another_length_is_dropped_with_both_lengths(peer: Peer) -> None:
-    ((first, lost, dropped),) = numbers(peer, frame(0, samples=10) + frame(1), 1)
-    assert (first, lost) == (1, 0)
+    _, (first, lost, dropped) = numbers(peer, frame(0) + frame(1, samples=10) + frame(2), 2)
+    assert (first, lost) == (2, 1)
     assert dropped == "BLOCK_SHORT a frame of 112 bytes, where (20, 2) samples and channels make 192: dropped"
+
+
+@pytest.mark.parametrize(
+    ("samples", "line"),
+    [
+        (
+            40,
+            "80 numbers, the rig file 20 samples x 2 channels = 40; set device.channels = 4, or set converter.",
+        ),
+        (10, "20 .*= 40; use no source above 0, or set converter.samples_per_block = 10"),
+        (15, "30 .*= 40; set converter.samples_per_block = 15"),
+    ],
+)
+def test_a_first_frame_that_does_not_fit_names_the_line_to_change(peer: Peer, samples: int, line: str) -> None:
+    peer.socket.sendall(frame(0, samples=samples))
+    with pytest.raises(DeviceError, match=f"the first frame has {line}") as error:
+        peer.adapter.read()
+    assert error.value.code == "DEVICE_DATA"
+
+
+def test_a_device_may_have_more_channels_than_the_rig_file_uses(peer: Peer) -> None:
+    settings = {"address": peer.adapter._settings.address, "waits": True, "channels": CHANNELS + 1}
+    adapter = Adapter(SETUP._replace(settings=settings))
+    adapter.open()
+    with peer.server.accept()[0] as device:
+        values = np.arange(SAMPLES * (CHANNELS + 1), dtype="<f4")
+        device.sendall(struct.pack("<4sIQdd", b"SSR1", 24 + values.nbytes, 0, 2600.0, 0.0) + values.tobytes())
+        block = adapter.read()
+    adapter.close()
+    assert block is not None
+    assert block.samples[:, 1].tolist() == [3.0, 4.0, 5.0]
 
 
 def test_a_device_that_does_not_know_its_vibration_gets_the_written_one(peer: Peer) -> None:
@@ -181,6 +212,10 @@ def test_a_program_is_started_and_ends_with_the_connection(tmp_path: Path) -> No
         ({}, "address, command: neither given: must be one"),
         ({"address": "here:1", "command": ["x"]}, "address, command: both given"),
         ({"address": "here"}, "address = 'here': must be HOST:PORT"),
+        (
+            {"address": "here:1", "channels": 1},
+            "device.channels = 1: must be 2 or more, as the rig file has source = 1",
+        ),
         ({"adress": "here:1"}, "adress = 'here:1': unknown key; perhaps address"),
     ],
 )
