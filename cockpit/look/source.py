@@ -164,7 +164,8 @@ def _by_names(table: Table, asked: LookOptions) -> _Reading:
     columns, of_columns, starts_s = mapped(table, channels, asked.rate_Hz)
     findings += [*of_columns, *unitless(table, channels, bool(asked.rate_Hz))]
     if guessed.stands_in == "a position":
-        columns["drive_force_N"] = lag_of(columns["t_s"], columns["drive_force_N"])
+        columns["drive_force_N"], speed_mps = lag_of(columns["t_s"], columns["drive_force_N"])
+        asked = asked._replace(speed_mps=asked.speed_mps or speed_mps)
         text = f"column {guessed.force} is a position: how far it lies behind an even motion is looked at"
         findings.append(Finding("lag", path.name, text))
     if torsion:

@@ -11,7 +11,7 @@ from bridge.results import in_json
 from diagnosis.look.creep import limit_of
 from diagnosis.look.laid_over import breakaway_of, with_slip_times
 from diagnosis.look.motion import StickSlip, best_way
-from diagnosis.look.numbers import Number, jackknifed, mean_of
+from diagnosis.look.numbers import Number, jackknifed, mean_of, median_of
 from diagnosis.look.slip_shape import Shape, falls_of, hidden_by_damping_N, shape_of
 from diagnosis.look.slips import OneWayPart, RecordSlips, find_slips, parts_of
 from diagnosis.look.speeds import AtSpeed, over_dwell, over_speed
@@ -118,7 +118,7 @@ def look(
     slips_of_parts = [slips for slips in (find_slips(part) for part in parts) if slips is not None]
     answer = None
     if known.unit:
-        parts, slips_of_parts, answer = best_way(parts, known.follows)
+        parts, slips_of_parts, answer = best_way(parts, known.follows, known.speed_mps)
     limit = limit_of([climb for slips in slips_of_parts for climb in climbs_of(slips)])
     ratio = limit.value if limit is not None else 1.0
     cycles = [cycle for slips in slips_of_parts for cycle in cycles_of(slips, known.speed_mps, ratio)]
@@ -150,8 +150,10 @@ def look(
             for name, number in numbers.items()
             if name not in _OF_SPRING
         }
-        if "period_s" in numbers:
-            numbers["frequency_Hz"] = _inverse(numbers["period_s"], "Hz")
+        # the mean would hold the times over turns and starts of the drive too
+        if sticks and (period := median_of(_periods(slips_of_parts), "s")) is not None:
+            numbers["period_s"] = period.wider(step_s / math.sqrt(6.0))
+            numbers["frequency_Hz"] = Number(1.0 / period.value, 1.0 / period.high, 1.0 / period.low, "Hz")
     elif known.torsion:
         numbers = {
             name: number._replace(unit=_TURNING.get(number.unit, number.unit)) for name, number in numbers.items()
@@ -173,8 +175,9 @@ def look(
     )
 
 
-def _inverse(number: Number, unit: str) -> Number:
-    return Number(1.0 / number.value, 1.0 / number.high, 1.0 / number.low, unit)
+def _periods(slips_of_parts: list[RecordSlips]) -> Floats:
+    """Times between breakaways of a part [s]."""
+    return np.concatenate([np.diff(slips.part.t_s[slips.tops]) for slips in slips_of_parts])
 
 
 def _of_coefficient(numbers: dict[str, Number]) -> dict[str, Number]:
@@ -188,7 +191,7 @@ def _of_coefficient(numbers: dict[str, Number]) -> dict[str, Number]:
 
 def _of_cycles(slips_of_parts: list[RecordSlips], cycles: list[Cycle], step_s: float) -> dict[str, Number]:
     """Means over the slips."""
-    periods = np.concatenate([np.diff(slips.part.t_s[slips.tops]) for slips in slips_of_parts])
+    periods = _periods(slips_of_parts)
     stuck = [cycle for cycle in cycles if math.isfinite(cycle.dwell_s)] or cycles
     drops = [cycle.breakaway_force_N - cycle.restick_force_N for cycle in stuck]
     durations = [cycle.restick_t_s - cycle.breakaway_t_s for cycle in cycles]
