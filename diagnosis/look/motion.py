@@ -19,8 +19,8 @@ _FEWEST = 5  # fewest swings that show whether they are slips; start and turns o
 # Smallest fall over the usual one: smaller ones are ripple between slips. 0: ripple splits the currents of 4 of 80 axes; 0.5:
 # small slips in a following error are lost on 4 of 80.
 _LEAST_FALL = 0.3
-# Share of the drive's speed by which a slide falls behind: 0.7 to 1.1 if it rests, 0 to 0.2 if it moves on, on 80 drawn axes; above
-# _SWINGS it goes back.
+# Share of the drive's speed by which a slide falls behind: 0.7 to 1.1 if it rests, 0 to 0.2 if it moves on, on 80 drawn axes;
+# above _SWINGS it goes back.
 _RESTS, _SWINGS, _FEWEST_SLOPES = 0.5, 1.5, 3
 _FEWEST_OF_FALL = 3  # fewest samples of a fall; shorter ones are steps of an encoder
 # Ratio of the durations of climb and fall: on 40 drawn servo axes the swings of those without stick-slip had 0.9 to 1.15, the
