@@ -9,10 +9,11 @@ import numpy as np
 
 from bridge.arrays import Floats
 from bridge.faults import Fault
+from bridge.formula import Formula
 from bridge.log.finding import Finding
 from bridge.tables.cells import numbers, seconds
 from bridge.tables.pieces import Segment, unwrapped
-from bridge.tables.unit_words import bare_name, in_brackets, unit_in_name
+from bridge.tables.unit_words import bare_name, in_brackets, known_unit, unit_in_name
 from bridge.units import counted
 
 _SECONDS = re.compile(r"(.*?)(?:secs?|seconds)")  # column of the whole seconds of a stamp; see _NANOSECONDS
@@ -50,6 +51,9 @@ class Table:
     written: dict[str, Any] = field(default_factory=dict[str, Any])  # how the file was read; keys of [source] of a map
     own_times: dict[str, str] = field(default_factory=dict[str, str])  # column of a channel's times, by channel
     segments: tuple[Segment, ...] = ()  # parts with a head each; empty for a file with one head
+    derived: dict[str, list[str]] = field(
+        default_factory=dict[str, list[str]]
+    )  # columns of each formula that was asked for
     # numbers of the columns that were read: recognising the columns of a long record reads each several times
     _numbers: dict[str, Floats] = field(default_factory=dict[str, Floats], init=False, repr=False)
     names_are_paths: bool = (
@@ -57,7 +61,7 @@ class Table:
     )
 
     def find(self, name: str | int) -> str:
-        """The key of a column given by its name, its number from 1, or its name without its unit.
+        """The key of a column given by its name, its number from 1, its name without its unit, or a formula of columns.
 
         Raises Fault BAD_TABLE if no column matches, or more than one.
         """
@@ -72,8 +76,31 @@ class Table:
                 return near[0]
             if near:
                 break
+        if self._derive(wanted):
+            return wanted
         known = ", ".join(self.columns) or "none"
         raise Fault("BAD_TABLE", f"{self.path.name}: column {wanted}: not in the file; known here: {known}")
+
+    def _derive(self, text: str) -> bool:
+        """Add the column of a formula, in SI units, with the clock of its first column; False for a text that is no formula."""
+        try:
+            formula = Formula(text)
+            sources = [self.find(name) for name in sorted(formula.names)] if not Formula.is_name(text) else []
+        except (ValueError, Fault):
+            return False
+        if not sources:
+            return False
+        factors = [known[1] if (known := known_unit(self.unit(source))) else 1.0 for source in sources]
+        columns = [factor * self.column(source) for factor, source in zip(factors, sources, strict=True)]
+        if len({len(column) for column in columns}) > 1:
+            rows = ", ".join(f"{source}: {len(column)}" for source, column in zip(sources, columns, strict=True))
+            raise Fault("BAD_TABLE", f"{self.path.name}: {text}: must have columns of equal length, rows {rows}")
+        self.columns[text] = formula(dict(zip(sorted(formula.names), columns, strict=True)))
+        self.derived[text] = sources
+        if sources[0] in self.clocks:
+            self.clocks[text] = self.clocks[sources[0]]
+        self._add([Finding("derived", f"{self.path.name}: {text}", f"from {', '.join(sources)}, each in its SI unit")])
+        return True
 
     def column(self, name: str | int) -> Floats:
         """One column, float64 [rows]; cells without a number are NaN. Raises Fault BAD_TABLE if it is missing or not numeric."""
@@ -119,6 +146,8 @@ class Table:
         """The unit of a column: from the file's list of units, its name, or the given name, as in `T [ms]`; empty if unknown."""
         key = self.find(name)
         first = _AGAIN.sub("", key)
+        if key in self.derived:
+            return ""
         if (unit := self.units.get(key)) or (self.names_are_paths and key.endswith("]")):
             return unit or ""
         unit = unit_in_name(first if first in self.columns else key)
@@ -127,7 +156,7 @@ class Table:
     def stated_unit(self, name: str | int) -> str:
         """The unit of a column, known or not, as the file writes it; empty if it states none."""
         key = self.find(name)
-        return self.unit(name) or ("" if self.names_are_paths else in_brackets(key))
+        return self.unit(name) or ("" if self.names_are_paths or key in self.derived else in_brackets(key))
 
 
 def _simplified(text: str, bare: bool) -> str:

@@ -21,7 +21,7 @@ from cockpit.look.findings import of_time, of_values, tare_of
 from cockpit.look.units import counts, own_unit, quantity, si, unitless
 from diagnosis.evidence.import_table import ImportMap
 from diagnosis.evidence.manifest_keys import USUAL, ChannelMap, Columns
-from diagnosis.evidence.mapped import has_time, mapped
+from diagnosis.evidence.mapped import has_time, mapped, piece_of
 from diagnosis.evidence.run_log import LoggedRun, columns_of_log
 from diagnosis.look.guess import Guess, guess, no_time, unused
 from diagnosis.look.look import LookResult, RecordFacts, look
@@ -164,7 +164,8 @@ def _by_names(table: Table, asked: LookOptions) -> _Reading:
     columns, of_columns, starts_s = mapped(table, channels, asked.rate_Hz)
     findings += [*of_columns, *unitless(table, channels, bool(asked.rate_Hz))]
     if guessed.stands_in == "a position":
-        columns["drive_force_N"] = lag_of(columns["t_s"], columns["drive_force_N"])
+        columns["drive_force_N"], speed_mps = lag_of(columns["t_s"], columns["drive_force_N"])
+        asked = asked._replace(speed_mps=asked.speed_mps or speed_mps)
         text = f"column {guessed.force} is a position: how far it lies behind an even motion is looked at"
         findings.append(Finding("lag", path.name, text))
     if torsion:
@@ -234,11 +235,7 @@ def _piece(record: MeasuredRecord, piece: int | None) -> MeasuredRecord:
     """The record of one piece, or of all. Raises Fault CONFIG for a number without a piece."""
     if piece is None:
         return record
-    starts_s = record.starts_s or (-np.inf,)
-    if not 1 <= piece <= len(starts_s):
-        raise Fault("CONFIG", f"--piece {piece}: must be from 1 to {len(starts_s)}, the pieces of {record.path.name}")
-    end_s = starts_s[piece] if piece < len(starts_s) else np.inf
-    inside = (record.t_s >= starts_s[piece - 1]) & (record.t_s < end_s)
+    inside = piece_of(record.t_s, record.starts_s, piece, record.path.name)
     return record._replace(
         t_s=record.t_s[inside],
         force_N=record.force_N[inside],

@@ -82,6 +82,7 @@ def unitless(table: Table, channels: dict[str, ChannelMap], rate: bool) -> list[
         for name, channel in channels.items()
         if channel.scale is None
         and not (channel.unit or table.stated_unit(channel.column))
+        and table.find(channel.column) not in table.derived
         and not (name == "t_s" and (rate or _is_time(table, channel)))
     ]
 

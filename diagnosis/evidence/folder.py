@@ -21,8 +21,8 @@ from diagnosis.evidence.column_checks import checked
 from diagnosis.evidence.conversion import as_sliding, run_as_sliding, told, with_beside
 from diagnosis.evidence.foreign_vibration import foreign_vibrations
 from diagnosis.evidence.manifest import MANIFEST, Manifest, RigTable, RunTable, described
-from diagnosis.evidence.manifest_keys import STANDARD, VIBRATION, ChannelMap, Columns
-from diagnosis.evidence.mapped import has_time, mapped
+from diagnosis.evidence.manifest_keys import STANDARD, VIBRATION, ChannelMap, Columns, SourceMap
+from diagnosis.evidence.mapped import has_time, mapped, piece_of
 from diagnosis.evidence.run import Evidence, MeasuredRun
 from diagnosis.evidence.run_log import columns_of_log
 from diagnosis.evidence.split import split
@@ -95,8 +95,11 @@ def _read_all(folder: Path, manifest: Manifest) -> list[tuple[Columns, list[Find
     result: list[tuple[Columns, list[Finding]]] = []
     for table in manifest.run:
         channels = manifest.channels | table.channels
-        key = f"{table.file} {sorted(channels.items())}"
-        columns, notes = known.get(key) or read_columns(folder / table.file, channels, manifest.rig.drive == "torsion")
+        key = f"{table.file} {table.source} {table.piece} {sorted(channels.items())}"
+        rotary = manifest.rig.drive == "torsion"
+        columns, notes = known.get(key) or read_columns(
+            folder / table.file, channels, rotary, table.source, table.piece
+        )
         result.append((_stretch(columns, table), [] if key in known else notes))
         known[key] = (columns, notes)
     return result
@@ -104,7 +107,7 @@ def _read_all(folder: Path, manifest: Manifest) -> list[tuple[Columns, list[Find
 
 def _stretch(columns: Columns, table: RunTable) -> Columns:
     """The part of a file that is a run; its limits count from the first sample with a finite time."""
-    if table.name == table.file:
+    if table.from_s == 0.0 and table.until_s is None:
         return columns
     t_s = columns["t_s"]
     since_s = t_s - t_s[np.isfinite(t_s)][0] if np.isfinite(t_s).any() else t_s
@@ -193,7 +196,13 @@ def _vibration(columns: Columns, t_s: Floats) -> Iterator[tuple[str, str, str]]:
         yield from (("rate", name, text) for name in ("mass_accel_mps2", "base_accel_mps2") if name in columns)
 
 
-def read_columns(path: Path, channels: dict[str, ChannelMap], rotary: bool = False) -> tuple[Columns, list[Finding]]:
+def read_columns(
+    path: Path,
+    channels: dict[str, ChannelMap],
+    rotary: bool = False,
+    source: SourceMap = SourceMap(),  # noqa: B008  immutable
+    piece: int | None = None,
+) -> tuple[Columns, list[Finding]]:
     """The standard columns of a data file, mapped and in SI units but not checked; and findings about missing columns and damage.
 
     A run log has the standard columns; a column that `channels` maps is scaled as in any other file. Raises Fault BAD_EVIDENCE.
@@ -202,15 +211,18 @@ def read_columns(path: Path, channels: dict[str, ChannelMap], rotary: bool = Fal
         if path.suffix == ".mcap":
             logged, damaged, _ = columns_of_log(path)
             return {name: _scaled(values, channels.get(name), name) for name, values in logged.items()}, damaged
-        table = read_table(path)
+        table = read_table(path, source.dialect, source.format)
         wanted, lacking = _wanted(table, channels)
-        if not has_time(table, wanted):
+        if source.sample_rate_Hz is None and not has_time(table, wanted):
             has = ", ".join(wanted) or "no standard column"
             line = f"{path.name}: t_s: missing; the file has {has}; add the column or map it in [channels]"
             raise Fault("BAD_EVIDENCE", line)
-        standard, noted, starts_s = mapped(table, wanted, rotary=rotary)
-        if starts_s:
-            line = f"{path.name}: t_s: begins again: holds {len(starts_s)} runs, and must hold one"
+        standard, noted, starts_s = mapped(table, wanted, source.sample_rate_Hz, rotary)
+        if piece is not None:
+            inside = piece_of(standard["t_s"], starts_s, piece, path.name)
+            standard = {name: values[inside] for name, values in standard.items()}
+        elif starts_s:
+            line = f"{path.name}: t_s: begins again: holds {len(starts_s)} runs, and must hold one; give piece = 1 in [[run]]"
             raise Fault("BAD_EVIDENCE", f"{line}; `stickslip log import {path.name} --out FOLDER` makes a run of each")
     except Fault as fault:
         line = fault.line if path.name in fault.line else f"{path.name}: {fault.line}"

@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,9 +18,8 @@ from bridge.log.finding import Finding
 from bridge.log.runlog import RunLog
 from bridge.log.storage.verdict_file import remove_verdict
 from bridge.tables.export import CHANNELS
-from bridge.tables.kinds import Kind
 from bridge.tables.one_clock import gaps_of
-from bridge.tables.readers import Dialect, read_table
+from bridge.tables.readers import read_table
 from bridge.tables.unit_words import known_unit
 from bridge.units import counted, unit_of
 from bridge.wire.messages import sensor_block
@@ -29,43 +28,13 @@ from diagnosis.evidence.assumed import with_assumed
 from diagnosis.evidence.conversion import with_beside
 from diagnosis.evidence.folder import examine
 from diagnosis.evidence.manifest import MANIFEST, DriveVelocity, RigTable, RunTable, manifest_text, read_manifest
-from diagnosis.evidence.manifest_keys import USUAL, ChannelMap, Columns, check_channel_names
-from diagnosis.evidence.mapped import Mapped, mapped
+from diagnosis.evidence.manifest_keys import USUAL, ChannelMap, Columns, SourceMap, check_channel_names, with_numbers
+from diagnosis.evidence.mapped import Mapped, mapped, piece_of
 from diagnosis.evidence.unknown_mass import shown_mass_kg
 
 _AGAINST = 0.3  # share of all work that the drive receives, from which the sign is wrong; a loaded spring returns some
 _BLOCK_SAMPLES = 20
 _IRREGULAR_SHARE = 0.01  # deviation from an even clock, in steps, that counts as even: rounding of printed times
-
-
-class SourceMap(Strict):
-    """How the source file is written."""
-
-    sample_rate_Hz: Annotated[float, Field(ge=1.0, le=1e7)] | None = Field(
-        default=None, description="Sampling rate, where no column holds the time."
-    )
-    format: Kind | None = Field(default=None, description="Format of the file, where its first bytes do not show it.")
-    delimiter: Annotated[str, Field(min_length=1, max_length=1)] | None = Field(
-        default=None, description="Mark between columns; a blank means any number of blanks and tabs."
-    )
-    decimal: Literal[".", ","] | None = Field(default=None, description="Decimal mark.")
-    thousands: Annotated[str, Field(max_length=1)] | None = Field(default=None, description="Thousands separator.")
-    skip_rows: Annotated[int, Field(ge=0)] | None = Field(
-        default=None, description="Lines before the line of the names."
-    )
-    encoding: str | None = None
-    names: list[str] | None = Field(default=None, description="Names of the columns, where the file has none.")
-    units_row: bool | None = Field(default=None, description="Whether a line of units follows the names.")
-    comment: Annotated[str, Field(min_length=1)] | None = Field(
-        default=None, description="Beginning of the lines that are skipped."
-    )
-    sheet: str | None = Field(default=None, description="Sheet of a workbook.")
-
-    @property
-    def dialect(self) -> Dialect:
-        """The map's keys for a text or a sheet."""
-        given = self.model_dump(exclude={"sample_rate_Hz", "format", "names"})
-        return Dialect(**given, names=None if self.names is None else tuple(self.names))
 
 
 class RunMap(Strict):
@@ -80,12 +49,14 @@ class ImportMap(Strict):
 
     source: SourceMap = SourceMap()
     channels: dict[str, ChannelMap]
+    numbers: dict[str, float] = Field(default={}, description="Numbers by name, for the formulas of derived channels.")
     rig: dict[str, Any] = Field(default={}, description="[rig] of manifest.toml; only an evidence folder needs it.")
     run: RunMap = RunMap()
 
     @model_validator(mode="after")
     def _channels_are_enough(self) -> "ImportMap":
         check_channel_names(self.channels)
+        self.channels.update(with_numbers(self.channels, self.numbers))
         if not {"drive_force_N", "mass_accel_mps2", "motor_current_A"} & self.channels.keys():
             raise ValueError("channels: must name drive_force_N or mass_accel_mps2; no other column shows a slip")
         if "t_s" in self.channels and self.source.sample_rate_Hz is not None:
@@ -133,23 +104,20 @@ def import_columns(
     Raises Fault CONFIG for the map, BAD_TABLE for the file, BAD_EVIDENCE for its content, LOG_WRITE. Nothing
     unfinished is left behind.
     """
-    starts_s = read.starts_s or (-np.inf,)
-    if piece is not None and not 1 <= piece <= len(starts_s):
-        raise Fault("CONFIG", f"--piece {piece}: must be from 1 to {len(starts_s)}, the pieces of {path.name}")
+    count = max(len(read.starts_s), 1)
     done: list[Imported] = []
     findings, refused = list(read.findings), list[Fault]()
-    for number in range(1, len(starts_s) + 1) if piece is None else [piece]:
-        columns, name, target = read.columns, path, out
-        if len(starts_s) > 1:
-            t_s = columns["t_s"]
-            end_s = starts_s[number] if number < len(starts_s) else np.inf
-            columns = {key: values[(t_s >= starts_s[number - 1]) & (t_s < end_s)] for key, values in columns.items()}
+    for number in range(1, count + 1) if piece is None else [piece]:
+        inside = piece_of(read.columns["t_s"], read.starts_s, number, path.name)
+        columns = {key: values[inside] for key, values in read.columns.items()}
+        name, target = path, out
+        if count > 1:
             name = path.with_name(f"{path.stem}-{number}{path.suffix}")
             target = out.with_name(f"{out.stem}-{number}.mcap") if out.suffix == ".mcap" else out
         try:
             written = _written(name, columns, wanted, map_name, target)
         except Fault as fault:
-            if len(starts_s) < 2:
+            if count < 2:
                 raise
             refused.append(fault)
             findings.append(Finding("pieces", f"{path.name}: piece {number}", f"left out: {fault.line}"))

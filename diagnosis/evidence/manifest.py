@@ -14,7 +14,14 @@ from bridge.config import Strict, in_short, read_toml, validate
 from bridge.faults import Fault
 from bridge.files import check_file, shown
 from diagnosis.evidence.assumed import with_assumed
-from diagnosis.evidence.manifest_keys import ChannelMap, NotNegative, Positive, check_channel_names
+from diagnosis.evidence.manifest_keys import (
+    ChannelMap,
+    NotNegative,
+    Positive,
+    SourceMap,
+    check_channel_names,
+    with_numbers,
+)
 
 FORMAT = "evidence/1"
 MANIFEST = "manifest.toml"
@@ -153,13 +160,19 @@ class RunTable(Strict):
     tare_N: float = Field(default=0.0, description="Reading of the force sensor without a force; subtracted.")
     normal_load_N: Positive | None = Field(default=None, description="Constant load, where no column gives it.")
     channels: dict[str, ChannelMap] = Field(default={}, description="Channels that differ from [channels] in this run.")
+    source: SourceMap = Field(default=SourceMap(), description="How the file is written, as in a channel map.")
+    piece: Annotated[int, Field(ge=1)] | None = Field(
+        default=None, description="Number of the run in a file whose time begins again."
+    )
 
     @property
     def name(self) -> str:
-        """Name of the file, with the limits in time if the run is a part of it: `log-0-to-9s.csv`."""
-        if self.from_s == 0.0 and self.until_s is None:
-            return self.file
+        """Name of the file, with piece and limits in time if the run is a part of it: `log-2.csv`, `log-0-to-9s.csv`."""
         path = PurePath(self.file)
+        if self.piece is not None:
+            path = path.with_name(f"{path.stem}-{self.piece}{path.suffix}")
+        if self.from_s == 0.0 and self.until_s is None:
+            return str(path)
         until = "end" if self.until_s is None else f"{self.until_s:g}s"
         return str(path.with_name(f"{path.stem}-{self.from_s:g}-to-{until}{path.suffix}"))
 
@@ -182,11 +195,14 @@ class Manifest(Strict):
     format: Literal["evidence/1"]
     rig: RigTable
     channels: dict[str, ChannelMap] = {}
+    numbers: dict[str, float] = Field(default={}, description="Numbers by name, for the formulas of derived channels.")
     run: Annotated[list[RunTable], Field(min_length=1)]
 
     @model_validator(mode="after")
     def _names_are_right(self) -> "Manifest":
         check_channel_names(self.channels)
+        for channels in (self.channels, *(run.channels for run in self.run)):
+            channels.update(with_numbers(channels, self.numbers))
         names = [str(PurePath(run.name).with_suffix("")) for run in self.run]
         counts = Counter(names)
         for run, name in zip(self.run, names, strict=True):
@@ -203,9 +219,11 @@ class Manifest(Strict):
 
 def _refuse_overlap(runs: list[RunTable]) -> None:
     """Raise ValueError where two runs share a stretch of a file: a held-out stretch must not be fitted."""
-    ordered = sorted(runs, key=lambda run: (run.file, run.from_s))
+    ordered = sorted(runs, key=lambda run: (run.file, run.piece or 0, run.from_s))
     for run, after in pairwise(ordered):
-        if run.file == after.file and after.from_s < (math.inf if run.until_s is None else run.until_s):
+        if (run.file, run.piece) == (after.file, after.piece) and after.from_s < (
+            math.inf if run.until_s is None else run.until_s
+        ):
             raise ValueError(
                 f"run.from_s = {after.from_s:g} of {run.file!r}: another run has this stretch as well: must begin where the "
                 "other run ends; set until_s"
@@ -264,12 +282,16 @@ def manifest_text(rig: RigTable, runs: list[RunTable], assumed: list[str]) -> st
     lines = [f"format = {_value(FORMAT)}", "", *rig_lines(rig, assumed)]
     for run in runs:
         lines += ["", "[[run]]"]
-        plain = run.model_dump(exclude={"channels"})
+        plain = run.model_dump(exclude={"channels", "source"})
         usual = {"from_s": 0.0, "tare_N": 0.0}
         lines += [f"{name} = {_value(value)}" for name, value in plain.items() if value not in (None, usual.get(name))]
-        for name, channel in run.channels.items():
-            keys = [f"{key} = {_value(value)}" for key, value in channel.model_dump(exclude_defaults=True).items()]
-            lines.append(f"channels.{name} = {{ {', '.join(keys)} }}")
+        tables = {
+            f"channels.{name}": channel.model_dump(exclude_defaults=True) for name, channel in run.channels.items()
+        }
+        for name, table in (tables | {"source": run.source.model_dump(exclude_defaults=True)}).items():
+            if table:
+                shown = {key: value for key, value in table.items() if key != "derive"}
+                lines.append(f"{name} = {{ {', '.join(f'{key} = {_value(value)}' for key, value in shown.items())} }}")
     return "\n".join(lines) + "\n"
 
 

@@ -1,12 +1,13 @@
 """The standard columns of a table, in SI units, on one clock, without values that a program writes for a missing measurement."""
 
 import re
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from bridge.arrays import Floats
+from bridge.arrays import Bools, Floats
 from bridge.faults import Fault
 from bridge.log.finding import Finding
 from bridge.tables.one_clock import Sampled, on_one_clock, own_rows, with_own_rows
@@ -88,6 +89,14 @@ def mapped(
     t_s = (np.arange(rows) - np.repeat(begins, np.diff([*begins, rows]))) / rate_Hz
     t_s, starts_s, of_pieces = in_pieces(t_s, table.segments, file)
     return Mapped({"t_s": t_s} | values, table.findings + findings + of_pieces, starts_s)
+
+
+def piece_of(t_s: Floats, starts_s: Sequence[float], piece: int, file: str) -> Bools:
+    """The rows of a piece, from 1, [rows]. Raises Fault CONFIG for a number without a piece."""
+    starts_s = (-np.inf, *starts_s[1:], np.inf)
+    if not 1 <= piece < len(starts_s):
+        raise Fault("CONFIG", f"--piece {piece}: must be from 1 to {len(starts_s) - 1}, the pieces of {file}")
+    return ~((t_s < starts_s[piece - 1]) | (t_s >= starts_s[piece]))
 
 
 def _sampled(times_s: Floats, values: Floats) -> Sampled:

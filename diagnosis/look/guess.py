@@ -177,6 +177,7 @@ def no_time(table: Table) -> str:
 def unused(table: Table, guessed: Guess) -> list[str]:
     """Columns with numbers that are not read, each once."""
     used = {guessed.time, guessed.force, guessed.load, guessed.position, guessed.speed, guessed.coefficient}
+    used |= {source for name in used for source in table.derived.get(name, ())}
     same = {id(table.columns[name]) for name in used if name}
     return [
         name

@@ -8,13 +8,14 @@ import numpy as np
 
 from bridge.arrays import Floats
 from bridge.results import in_json
+from diagnosis.look.creep import limit_of
 from diagnosis.look.laid_over import breakaway_of, with_slip_times
 from diagnosis.look.motion import StickSlip, best_way
-from diagnosis.look.numbers import Number, jackknifed, mean_of
+from diagnosis.look.numbers import Number, jackknifed, mean_of, median_of
 from diagnosis.look.slip_shape import Shape, falls_of, hidden_by_damping_N, shape_of
 from diagnosis.look.slips import OneWayPart, RecordSlips, find_slips, parts_of
 from diagnosis.look.speeds import AtSpeed, over_dwell, over_speed
-from diagnosis.look.sticks import Cycle, cycles_of
+from diagnosis.look.sticks import Cycle, climbs_of, cycles_of
 
 # name of a number of the force -> name of the number of a friction coefficient
 _MU = {
@@ -37,6 +38,9 @@ _TURNING = {"N": "N m", "N/s": "N m/s", "N/m": "N m/rad", "kg": "kg m²", "N per
 # F_s may be lower, in rises of the force until the slide is as fast as its drive (0 to 0.43 on the axes), and higher, as a share
 # of F_s - F_k (creep: 0.04 in the middle, 0.5 on the softest contact).
 _FALLS_SLOWLY, _CREEPS = 0.4, 0.06
+# The limit of the friction from the sticks, over the force at breakaway, was 0.4 to 1 of the true one where the contact creeps:
+# the sticks that are fitted end before the limit. Smaller: F_s of slow drives and soft contacts lies above its interval.
+_NOT_REACHED = 2.0
 # Stiffness: shares by which the correction for the contact may be too large or small (0.46 and 0.82 at most, except on 2 rigs).
 _TOO_MUCH, _TOO_LITTLE = 0.5, 0.75
 # Fewest samples of a stick from which a stiffness comes. At 5 to 13 it was 8 to 33 % too small on 7 drawn axes, as the ring of a
@@ -114,8 +118,10 @@ def look(
     slips_of_parts = [slips for slips in (find_slips(part) for part in parts) if slips is not None]
     answer = None
     if known.unit:
-        parts, slips_of_parts, answer = best_way(parts, known.follows)
-    cycles = [cycle for slips in slips_of_parts for cycle in cycles_of(slips, known.speed_mps)]
+        parts, slips_of_parts, answer = best_way(parts, known.follows, known.speed_mps)
+    limit = limit_of([climb for slips in slips_of_parts for climb in climbs_of(slips)])
+    ratio = limit.value if limit is not None else 1.0
+    cycles = [cycle for slips in slips_of_parts for cycle in cycles_of(slips, known.speed_mps, ratio)]
     weights = [len(slips.tops) for slips in slips_of_parts]
     straight = [slips.straight for slips in slips_of_parts]
     sticks = bool(slips_of_parts) and float(np.average(straight, weights=weights)) >= 0.5
@@ -125,7 +131,7 @@ def look(
     numbers: dict[str, Number] = {}
     if sticks:
         numbers |= _of_cycles(slips_of_parts, cycles, step_s)
-        numbers |= _of_falls(slips_of_parts, numbers)
+        numbers |= _of_falls(slips_of_parts, numbers, limit)
         numbers |= _between_samples(numbers, step_s)
         if (dwell := over_dwell(cycles)) is not None:
             numbers["dwell_N_per_decade"] = dwell
@@ -144,8 +150,10 @@ def look(
             for name, number in numbers.items()
             if name not in _OF_SPRING
         }
-        if "period_s" in numbers:
-            numbers["frequency_Hz"] = _inverse(numbers["period_s"], "Hz")
+        # the mean would hold the times over turns and starts of the drive too
+        if sticks and (period := median_of(_periods(slips_of_parts), "s")) is not None:
+            numbers["period_s"] = period.wider(step_s / math.sqrt(6.0))
+            numbers["frequency_Hz"] = Number(1.0 / period.value, 1.0 / period.high, 1.0 / period.low, "Hz")
     elif known.torsion:
         numbers = {
             name: number._replace(unit=_TURNING.get(number.unit, number.unit)) for name, number in numbers.items()
@@ -167,8 +175,9 @@ def look(
     )
 
 
-def _inverse(number: Number, unit: str) -> Number:
-    return Number(1.0 / number.value, 1.0 / number.high, 1.0 / number.low, unit)
+def _periods(slips_of_parts: list[RecordSlips]) -> Floats:
+    """Times between breakaways of a part [s]."""
+    return np.concatenate([np.diff(slips.part.t_s[slips.tops]) for slips in slips_of_parts])
 
 
 def _of_coefficient(numbers: dict[str, Number]) -> dict[str, Number]:
@@ -182,7 +191,7 @@ def _of_coefficient(numbers: dict[str, Number]) -> dict[str, Number]:
 
 def _of_cycles(slips_of_parts: list[RecordSlips], cycles: list[Cycle], step_s: float) -> dict[str, Number]:
     """Means over the slips."""
-    periods = np.concatenate([np.diff(slips.part.t_s[slips.tops]) for slips in slips_of_parts])
+    periods = _periods(slips_of_parts)
     stuck = [cycle for cycle in cycles if math.isfinite(cycle.dwell_s)] or cycles
     drops = [cycle.breakaway_force_N - cycle.restick_force_N for cycle in stuck]
     durations = [cycle.restick_t_s - cycle.breakaway_t_s for cycle in cycles]
@@ -212,7 +221,9 @@ def _stiffness(stuck: list[Cycle], step_s: float) -> dict[str, Number | None]:
         return {}
     series = mean_of([cycle.stiffness_N_per_m for cycle in stuck], "N/m")
     drive = mean_of([cycle.drive_m_per_N for cycle in stuck], "m/N")
-    if series is None or drive is None or not drive.low > 0.0:
+    if series is None or not series.low > 0.0:  # aliased swings
+        return {}
+    if drive is None or not drive.low > 0.0:
         return {"stiffness_N_per_m": series}
     # below 2 half intervals the scatter of the contact's compliance exceeds half of its correction
     if not 1.0 / series.value - drive.value > 2.0 * (drive.high - drive.value):
@@ -224,7 +235,7 @@ def _stiffness(stuck: list[Cycle], step_s: float) -> dict[str, Number | None]:
     return {"series_N_per_m": series, "stiffness_N_per_m": stiffness}
 
 
-def _of_falls(slips_of_parts: list[RecordSlips], numbers: dict[str, Number]) -> dict[str, Number]:
+def _of_falls(slips_of_parts: list[RecordSlips], numbers: dict[str, Number], limit: Number | None) -> dict[str, Number]:
     """Sliding friction, mass and the force at which the slide breaks away, from the falls laid over each other."""
     if "restick_force_N" not in numbers:
         return {}
@@ -252,7 +263,7 @@ def _of_falls(slips_of_parts: list[RecordSlips], numbers: dict[str, Number]) -> 
     result = {
         "kinetic_force_N": kinetic,
         "omega_rad_per_s": omega,
-        "static_force_N": _breakaway(shape, numbers, step_s),
+        "static_force_N": _breakaway(shape, numbers, step_s, limit),
     }
     if "stiffness_N_per_m" in numbers and shape.is_swing:
         stiffness = numbers["stiffness_N_per_m"]
@@ -264,7 +275,7 @@ def _of_falls(slips_of_parts: list[RecordSlips], numbers: dict[str, Number]) -> 
     return result
 
 
-def _breakaway(shape: Shape, numbers: dict[str, Number], step_s: float) -> Number:
+def _breakaway(shape: Shape, numbers: dict[str, Number], step_s: float, limit: Number | None) -> Number:
     """The mean force at breakaway; the interval holds the static friction of a friction law too.
 
     The force rises further until the slide is as fast as its drive. For friction that falls at once
@@ -276,7 +287,10 @@ def _breakaway(shape: Shape, numbers: dict[str, Number], step_s: float) -> Numbe
     rise = numbers["slope_N_per_s"].value / shape.omega_rad_per_s if "slope_N_per_s" in numbers else 0.0
     least = shape.force_N + math.sqrt(max(above**2 - rise**2, 0.0)) - _FALLS_SLOWLY * rise
     between = above * (shape.omega_rad_per_s * step_s) ** 2 / 8.0
-    return top._replace(low=min(top.low, least - (top.value - top.low)), high=top.high + _CREEPS * above + between)
+    higher = top.high + _CREEPS * above + between
+    if limit is not None:
+        higher += _NOT_REACHED * (limit.high - 1.0) * top.value
+    return top._replace(low=min(top.low, least - (top.value - top.low)), high=higher)
 
 
 def _between_samples(numbers: dict[str, Number], step_s: float) -> dict[str, Number]:

@@ -12,9 +12,16 @@ import numpy as np
 
 from bridge.arrays import Floats
 from diagnosis.look.slips import OneWayPart, RecordSlips, find_slips
+from diagnosis.look.sticks import cycles_of
 from diagnosis.slips import turning_points
 
 _FEWEST = 5  # fewest swings that show whether they are slips; start and turns of a drive give up to 3
+# Smallest fall over the usual one: smaller ones are ripple between slips. 0: ripple splits the currents of 4 of 80 axes; 0.5:
+# small slips in a following error are lost on 4 of 80.
+_LEAST_FALL = 0.3
+# Share of the drive's speed by which a slide falls behind: 0.7 to 1.1 if it rests, 0 to 0.2 if it moves on, on 80 drawn axes;
+# above _SWINGS it goes back.
+_RESTS, _SWINGS, _FEWEST_SLOPES = 0.5, 1.5, 3
 _FEWEST_OF_FALL = 3  # fewest samples of a fall; shorter ones are steps of an encoder
 # Ratio of the durations of climb and fall: on 40 drawn servo axes the swings of those without stick-slip had 0.9 to 1.15, the
 # currents of those with it 1.2 to 7.5. Above _SLIPS it is stick-slip even if climbs are bent; between the two it stays open.
@@ -35,14 +42,38 @@ class StickSlip(NamedTuple):
     why: str
 
 
-def best_way(parts: list[OneWayPart], follows: bool) -> tuple[list[OneWayPart], list[RecordSlips], StickSlip]:
-    """The parts, their slips and the answer. `follows`: a following error, which programs write with either sign."""
+def best_way(
+    parts: list[OneWayPart], follows: bool, speed_mps: float | None
+) -> tuple[list[OneWayPart], list[RecordSlips], StickSlip]:
+    """The parts, their slips and the answer.
+
+    Args:
+        parts: the parts of the record.
+        follows: a following error, which programs write with either sign.
+        speed_mps: speed of the drive; None: not known.
+
+    """
     ways = [parts]
     if follows:
         ways.append([part._replace(force_N=-part.force_N, sign=-part.sign) for part in parts])
-    slips_of = [[slips for slips in map(find_slips, way) if slips is not None] for way in ways]
+    slips_of = [[slips for slips in map(_alike, way) if slips is not None] for way in ways]
     way = max(range(len(ways)), key=lambda i: _shape(slips_of[i])[0])
+    if follows and speed_mps:
+        return ways[way], slips_of[way], _at_rest(slips_of[way], speed_mps)
     return ways[way], slips_of[way], _answer(slips_of[way], follows)
+
+
+def _alike(part: OneWayPart) -> RecordSlips | None:
+    """The slips of a part without the ripple between them; the usual fall is the one in the middle of the sum of all falls."""
+    slips = find_slips(part)
+    if slips is None:
+        return None
+    tops, bottoms = slips.falls
+    sizes = np.sort(part.force_N[tops] - part.force_N[bottoms])
+    if not len(sizes):
+        return slips
+    usual = float(sizes[np.searchsorted(np.cumsum(sizes), 0.5 * sizes.sum())])
+    return find_slips(part, _LEAST_FALL * usual) or slips
 
 
 def _shape(slips: list[RecordSlips]) -> tuple[float, float, int, float]:
@@ -66,6 +97,19 @@ def _uneven(slips: list[RecordSlips]) -> float:
     return float((high - low) / middle)
 
 
+def _at_rest(slips: list[RecordSlips], speed_mps: float) -> StickSlip:
+    """Stick-slip in a following error at a known speed: a slide at rest falls behind by the way of its drive."""
+    slopes = [cycle.slope_N_per_s for part in slips for cycle in cycles_of(part, None)]
+    slopes = [slope for slope in slopes if np.isfinite(slope)]
+    if len(slopes) < _FEWEST_SLOPES:
+        return StickSlip("no", f"{len(slopes)} swings above the noise: start and turns of the drive give as many")
+    share = float(np.median(slopes)) / speed_mps
+    why = f"between slips the slide falls behind at {100.0 * share:.0f} % of the drive's speed"
+    if _RESTS < share < _SWINGS:
+        return StickSlip("yes", f"{why}: it rests")
+    return StickSlip("no", f"{why}: it {'moves on' if share < _SWINGS else 'swings'}")
+
+
 def _answer(slips: list[RecordSlips], follows: bool) -> StickSlip:
     ratio, straight, swings, fall = _shape(slips)
     if swings < _FEWEST:
@@ -86,14 +130,15 @@ def _answer(slips: list[RecordSlips], follows: bool) -> StickSlip:
     return StickSlip("no", f"{times}: a ripple or a swinging loop, as a slide that rests lets them last longer")
 
 
-def lag_of(t_s: Floats, position: Floats) -> Floats:
-    """How far a position lies behind an even motion in each of its strokes, [samples]; NaN near the turns."""
+def lag_of(t_s: Floats, position: Floats) -> tuple[Floats, float | None]:
+    """How far a position lies behind an even motion in each of its strokes, [samples], NaN near the turns; and its speed."""
     known = np.flatnonzero(np.isfinite(t_s + position))
     result = np.full(len(position), np.nan)
     values = position[known]
     if not len(known) or not np.ptp(values) > 0.0:
-        return result
+        return result, None
     turns = [0, *turning_points(values, _TURN * float(np.ptp(values))).tolist(), len(values)]
+    speeds: list[float] = []
     for first, end in pairwise(turns):
         cut = int(_NEAR_TURN * (end - first))
         rows = known[first + cut : end - cut]
@@ -101,4 +146,5 @@ def lag_of(t_s: Floats, position: Floats) -> Floats:
             continue
         line = np.polynomial.Polynomial.fit(t_s[rows], position[rows], 1)(t_s[rows])
         result[rows] = np.sign(line[-1] - line[0]) * (line - position[rows])
-    return result
+        speeds.append(abs(float(line[-1] - line[0])) / float(t_s[rows[-1]] - t_s[rows[0]]))
+    return result, float(np.median(speeds)) if speeds else None

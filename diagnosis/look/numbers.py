@@ -11,6 +11,7 @@ from bridge.arrays import Floats
 from bridge.results import in_json
 
 _GROUPS = 10  # groups of slips for the jackknife
+_RANKS = 1.645 / 2.0  # ranks from the median to the ends of its interval, over the root of the number of values
 # Student's t for 90 %, two sides, by degrees of freedom; 1.645 beyond the table
 _T = (math.inf, 6.314, 2.920, 2.353, 2.132, 2.015, 1.943, 1.895, 1.860, 1.833, 1.812, 1.796, 1.782, 1.771, 1.761, 1.753)
 
@@ -60,6 +61,16 @@ def mean_of(values: Floats | Sequence[float], unit: str, resolution: float = 0.0
         quantile_t(len(finite) - 1) * float(finite.std(ddof=1)) / math.sqrt(len(finite)), 1.645 * resolution
     )
     return Number(mean, mean - error, mean + error, unit)
+
+
+def median_of(values: Floats, unit: str) -> Number | None:
+    """The median of values [n], between the order statistics that hold it with 90 %; for values of which a few are others."""
+    if not len(values):
+        return None
+    n, ordered = len(values), np.sort(values)
+    low, high = math.floor(0.5 * n - _RANKS * n**0.5), math.ceil(0.5 * n + _RANKS * n**0.5)
+    ends = (math.nan, math.nan) if low < 0 else (float(ordered[low]), float(ordered[high - 1]))
+    return Number(float(np.median(ordered)), *ends, unit)
 
 
 def jackknifed(value: float, without: Sequence[float], unit: str) -> Number:

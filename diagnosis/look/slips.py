@@ -135,14 +135,14 @@ class RecordSlips(NamedTuple):
         return np.array([_half_done(self.part.force_N, top, bottom, self.width) for top, bottom in falls])
 
 
-def find_slips(part: OneWayPart) -> RecordSlips | None:
-    """The slips of a part; None where no fall exceeds the noise."""
+def find_slips(part: OneWayPart, least_N: float = 0.0) -> RecordSlips | None:
+    """The slips of a part with falls of `least_N` or more; None where no fall exceeds the noise."""
     width = 1
     widest = max(1, int(_WIDEST * len(part.force_N)))
     result: tuple[Indices, Indices] | None = None
     noise_N = part.noise_N
     while width <= widest:
-        tops, bottoms = _turning(part.force_N, width, noise_N)
+        tops, bottoms = _turning(part.force_N, width, noise_N, least_N)
         if len(tops):
             result = tops, bottoms
             falls = bottoms - tops[: len(bottoms)]
@@ -159,11 +159,11 @@ def find_slips(part: OneWayPart) -> RecordSlips | None:
     return RecordSlips(part, tops, bottoms, width, _straight(part, tops, bottoms, width, noise_N))
 
 
-def _turning(force_N: Floats, width: int, noise_N: float) -> tuple[Indices, Indices]:
+def _turning(force_N: Floats, width: int, noise_N: float, least_N: float) -> tuple[Indices, Indices]:
     """Alternating maxima and minima of the smoothed force that differ by more than its noise."""
     smooth = smoothed(force_N, width)
     low, high = np.quantile(smooth, (0.01, 0.99))
-    drop_N = max(NOISE_SPANS * noise_N / (width | 1) ** 0.5, _SHARE * float(high - low))
+    drop_N = max(NOISE_SPANS * noise_N / (width | 1) ** 0.5, _SHARE * float(high - low), least_N)
     if drop_N <= 0.0:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     at = turning_points(smooth, drop_N)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bridge.arrays import Floats
+from diagnosis.look.creep import Climb, climb_of, fitted
 from diagnosis.look.slips import OneWayPart, RecordSlips, find_slips, parts_of, smoothed
 
 # Begin and end of the part of a stick in which its slope is measured: a re-stick rings, and before a breakaway the slide creeps.
@@ -13,7 +14,6 @@ _FROM, _TO = 0.25, 0.9
 _FEWEST = 5  # fewest samples of that part
 _EVEN = 0.5  # smallest way of the drive in that part, as a share of the way of an even drive
 _LEVELS = (0.5, 0.6, 0.7, 0.8, 0.9)  # levels of the climb between which its rate is measured
-_DEGREE = 4  # degree of the polynomial through a stick: a contact that gives way bends it once
 # Smallest speed of a drive in a stick, over the mean speed around the stick. A drive has 1; a slide has 0, or a few hundredths
 # where its contact gives way.
 _LEAST_OF_DRIVE = 0.5
@@ -39,8 +39,15 @@ class Cycle(NamedTuple):
     sign: float = 1.0  # sign of the measured force
 
 
-def cycles_of(slips: RecordSlips, speed_mps: float | None) -> list[Cycle]:
-    """Values of every slip of a part. `speed_mps` is the drive's speed, used where its position was not measured."""
+def cycles_of(slips: RecordSlips, speed_mps: float | None, limit: float = 1.0) -> list[Cycle]:
+    """Values of every slip of a part.
+
+    Args:
+        slips: the slips of the part.
+        speed_mps: the drive's speed, used where its position was not measured.
+        limit: limit of the friction over the force at breakaway, see `creep`.
+
+    """
     part = slips.part
     top_N, bottom_N = _peaks(slips)
     tops, bottoms = slips.tops.tolist(), slips.bottoms.tolist()
@@ -49,7 +56,7 @@ def cycles_of(slips: RecordSlips, speed_mps: float | None) -> list[Cycle]:
         known: dict[str, float] = {}
         if i:
             began = bottoms[i - 1]
-            known = _stick(part, began, top, float(top_N[i]), speed_mps, slips.width)
+            known = _stick(part, began, top, limit * float(top_N[i]), speed_mps, slips.width)
             known["dwell_s"] = float(part.t_s[top] - part.t_s[began])
             known["loading_N_per_s"] = _loading(part, began, top, slips.width)
         if i < len(bottoms):
@@ -58,6 +65,23 @@ def cycles_of(slips: RecordSlips, speed_mps: float | None) -> list[Cycle]:
             known["mean_force_N"] = float(part.force_N[top : tops[i + 1]].mean())
         cycles.append(Cycle(float(part.t_s[top]), float(top_N[i]), sign=part.sign, **known))
     return cycles
+
+
+def climbs_of(slips: RecordSlips) -> list[tuple[Climb, float]]:
+    """The middle of each stick of a part, with the force at its breakaway [N]; without sticks that are too short."""
+    part, tops = slips.part, slips.tops[1:].tolist()
+    climbs: list[tuple[Climb, float]] = []
+    for began, top, top_N in zip(slips.bottoms.tolist(), tops, _peaks(slips)[0][1:].tolist(), strict=False):
+        stuck = _stuck(began, top, slips.width)
+        if (climb := climb_of(part.t_s[stuck], part.force_N[stuck])) is not None:
+            climbs.append((climb, top_N))
+    return climbs
+
+
+def _stuck(began: int, top: int, width: int) -> slice:
+    """The samples of a stick in which its shape is measured: the smoothing locates a breakaway to its `width`."""
+    first = began + int(_FROM * (top - began))
+    return slice(first, max(min(began + int(_TO * (top - began)), top - width), first))
 
 
 def is_of_slide(t_s: Floats, force_N: Floats, position_m: Floats) -> bool:
@@ -104,7 +128,7 @@ def _peaks(slips: RecordSlips) -> list[Floats]:
 
 
 def _stick(
-    part: OneWayPart, began: int, top: int, breakaway_N: float, speed_mps: float | None, width: int
+    part: OneWayPart, began: int, top: int, limit_N: float, speed_mps: float | None, width: int
 ) -> dict[str, float]:
     """Numbers of the middle of a stick by their names in `Cycle`: none of a short stick, the slope alone of an unknown speed."""
     first, last = began + int(_FROM * (top - began)), began + int(_TO * (top - began))
@@ -123,10 +147,13 @@ def _stick(
         in_part_m, in_stick_m = (part.position_m[b] - part.position_m[a] for a, b in ((first, last - 1), (began, top)))
         if in_part_m < _EVEN * (_TO - _FROM) * in_stick_m:  # the drive has halted
             return known
-    # the smoothing locates a breakaway to its width: nearer to it the slip may have begun
-    stuck = slice(0, max(min(last, top - width) - first, 0))
-    drive, contact = _compliances(speed * (t_s - t_s[0])[stuck], force_N[stuck], breakaway_N)
-    return known | {"stiffness_N_per_m": slope / speed, "drive_m_per_N": drive, "contact_m_per_N": contact}
+    known |= {"stiffness_N_per_m": slope / speed}
+    stuck = _stuck(began, top, width)
+    climb = climb_of(part.t_s[stuck], part.force_N[stuck])
+    if climb is None or not limit_N > 0.0:
+        return known
+    fit = fitted(climb, speed, np.array([limit_N]))
+    return known | {"drive_m_per_N": float(fit.drive_m_per_N[0]), "contact_m_per_N": float(fit.contact_m_per_N[0])}
 
 
 def _loading(part: OneWayPart, began: int, top: int, width: int) -> float:
@@ -139,24 +166,6 @@ def _loading(part: OneWayPart, began: int, top: int, width: int) -> float:
     reached = np.array([len(climb) - 1 - np.argmax(climb[::-1] <= level) for level in levels])
     quickest = float(np.diff(reached).min()) * part.step_s
     return float(levels[1] - levels[0]) / quickest if quickest > 0.0 else np.nan
-
-
-def _compliances(way_m: Floats, force_N: Floats, breakaway_N: float) -> tuple[float, float]:
-    """Compliances of drive and contact [m/N]; NaN where the stick does not show them.
-
-    A contact whose stiffness falls from S to 0 as the force nears its breakaway F_b moves by -F_b / S * ln(1 - F / F_b)
-    (Dahl, A solid friction model, 1968), the drive by F / k: a linear fit in two columns. The force in both is a smooth curve
-    through the samples, as noise in a column would bias its factor towards zero.
-    """
-    if len(way_m) <= 2 * _DEGREE:
-        return np.nan, np.nan
-    smooth = np.polynomial.Polynomial.fit(way_m, force_N, _DEGREE)(way_m)
-    left = 1.0 - smooth / breakaway_N
-    if breakaway_N <= 0.0 or left.min() <= 0.0:
-        return np.nan, np.nan
-    columns = np.column_stack([np.ones_like(way_m), smooth, -breakaway_N * np.log(left)])
-    _, drive, contact = np.linalg.lstsq(columns, way_m, rcond=None)[0]
-    return float(drive), float(contact)
 
 
 def _slope(x: Floats, y: Floats) -> float:
