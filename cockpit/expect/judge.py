@@ -11,7 +11,6 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 
 from bridge.arrays import Bools, Floats
-from bridge.log.logfile import RunData
 from bridge.units import counted, unit_of
 from bridge.wire.words import word_of, words
 from cockpit.expect.record import Record, Samples
@@ -43,9 +42,8 @@ class Expected(NamedTuple):
         return f"{self.result:<8} {self.name}: {self.why}"
 
 
-def judge(run: RunData, expectations: Sequence[ExpectTable]) -> list[Expected]:
-    """Results of expectations on a log, in their order. Raises Fault BAD_LOG for a log whose configuration is damaged."""
-    record = Record(run)
+def judge(record: Record, expectations: Sequence[ExpectTable]) -> list[Expected]:
+    """Results of expectations on a log, in their order."""
     return [_Judge(record, table).result() for table in expectations]
 
 

@@ -32,7 +32,7 @@ class Samples(NamedTuple):
 
 
 class Record:
-    """One finished log."""
+    """One finished log. Raises Fault BAD_LOG for a log whose configuration is damaged."""
 
     def __init__(self, run: RunData) -> None:
         self.run = run

@@ -203,8 +203,7 @@ def _judged(
 def _without_controller(scenario: Scenario, from_s: float, seconds: float) -> "Phase | None":
     """Simulate a run of `seconds` without vibration; return its figures from `from_s` on, None without a block. Raises Fault."""
     from cockpit.judge.judged import judge_log
-    from cockpit.run.in_process import run_onboard
-    from cockpit.run.simulated.run import run_with_faults
+    from cockpit.run.simulated.run import simulate
 
     policy = scenario.controller.policy.model_copy(update={"enabled_from_s": seconds + 1.0})
     controller = scenario.controller.model_copy(update={"policy": policy})
@@ -212,7 +211,7 @@ def _without_controller(scenario: Scenario, from_s: float, seconds: float) -> "P
     alone = scenario.model_copy(update={"controller": controller, "duration_s": seconds, "log": log})
     with TemporaryDirectory() as folder:
         path = Path(folder) / "without.mcap"
-        (run_with_faults if scenario.fault else run_onboard)(alone, path, {})
+        simulate(alone, path, {})
         return judge_log(path, stretch_from_s=from_s).judge.stretch
 
 

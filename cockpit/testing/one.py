@@ -12,10 +12,10 @@ from bridge.log.logfile import read_run
 from bridge.results import in_json
 from bridge.units import counted
 from cockpit.expect.judge import FAILED, PASSED, UNTESTED, Expected, judge
-from cockpit.run.in_process import run_onboard
+from cockpit.expect.record import Record
 from cockpit.run.run import about_run
 from cockpit.run.scenario import Scenario, load_scenario
-from cockpit.run.simulated.run import run_with_faults
+from cockpit.run.simulated.run import simulate
 
 ERROR: Final = "ERROR"
 Verdict = Literal["PASSED", "FAILED", "UNTESTED", "ERROR"]
@@ -36,13 +36,19 @@ class Tested(NamedTuple):
 
     name: str
     file: str
-    rig: str
-    seed: int
-    defect: str  # of a mutant; empty for the scenario itself
-    expectations: list[Expected]
-    error: str  # reason for which nothing could be judged; else empty
-    log: str  # kept log; empty for a log that was deleted
-    JSON_OPTIONAL = "defect", "error", "log"
+    rig: str = ""
+    seed: int = 0
+    defect: str = ""  # of a mutant; empty for the scenario itself
+    expectations: list[Expected] = []
+    error: str = ""  # reason for which nothing could be judged; else empty
+    log: str = ""  # kept log; empty for a log that was deleted
+    checksum: str = ""  # SHA-256 of the log
+    JSON_OPTIONAL = "defect", "error", "log", "checksum"
+
+    def judged(self, log: Path, scenario: Scenario) -> "Tested":
+        """The test with the results of its expectations on a log. Raises Fault BAD_LOG."""
+        run = read_run(log)
+        return self._replace(expectations=judge(Record(run), scenario.expect), checksum=run.checksums.sha256)
 
     @in_json
     def result(self) -> Verdict:
@@ -81,31 +87,30 @@ def loaded(case: TestCase) -> tuple[Scenario, str]:
 
 def run_test(case: TestCase, keep: Path | None) -> Tested:
     """Run one test; a log whose test did not pass is moved into the folder `keep`, None: deleted."""
-    rig, seed, defect = "", 0, ""
+    tested = Tested(case.name, shown(case.file))
     try:
         scenario, defect = loaded(case)
-        rig, seed = scenario.rig.name, scenario.seed
+        tested = tested._replace(rig=scenario.rig.name, seed=scenario.seed, defect=defect)
         if scenario.duration_s <= 0.0:
             raise Fault("CONFIG", f"{case.file}: duration_s = 0: a test must have an end; set duration_s")
         with TemporaryDirectory() as folder:
             log = Path(folder) / f"{case.name}.mcap"
-            (run_with_faults if scenario.fault else run_onboard)(scenario, log, about_run(scenario, lockstep=True))
-            tested = Tested(
-                case.name, shown(case.file), rig, seed, defect, judge(read_run(log), scenario.expect), "", ""
-            )
+            simulate(scenario, log, about_run(scenario, lockstep=True))
+            tested = tested.judged(log, scenario)
             if keep is None or tested.result == PASSED:
                 return tested
             keep.mkdir(parents=True, exist_ok=True)
             return tested._replace(log=shown(Path(shutil.move(log, keep / log.name))))
     except Fault as fault:
-        return Tested(case.name, shown(case.file), rig, seed, defect, [], f"{fault.kind.code}: {fault.line}", "")
+        return tested._replace(error=f"{fault.kind.code}: {fault.line}")
 
 
 def judge_old(case: TestCase, log: Path) -> Tested:
     """Judge the expectations of a scenario on a log of any rig."""
+    tested = Tested(case.name, shown(case.file))
     try:
         scenario, _ = loaded(case)
-        expected = judge(read_run(log), scenario.expect)
-        return Tested(case.name, shown(case.file), scenario.rig.name, scenario.seed, "", expected, "", shown(log))
+        tested = tested._replace(rig=scenario.rig.name, seed=scenario.seed, log=shown(log))
+        return tested.judged(log, scenario)
     except Fault as fault:
-        return Tested(case.name, shown(case.file), "", 0, "", [], f"{fault.kind.code}: {fault.line}", "")
+        return tested._replace(error=f"{fault.kind.code}: {fault.line}")

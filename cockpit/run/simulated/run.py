@@ -14,7 +14,7 @@ from bridge.wire.complaints import BAD_MESSAGE, Complaints
 from bridge.wire.inbox import WAITING, Received
 from bridge.wire.session import LEASE_S
 from bridge.wire.topics import OPERATOR, SENSORS, TOPICS
-from cockpit.run.in_process import TimedAction, actions_of, log_of
+from cockpit.run.in_process import TimedAction, actions_of, log_of, run_onboard
 from cockpit.run.scenario import Scenario
 from cockpit.run.simulated.stage import Hub, Player, Receive, Session, Stage, WaitingInbox
 from cockpit.run.step import configurations
@@ -195,3 +195,8 @@ def run_with_faults(
         run.play(stopped)
     finally:
         log.close()
+
+
+def simulate(scenario: Scenario, path: Path, about: dict[str, Any]) -> None:
+    """Run a scenario in one process and write its log: many blocks at once without faults, else message by message."""
+    (run_with_faults if scenario.fault else run_onboard)(scenario, path, about)
