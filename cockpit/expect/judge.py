@@ -52,8 +52,8 @@ class _Judge:
 
     def __init__(self, record: Record, table: ExpectTable) -> None:
         self._record, self._table = record, table
-        self._from_s = table.from_s
-        self._to_s = record.end_s if table.end_s is None else table.end_s
+        self._from_s = record.begin_s + table.from_s
+        self._to_s = record.end_s if table.end_s is None else record.begin_s + table.end_s
 
     def result(self) -> Expected:
         table = self._table

@@ -17,8 +17,8 @@ from bridge.results import strict_json
 from bridge.units import counted
 from bridge.wire.session import rig_security
 from cockpit.run.child_process import left_on_ctrl_c, stop_event, warn_without_priority
-from cockpit.run.run_tables import LogTable, refuse_faults
-from cockpit.run.scenario import Scenario, load_scenario, refuse_short_blocks, refuse_steps
+from cockpit.run.run_tables import LogTable, refuse_for_processes
+from cockpit.run.scenario import Scenario, load_scenario, refuse_short_blocks
 from cockpit.run.writable import LOG, check_output, stamp_of
 
 if TYPE_CHECKING:
@@ -93,9 +93,7 @@ def run_scenario(
     if isinstance(scenario, Scenario) and not (lockstep or in_process):
         refuse_short_blocks(scenario)
     if lockstep or not in_process:
-        refuse_faults(scenario, lockstep)
-        if isinstance(scenario, Scenario):
-            refuse_steps(scenario)
+        refuse_for_processes(scenario, lockstep)
     if not (lockstep or in_process):
         warn_without_priority()
     if not in_process:

@@ -15,10 +15,10 @@ from cockpit.expect.judge import PASSED, Expected, judge
 from cockpit.expect.record import Record, Samples
 from cockpit.expect.tables import ExpectTable, refuse_word
 from cockpit.figures.signals import SIGNALS
-from cockpit.run.run import about_run
-from cockpit.run.scenario import Scenario, load_scenario
+from cockpit.run.device_run import DeviceRun
+from cockpit.run.scenario import Scenario
 from cockpit.run.scenario_file import find
-from cockpit.run.simulated.run import simulate
+from cockpit.testing.target import Target, load
 
 
 class Expectation(TypedDict, total=False):
@@ -48,13 +48,13 @@ class Run:
 
     Args:
         log: its log.
-        scenario: its configuration.
+        tables: its configuration.
 
     """
 
-    def __init__(self, log: Path, scenario: Scenario) -> None:
-        self.log, self.scenario = log, scenario
-        self._record = Record(read_run(log))
+    def __init__(self, log: Path, tables: Scenario | DeviceRun) -> None:
+        self.log, self.tables = log, tables
+        self._record = Record(read_run(log), tables.duration_s)
         self.results: list[Expected] = []  # of all judged expectations
 
     @property
@@ -91,11 +91,11 @@ class Run:
     def expect(self, **keys: Unpack[Expectation]) -> None:
         """Judge an expectation; without keys those of the scenario. Raises AssertionError where one is FAILED or UNTESTED."""
         __tracebackhide__ = True
-        tables = self.scenario.expect
+        tables = self.tables.expect
         if keys:
             tables = [validate(ExpectTable, dict(keys), "expect")]
-            if late := tables[0].after(self._record.end_s):
-                line = f"expect.{late}: must not be after the end of the run, {self._record.end_s:g} s"
+            if late := tables[0].after(self.tables.duration_s):
+                line = f"expect.{late}: must not be after the end of the run, {self.tables.duration_s:g} s"
                 raise Fault("CONFIG", f"{line}; set an earlier time, or run longer")
         if not tables:
             raise Fault("CONFIG", "the scenario has no [[expect]]; give a signal, event, state, slips or surges")
@@ -112,12 +112,15 @@ class Rig:
         scenario: a scenario by name or path.
         settings: `key=value` each, as of `--set`.
         folder: for the logs of its runs.
+        target: what it runs on.
+        folder: for the logs of its runs.
         runs: receives each finished run.
 
     """
 
-    def __init__(self, scenario: str, settings: list[str], folder: Path, runs: list[Run]) -> None:
-        self._scenario, self._settings, self._folder, self._runs = scenario, settings, folder, runs
+    def __init__(self, scenario: str, settings: list[str], target: Target, folder: Path, runs: list[Run]) -> None:
+        self._scenario, self._settings, self._target = scenario, settings, target
+        self._folder, self._runs = folder, runs
         given = read_toml(find(scenario, "scenarios"))
         self._changes: dict[str, list[dict[str, Any]]] = {name: list(given.get(name, [])) for name in ("fault", "step")}
 
@@ -157,12 +160,10 @@ class Rig:
     def run(self, seconds: float | None = None) -> Run:
         """Run for a time; without it for that of the scenario. Raises Fault."""
         timed = [] if seconds is None else [f"duration_s={float(seconds)!r}"]
-        scenario = load_scenario(self._scenario, [*self._settings, *timed])
-        if scenario.duration_s <= 0.0:
-            raise Fault("CONFIG", f"{self._scenario}: duration_s = 0: a test must have an end; give run() seconds")
+        test = load(self._scenario, [*self._settings, *timed], self._target)
         log = self._folder / f"{len(self._runs) + 1}.mcap"
-        simulate(scenario, log, about_run(scenario, lockstep=True))
-        self._runs.append(Run(log, scenario))
+        test.make(self._scenario, log)
+        self._runs.append(Run(log, test.run))
         return self._runs[-1]
 
 

@@ -13,9 +13,8 @@ from bridge.results import in_json
 from bridge.units import counted
 from cockpit.expect.judge import FAILED, PASSED, UNTESTED, Expected, judge
 from cockpit.expect.record import Record
-from cockpit.run.run import about_run
-from cockpit.run.scenario import Scenario, load_scenario
-from cockpit.run.simulated.run import simulate
+from cockpit.run.run_tables import RunTables
+from cockpit.testing.target import NO_TARGET, Loaded, Target, load
 
 ERROR: Final = "ERROR"
 Verdict = Literal["PASSED", "FAILED", "UNTESTED", "ERROR"]
@@ -28,6 +27,7 @@ class TestCase(NamedTuple):
     name: str
     file: Path
     settings: list[str]
+    target: Target = NO_TARGET
     mutant: int | None = None  # index in `must_fail`; None: the scenario without a defect
 
 
@@ -43,18 +43,23 @@ class Tested(NamedTuple):
     error: str = ""  # reason for which nothing could be judged; else empty
     log: str = ""  # kept log; empty for a log that was deleted
     checksum: str = ""  # SHA-256 of the log
-    JSON_OPTIONAL = "defect", "error", "log", "checksum"
+    untested: bool = False  # the error is that this rig cannot run it
+    JSON_OPTIONAL = "defect", "error", "log", "checksum", "untested"
 
-    def judged(self, log: Path, scenario: Scenario) -> "Tested":
+    def judged(self, log: Path, run: RunTables) -> "Tested":
         """The test with the results of its expectations on a log. Raises Fault BAD_LOG."""
-        run = read_run(log)
-        return self._replace(expectations=judge(Record(run), scenario.expect), checksum=run.checksums.sha256)
+        record = Record(read_run(log), run.duration_s or None)
+        return self._replace(expectations=judge(record, run.expect), checksum=record.run.checksums.sha256)
+
+    def without_result(self, fault: Fault) -> "Tested":
+        """The test that could not be run or judged."""
+        return self._replace(error=f"{fault.kind.code}: {fault.line}", untested=fault.kind.code == "NOT_JUDGED")
 
     @in_json
     def result(self) -> Verdict:
         """ERROR if nothing was judged; FAILED with a failed expectation; PASSED only if all of them passed."""
         if self.error:
-            return ERROR
+            return UNTESTED if self.untested else ERROR
         results = {row.result for row in self.expectations}
         return FAILED if FAILED in results else PASSED if results == {PASSED} else UNTESTED
 
@@ -75,42 +80,40 @@ class Tested(NamedTuple):
         return [*lines, *([f"  replay   stickslip replay {self.log}"] if self.log else [])]
 
 
-def loaded(case: TestCase) -> tuple[Scenario, str]:
-    """The scenario of a test, with its mutant's defect, and the defect in words. Raises Fault CONFIG."""
+def loaded(case: TestCase) -> tuple[Loaded, str]:
+    """The test, with its mutant's defect, and the defect in words. Raises Fault CONFIG, NOT_JUDGED."""
+    plain = load(str(case.file), case.settings, case.target)
     if case.mutant is None:
-        return load_scenario(str(case.file), case.settings), ""
-    defect = load_scenario(str(case.file), case.settings).must_fail[case.mutant]
-    scenario = load_scenario(str(case.file), [*case.settings, *defect.settings])
+        return plain, ""
+    defect = plain.run.must_fail[case.mutant]
+    made = load(str(case.file), [*case.settings, *defect.settings], case.target)
     about = defect.about or ", ".join([*defect.settings, *(table.in_words() for table in defect.fault)])
-    return scenario.model_copy(update={"fault": [*scenario.fault, *defect.fault]}), about
+    return made._replace(run=made.run.model_copy(update={"fault": [*made.run.fault, *defect.fault]})), about
 
 
 def run_test(case: TestCase, keep: Path | None) -> Tested:
     """Run one test; a log whose test did not pass is moved into the folder `keep`, None: deleted."""
     tested = Tested(case.name, shown(case.file))
     try:
-        scenario, defect = loaded(case)
-        tested = tested._replace(rig=scenario.rig.name, seed=scenario.seed, defect=defect)
-        if scenario.duration_s <= 0.0:
-            raise Fault("CONFIG", f"{case.file}: duration_s = 0: a test must have an end; set duration_s")
+        test, defect = loaded(case)
+        tested = tested._replace(rig=test.run.rig.name, seed=test.run.seed, defect=defect)
         with TemporaryDirectory() as folder:
             log = Path(folder) / f"{case.name}.mcap"
-            simulate(scenario, log, about_run(scenario, lockstep=True))
-            tested = tested.judged(log, scenario)
+            test.make(str(case.file), log)
+            tested = tested.judged(log, test.run)
             if keep is None or tested.result == PASSED:
                 return tested
             keep.mkdir(parents=True, exist_ok=True)
             return tested._replace(log=shown(Path(shutil.move(log, keep / log.name))))
     except Fault as fault:
-        return tested._replace(error=f"{fault.kind.code}: {fault.line}")
+        return tested.without_result(fault)
 
 
 def judge_old(case: TestCase, log: Path) -> Tested:
     """Judge the expectations of a scenario on a log of any rig."""
     tested = Tested(case.name, shown(case.file))
     try:
-        scenario, _ = loaded(case)
-        tested = tested._replace(rig=scenario.rig.name, seed=scenario.seed, log=shown(log))
-        return tested.judged(log, scenario)
+        run = loaded(case)[0].run
+        return tested._replace(rig=run.rig.name, seed=run.seed, log=shown(log)).judged(log, run)
     except Fault as fault:
-        return tested._replace(error=f"{fault.kind.code}: {fault.line}")
+        return tested.without_result(fault)

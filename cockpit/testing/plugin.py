@@ -28,6 +28,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options."""
     group = parser.getgroup("stickslip")
     group.addoption(
+        "--stickslip-rig", metavar="RIG", default="", help="Rig by name or path in place of the scenarios' rigs."
+    )
+    group.addoption("--stickslip-arm", action="store_true", help="Arm a real rig for each run that the scenario arms.")
+    group.addoption(
         "--stickslip-logs", metavar="FOLDER", default="runs/tests", help="Folder for logs and pictures of failed tests."
     )
 
@@ -41,8 +45,10 @@ def pytest_configure(config: pytest.Config) -> None:
 def rig(request: pytest.FixtureRequest) -> Iterator[MakeRig]:
     """A function that gives the rig of a scenario: `rig("paper-c45-c45", seed=3).run(5)`."""
     from cockpit.testing.session import Session
+    from cockpit.testing.target import Target
 
-    with Session(request.path.parent) as session:
+    target = Target(str(request.config.getoption("--stickslip-rig")), bool(request.config.getoption("--stickslip-arm")))
+    with Session(request.path.parent, target) as session:
         request.node.stash[_SESSION] = session
         yield session.rig
 

@@ -9,6 +9,7 @@ from typing import Any, Self
 from bridge.faults import Fault
 from cockpit.testing.api import Rig, Run, as_settings
 from cockpit.testing.junit import properties_of
+from cockpit.testing.target import Target
 
 
 class Session:
@@ -16,11 +17,12 @@ class Session:
 
     Args:
         folder: of the test; scenarios may be files in it.
+        target: what it runs on.
 
     """
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self, folder: Path, target: Target) -> None:
+        self._folder, self._target = folder, target
         self._logs = TemporaryDirectory(prefix="stickslip-")
         self._runs: list[Run] = []
 
@@ -35,13 +37,13 @@ class Session:
         """The rig of a scenario. Raises Fault CONFIG."""
         near = self._folder / scenario
         name = str(near) if scenario.endswith(".toml") and near.is_file() else scenario
-        return Rig(name, as_settings(settings), Path(self._logs.name), self._runs)
+        return Rig(name, as_settings(settings), self._target, Path(self._logs.name), self._runs)
 
     def properties(self, marked: list[str]) -> list[tuple[str, str]]:
         """Properties for JUnit XML: those of each run, and the requirements `marked` for the test."""
         rows = [("requirement", name) for name in marked]
         for run in self._runs:
-            rows += properties_of(run.scenario.rig.name, run.scenario.seed, run.checksum, run.results)
+            rows += properties_of(run.tables.rig.name, run.tables.seed, run.checksum, run.results)
         return [*dict.fromkeys(rows)]
 
     def keep(self, folder: Path, test: str) -> list[str]:
