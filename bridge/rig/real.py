@@ -35,10 +35,15 @@ def served(rig: DeviceRig, folder: Path, faults: Sequence[FaultTable] = (), seed
     return Served(rig.name, rig.guard, notes(rig, device_of(rig, folder).watchdog_s), make)
 
 
-def open_node(rig: DeviceRig, folder: Path, run: int, faults: Sequence[FaultTable] = (), seed: int = 0) -> DeviceNode:
-    """The node of a rig whose device is open. Raises Fault CONFIG, NO_DEVICE; a rig that cannot be opened is never simulated."""
+def open_node(
+    rig: DeviceRig, folder: Path, run: int, faults: Sequence[FaultTable] = (), seed: int = 0, arm: bool = False
+) -> DeviceNode:
+    """The node of a rig whose device is open. Raises Fault CONFIG, NO_DEVICE; a rig that cannot be opened is never simulated.
+
+    `arm`: it starts ARMED; only for a device that makes a block for each command, as a model does.
+    """
     device = device_of(rig, folder)
-    guard = build(rig.guard, _exciter(rig), run, absent=absent(rig.channels), derived=rig.derived)
+    guard = build(rig.guard, _exciter(rig), run, arm, absent=absent(rig.channels), derived=rig.derived)
     injected = Faults(faults, seed, rig.converter.block_s, rig.converter.samples_per_block)
     try:  # an adapter may be foreign code
         device.open()

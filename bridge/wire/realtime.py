@@ -7,6 +7,7 @@ import gc
 import os
 import resource
 import threading
+from collections.abc import Generator
 from pathlib import Path
 
 from bridge.wire.clock import time
@@ -98,6 +99,21 @@ def raise_priority() -> None:
             if cores:
                 os.sched_setaffinity(thread, cores)
             os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(VIEWER_PRIORITY))
+
+
+@contextlib.contextmanager
+def raised_priority() -> Generator[None]:
+    """The priority of `raise_priority` within a block; all threads of this process have their own one again afterwards."""
+    before = {thread: (os.sched_getscheduler(thread), os.sched_getparam(thread)) for thread in _threads()}
+    cores, (policy, param) = os.sched_getaffinity(0), before[threading.get_native_id()]
+    raise_priority()
+    try:
+        yield
+    finally:
+        for thread in _threads():
+            with contextlib.suppress(OSError):
+                os.sched_setscheduler(thread, *before.get(thread, (policy, param)))
+                os.sched_setaffinity(thread, cores)
 
 
 def _lock_memory() -> bool:

@@ -85,10 +85,10 @@ def serve_rig(shared: SharedOptions, rig: str | None, wait_for: str, as_json: Js
             from bridge.rig.process import serve
             from bridge.rig.real import served
             from cockpit.run.device_run import device_header
-            from cockpit.run.run_tables import refuse_faults
+            from cockpit.run.run_tables import refuse_for_processes
 
             described = device_header(made, "plant", shared.lockstep)
-            refuse_faults(made, shared.lockstep)
+            refuse_for_processes(made, shared.lockstep)
             real = served(made.rig, folder, made.fault, made.seed)
             blocks = serve(real, made.duration_s, made.bus, described, roles, shared.lockstep, stop, kept, report)
     done = Served("plant", made.bus.endpoint, shared.lockstep, blocks)
@@ -104,14 +104,13 @@ def _simulated(
     report: Callable[[str, str], None],
 ) -> int:
     """Serve a simulated rig; returns the number of blocks. Raises Fault."""
-    from cockpit.run.run_tables import refuse_faults
-    from cockpit.run.scenario import header, refuse_short_blocks, refuse_steps
+    from cockpit.run.run_tables import refuse_for_processes
+    from cockpit.run.scenario import header, refuse_short_blocks
     from plant.rig.app import run as simulate
 
     if not lockstep:
         refuse_short_blocks(made)
-    refuse_faults(made, lockstep)
-    refuse_steps(made)
+    refuse_for_processes(made, lockstep)
     described = header(made, "plant", lockstep)
     return simulate(
         made.rig,

@@ -23,6 +23,12 @@ class Boxed(NamedTuple):
     port: int
 
 
+class Released(NamedTuple):
+    """Result of `rig release`."""
+
+    by: str  # the process whose test left the rig; empty: the rig was not quarantined
+
+
 @rig_app.command("serve")
 @command("scenario", "settings", "endpoint", "prefix", "certs", "insecure", "wait")
 def rig_serve(shared: SharedOptions, rig: RigArgument, wait_for: WaitFor = "controller", as_json: Json = None) -> None:
@@ -95,6 +101,19 @@ def rig_conformance(
         write_whole(junit, result.junit())
     print_result(as_json, result, result.in_words())
     return 0 if result.ok else 1
+
+
+@rig_app.command("release")
+@command()
+def rig_release(
+    rig: Annotated[str, typer.Argument(metavar="NAME", help="Name of a rig, as the refusal gives it.")],
+    as_json: Json = None,
+) -> None:
+    """Allow tests of a rig again that a test did not bring to rest; look at the rig first."""
+    from cockpit.testing.lock import release
+
+    by = release(rig)
+    print_result(as_json, Released(by), [f"release  {rig}: {f'was left by {by}' if by else 'was not quarantined'}"])
 
 
 @rig_app.command("box")

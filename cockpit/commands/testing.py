@@ -24,6 +24,15 @@ def run_tests(
         bool,
         typer.Option("--mutants", help=r"Run with each defect of \[\[must_fail]], under which a test has to fail."),
     ] = False,
+    rig: Annotated[
+        str | None,
+        typer.Option(
+            "--rig", metavar="NAME", help="Rig in place of the scenarios' rigs: a name in deploy/rigs, or a .toml file."
+        ),
+    ] = None,
+    arm: Annotated[
+        bool, typer.Option("--arm", help="Arm a real rig for each scenario with arm = true; its exciter vibrates.")
+    ] = False,
     log: Annotated[
         Path | None,
         typer.Option(metavar="OLD.mcap", help="Run nothing: judge the expectations on this log of any rig."),
@@ -47,6 +56,7 @@ def run_tests(
     from cockpit.testing.one import judge_old
     from cockpit.testing.suite import Suite, cases_of, mutants_of
     from cockpit.testing.suite import run_tests as run
+    from cockpit.testing.target import Target
 
     end_like_ctrl_c()
     if report is not None:
@@ -54,7 +64,7 @@ def run_tests(
     check_output_folder("--logs", logs)
     if log is not None and mutants:
         raise Fault("CONFIG", "--mutants: needs runs with defects, which --log does not have; leave one of them out")
-    cases, others = cases_of(paths or [deploy_folder() / "tests"], shared.as_settings())
+    cases, others = cases_of(paths or [deploy_folder() / "tests"], shared.as_settings(), Target(rig or "", arm))
     without: list[str] = []
     if log is not None:
         check_log_file(log)

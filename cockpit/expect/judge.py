@@ -11,7 +11,6 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 
 from bridge.arrays import Bools, Floats
-from bridge.log.logfile import RunData
 from bridge.units import counted, unit_of
 from bridge.wire.words import word_of, words
 from cockpit.expect.record import Record, Samples
@@ -43,9 +42,8 @@ class Expected(NamedTuple):
         return f"{self.result:<8} {self.name}: {self.why}"
 
 
-def judge(run: RunData, expectations: Sequence[ExpectTable]) -> list[Expected]:
-    """Results of expectations on a log, in their order. Raises Fault BAD_LOG for a log whose configuration is damaged."""
-    record = Record(run)
+def judge(record: Record, expectations: Sequence[ExpectTable]) -> list[Expected]:
+    """Results of expectations on a log, in their order."""
     return [_Judge(record, table).result() for table in expectations]
 
 
@@ -54,8 +52,8 @@ class _Judge:
 
     def __init__(self, record: Record, table: ExpectTable) -> None:
         self._record, self._table = record, table
-        self._from_s = table.from_s
-        self._to_s = record.end_s if table.end_s is None else table.end_s
+        self._from_s = record.begin_s + table.from_s
+        self._to_s = record.end_s if table.end_s is None else record.begin_s + table.end_s
 
     def result(self) -> Expected:
         table = self._table

@@ -32,19 +32,33 @@ class Samples(NamedTuple):
 
 
 class Record:
-    """One finished log."""
+    """One finished log. Raises Fault BAD_LOG for a log whose configuration is damaged.
 
-    def __init__(self, run: RunData) -> None:
-        self.run = run
+    Args:
+        run: the log.
+        duration_s: length of the test; not given: that of the run.
+
+    """
+
+    def __init__(self, run: RunData, duration_s: float | None = None) -> None:
+        self.run, self._duration_s = run, duration_s
         self._plant = plant_of(run.headers, run.path)
         self.block_s = block_period_ns(run.sensors) * 1e-9
         self.last_s = float(run.sensors["t_ns"][-1]) * 1e-9 if len(run.sensors) else 0.0
 
     @property
     def end_s(self) -> float:
-        """Planned end of the run; its last block where that is unknown."""
-        planned = value_at(self._plant, "duration_s")
-        return float(planned) if is_number(planned) and planned > 0 else self.last_s
+        """Planned end of the test; its last block where that is unknown."""
+        planned = value_at(self._plant, "duration_s") if self._duration_s is None else self._duration_s
+        return self.begin_s + float(planned) if is_number(planned) and planned > 0 else self.last_s
+
+    @cached_property
+    def begin_s(self) -> float:
+        """Time at which the times of expectations begin: a real rig is armed after its check, a simulated one from the start."""
+        armed = np.flatnonzero(np.isin(self.run.applied["guard_state"], _IN_CHARGE))
+        if value_at(self._plant, "rig.adapter") in {None, "sim"} or not len(armed) or not armed[0]:
+            return 0.0
+        return float(self.run.applied["t_ns"][armed[0]]) * 1e-9
 
     @cached_property
     def damage(self) -> str:

@@ -94,12 +94,12 @@ class ExpectTable(Strict):
         if self.signal:
             self._refuse_limits()
         for word in self.event or ():
-            _refuse_word("event", word, EVENT_WORDS)
+            refuse_word("event", word, EVENT_WORDS)
         if self.state:
-            _refuse_word("state", self.state, STATES)
+            refuse_word("state", self.state, STATES)
             known = [row.word for row in words() if row.column == STATES[self.state].column]
             for word in self.is_in or ():
-                _refuse_word("is_in", word, known)
+                refuse_word("is_in", word, known)
         for name in ("slips", "surges"):
             counts = getattr(self, name)
             if counts is not None and not 0 <= counts[0] <= counts[1]:
@@ -137,7 +137,7 @@ class ExpectTable(Strict):
                 raise ValueError(f"{name} = {end_s:g}: must be after from_s = {self.from_s:g}; exchange them")
 
     def _refuse_limits(self) -> None:
-        _refuse_word("signal", self.signal, SIGNALS)
+        refuse_word("signal", self.signal, SIGNALS)
         if (self.within is None) == (self.at_least is None and self.at_most is None):
             raise ValueError(f"{self.signal}: must have within, or at_least or at_most; give a limit")
         low, high = self.limits
@@ -240,7 +240,8 @@ def _si(limit: _Limit, signal: str) -> float:
     return float(match[1]) * given[1] / si_unit[1]
 
 
-def _refuse_word(key: str, word: str, known: Sequence[str] | set[str] | dict[str, Any]) -> None:
+def refuse_word(key: str, word: str, known: Sequence[str] | set[str] | dict[str, Any]) -> None:
+    """Raise ValueError for a word that is not known, with the nearest known one."""
     if word in known:
         return
     near = get_close_matches(word, [*known], 1, 0.6)

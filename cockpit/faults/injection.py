@@ -63,7 +63,7 @@ def inject(bus_config: BusConfig, name: str, tables: Sequence[FaultTable], clear
         if of_rig or clear:
             done += _order_rig(bus, where, of_rig, clear)
         for table in sorted(of_processes, key=lambda table: table.from_s):
-            done.append(_disturb(table, pids[table.target]))
+            done.append(disturb(table, pids[table.target]))
     return Injected(where, name, done)
 
 
@@ -99,7 +99,7 @@ def _order_rig(bus: Bus, where: str, tables: Sequence[FaultTable], clear: bool) 
     return [*(["all faults are over"] if clear else []), *begun_texts, *later]
 
 
-def _disturb(table: FaultTable, pid: int) -> str:
+def disturb(table: FaultTable, pid: int) -> str:
     """Freeze, kill or restart a process of this computer and this user."""
     time.sleep(table.from_s)
     role = table.target

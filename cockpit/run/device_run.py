@@ -9,7 +9,7 @@ from pydantic import model_validator
 from bridge.config import made_with, read_toml, validate, with_overrides
 from bridge.faults import Fault
 from bridge.guard.absent import absent
-from bridge.rig.faults.kinds import EXCITER, PROCESS
+from bridge.rig.faults.kinds import EXCITER
 from bridge.rig.file import DeviceRig
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.run.run_tables import RunTables, header_of
@@ -32,10 +32,6 @@ class DeviceRun(RunTables):
             raise ValueError(
                 "arm = true: a real rig is armed by an operator alone; leave it out, and use `stickslip arm`"
             )
-        for number, table in enumerate(self.fault):
-            if table.group in (EXCITER, PROCESS):
-                line = f"fault.{number}.target = {table.target}: must be a sensor, clock or bus: this rig is real"
-                raise ValueError(f"{line}; leave it out, or use a simulated rig")
         controller, converter = self.controller, self.rig.converter
         blocks = {"block_s": converter.block_s, "samples_per_block": converter.samples_per_block}
         for name, of_rig in blocks.items():
@@ -50,6 +46,19 @@ class DeviceRun(RunTables):
             return self.model_copy(update={"controller": within(controller, self.rig.vibration_limits)})
         except ValueError as error:
             raise ValueError(f"controller.{error}") from None
+
+    @property
+    def simulated_only(self) -> str:
+        """The first of its tables that only a simulated rig carries out."""
+        for number, fault in enumerate(self.fault):
+            if fault.group == EXCITER:
+                return f"fault.{number}.target = {fault.target}: must be a sensor, clock or bus: this rig is real"
+        for number, step in enumerate(self.step):
+            if step.speed_mps is not None or step.load is not None:
+                return (
+                    f"step.{number}: speed and load of a real rig are set by its machine: must be command or settings"
+                )
+        return ""
 
     def _amplitude(self, given: AmplitudeConfig) -> AmplitudeConfig:
         """The table with bandwidth and range of the base accelerometer, where it does not give them."""

@@ -23,6 +23,8 @@ from bridge.wire.topics import (
     TRACE,
 )
 from cockpit.run.closed_loop import ClosedLoop, Stretch
+from cockpit.run.device_run import DeviceRun, device_header
+from cockpit.run.run_tables import RunTables
 from cockpit.run.scenario import Scenario, header
 from cockpit.run.step import configurations, timed_settings
 from controller.node import operator_events
@@ -122,7 +124,7 @@ def run_onboard(
         log.close()
 
 
-def actions_of(scenario: Scenario) -> list[TimedAction]:
+def actions_of(scenario: RunTables) -> list[TimedAction]:
     """The operator commands among the steps of a scenario, in order of time."""
     steps = [step for step in scenario.step if step.command is not None]
     return [TimedAction(step.t_ns, wire.Operator.Action.Value(step.command or "STOP")) for step in steps]
@@ -134,14 +136,15 @@ def _end(publish: "_Events", loop: ClosedLoop) -> None:
     publish("controller", t_ns, "END", f"steps={loop.block} duplicates=0 dropped=0")
 
 
-def log_of(scenario: Scenario, path: Path, about: dict[str, Any]) -> RunLog:
+def log_of(scenario: "Scenario | DeviceRun", path: Path, about: dict[str, Any]) -> RunLog:
     """A new log of a run in one process, with its metadata and headers."""
     log = RunLog(path, lockstep=True, rotation=scenario.log.rotation)
     if settings := timed_settings(scenario.step):
         about = about | {"settings": [*about.get("settings", []), *settings]}
     log.add_metadata("run", about)
     for role in ("controller", "plant"):
-        log.add_header(header(scenario, role, lockstep=True))
+        is_simulated = isinstance(scenario, Scenario)
+        log.add_header(header(scenario, role, True) if is_simulated else device_header(scenario, role, True))
     return log
 
 

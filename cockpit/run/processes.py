@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Collection, Generator, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -97,14 +97,16 @@ def run_processes(
     lockstep: bool,
     watch: Callable[[threading.Event], None],
     wait_s: float | None = None,
+    to_fail: Collection[str] = (),
 ) -> None:
     """Run a scenario to its end and close its log.
 
     Args:
         arguments: command line of a child that gives the same scenario.
         endpoint: address of the bus; it must be free.
-        watch: follows the run on the bus until its event is set; runs in a separate thread.
+        watch: follows the run on the bus until its event is set, or sets it to end the run; runs in a separate thread.
         wait_s: longest time until the log begins; None: no limit. A line every 30 s reports that the run has not begun.
+        to_fail: roles that a fault of the run ends; the others go on.
 
     Raises Fault ENDPOINT_BUSY, NO_PEER after `wait_s`, the Fault of the child that failed first, PEER_DIED if a child was killed,
     KeyboardInterrupt after Ctrl-C.
@@ -123,7 +125,7 @@ def run_processes(
                 wait_for = ["--wait-for", "controller,recorder"] if role == "plant" else []
                 children.append(Child(role, [*arguments, *more, *extra, *wait_for]))
         watcher.start()
-        _until_the_end(children, StartWatch(children, log, wait_s))
+        _until_the_end(children, StartWatch(children, log, wait_s), over, to_fail)
     except KeyboardInterrupt:
         _stop(children)
         raise
@@ -186,9 +188,15 @@ class StartWatch:
         self._due_s = now_s + _REPORT_S
 
 
-def _until_the_end(children: list[Child], beginning: StartWatch) -> None:
-    """Wait until all children have ended with status 0. Raises the Fault of the child whose failure ended the others."""
-    while True:
+def _until_the_end(
+    children: list[Child], beginning: StartWatch, over: threading.Event, to_fail: Collection[str]
+) -> None:
+    """Wait until all children have ended with status 0, or `over` is set.
+
+    Raises the Fault of the child whose failure ended the others.
+    """
+    children = [child for child in children if child.role not in to_fail]
+    while not over.is_set():
         beginning.look()
         ended = [child for child in children if child.process.poll() is not None]
         failed = [child for child in ended if child.process.returncode != 0]

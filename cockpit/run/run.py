@@ -17,8 +17,8 @@ from bridge.results import strict_json
 from bridge.units import counted
 from bridge.wire.session import rig_security
 from cockpit.run.child_process import left_on_ctrl_c, stop_event, warn_without_priority
-from cockpit.run.run_tables import LogTable, refuse_faults
-from cockpit.run.scenario import Scenario, load_scenario, refuse_short_blocks, refuse_steps
+from cockpit.run.run_tables import LogTable, refuse_for_processes
+from cockpit.run.scenario import Scenario, load_scenario, refuse_short_blocks
 from cockpit.run.writable import LOG, check_output, stamp_of
 
 if TYPE_CHECKING:
@@ -93,9 +93,7 @@ def run_scenario(
     if isinstance(scenario, Scenario) and not (lockstep or in_process):
         refuse_short_blocks(scenario)
     if lockstep or not in_process:
-        refuse_faults(scenario, lockstep)
-        if isinstance(scenario, Scenario):
-            refuse_steps(scenario)
+        refuse_for_processes(scenario, lockstep)
     if not (lockstep or in_process):
         warn_without_priority()
     if not in_process:
@@ -203,8 +201,7 @@ def _judged(
 def _without_controller(scenario: Scenario, from_s: float, seconds: float) -> "Phase | None":
     """Simulate a run of `seconds` without vibration; return its figures from `from_s` on, None without a block. Raises Fault."""
     from cockpit.judge.judged import judge_log
-    from cockpit.run.in_process import run_onboard
-    from cockpit.run.simulated.run import run_with_faults
+    from cockpit.run.simulated.run import simulate
 
     policy = scenario.controller.policy.model_copy(update={"enabled_from_s": seconds + 1.0})
     controller = scenario.controller.model_copy(update={"policy": policy})
@@ -212,7 +209,7 @@ def _without_controller(scenario: Scenario, from_s: float, seconds: float) -> "P
     alone = scenario.model_copy(update={"controller": controller, "duration_s": seconds, "log": log})
     with TemporaryDirectory() as folder:
         path = Path(folder) / "without.mcap"
-        (run_with_faults if scenario.fault else run_onboard)(alone, path, {})
+        simulate(alone, path, {})
         return judge_log(path, stretch_from_s=from_s).judge.stretch
 
 

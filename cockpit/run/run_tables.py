@@ -1,12 +1,13 @@
 """The tables of a scenario that runs of simulated and of real rigs share, and the headers of their processes."""
 
 import json
+import math
 import platform
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from bridge.config import Strict
 from bridge.faults import Fault
@@ -17,6 +18,8 @@ from bridge.rig.faults.table import FaultTable
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.payloads import SCHEMA_VERSION
 from bridge.wire.zenoh_link import BusConfig
+from cockpit.expect.tables import ExpectTable, MutantTable
+from cockpit.run.step import StepTable, configurations
 from controller.config import ControllerConfig
 
 
@@ -54,13 +57,41 @@ class RunTables(Strict):
     bus: BusConfig = BusConfig()
     log: LogTable = LogTable()
     fault: list[FaultTable] = Field(default=[], description="Injected faults, a table `[[fault]]` each.")
+    step: list[StepTable] = Field(default=[], description="Changes during the run, a table `[[step]]` each.")
+    expect: list[ExpectTable] = Field(
+        default=[], description="Expectations that `stickslip test` judges, a table `[[expect]]` each."
+    )
+    must_fail: list[MutantTable] = Field(
+        default=[], description="Defects under which some expectation must fail, a table `[[must_fail]]` each."
+    )
+
+    @model_validator(mode="after")
+    def _holds_its_times(self) -> Self:
+        for table in [*self.fault, *(table for mutant in self.must_fail for table in mutant.fault)]:
+            if 0.0 < self.duration_s <= table.from_s:
+                line = f"fault: {table.in_words()}: from_s = {table.from_s:g}: must be before the end of the run"
+                raise ValueError(f"{line}, duration_s = {self.duration_s:g}; begin it earlier, or run longer")
+        for kind, tables in (("step", self.step), ("expect", self.expect)):
+            for number, table in enumerate(tables):
+                if late := table.after(self.duration_s or math.inf):
+                    line = f"{kind}.{number}.{late}: must not be after the end of the run, duration_s = {self.duration_s:g}"
+                    raise ValueError(f"{line}; set an earlier time, or run longer")
+        configurations(self.controller, self.step)  # raises for a setting that no controller has
+        return self
+
+    @property
+    def simulated_only(self) -> str:
+        """The first of its tables that this rig does not carry out, as text; empty if it can run."""
+        return ""
 
 
-def refuse_faults(run: RunTables, lockstep: bool) -> None:
-    """Raise Fault CONFIG for faults that a run of several processes cannot have.
+def refuse_for_processes(run: RunTables, lockstep: bool) -> None:
+    """Raise Fault CONFIG for the faults and steps that a run of several processes cannot have.
 
     In lockstep these are faults of bus and processes; in real time faults of processes, as a scenario cannot end real processes.
     """
+    if run.simulated_only:
+        raise Fault("CONFIG", f"{run.name}: {run.simulated_only}; leave it out, or use a simulated rig")
     for number, table in enumerate(run.fault):
         if lockstep and table.needs_time:
             why = "needs a clock, which lockstep lacks; use --in-process, or real time"
@@ -69,6 +100,9 @@ def refuse_faults(run: RunTables, lockstep: bool) -> None:
         else:
             continue
         raise Fault("CONFIG", f"{run.name}: fault.{number}.target = {table.target}: {why}")
+    if any(step.speed_mps is None for step in run.step):
+        line = f"{run.name}: step: needs a run in one process, as only a change of speed is part of the rig"
+        raise Fault("CONFIG", f"{line}; use `stickslip test`, or --in-process")
 
 
 def processor() -> str:

@@ -1,20 +1,18 @@
 """A scenario: one rig, one controller, one duration."""
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from bridge.config import made_with, read_toml, validate, with_overrides
 from bridge.faults import Fault
 from bridge.guard.absent import absent
 from bridge.wire import stickslip_pb2 as wire
-from cockpit.expect.tables import ExpectTable, MutantTable
 from cockpit.run.run_tables import RunTables, header_of
 from cockpit.run.scenario_file import RIG_FILE, find, is_real_rig, rig_table, with_rig
 from cockpit.run.sensor_needs import refuse_blind_sensors, refuse_out_of_travel
-from cockpit.run.step import StepTable, configurations, with_speeds
+from cockpit.run.step import with_speeds
 from controller.config import seeing, within
 from plant.config import RigConfig
 from plant.config_limits import refuse_a_spring_of_another_rig, refuse_what_no_rig_does
@@ -27,13 +25,6 @@ class Scenario(RunTables):
     """Configuration of one run of a simulated rig. Its validation checks that rig, controller and faults fit together."""
 
     rig: RigConfig
-    step: list[StepTable] = Field(default=[], description="Changes during the run, a table `[[step]]` each.")
-    expect: list[ExpectTable] = Field(
-        default=[], description="Expectations that `stickslip test` judges, a table `[[expect]]` each."
-    )
-    must_fail: list[MutantTable] = Field(
-        default=[], description="Defects under which some expectation must fail, a table `[[must_fail]]` each."
-    )
 
     @model_validator(mode="after")
     def _fits_together(self) -> "Scenario":
@@ -44,17 +35,7 @@ class Scenario(RunTables):
             if of_rig != of_controller:
                 raise ValueError(f"controller.{name} = {of_controller}: must equal rig.solver.{name} = {of_rig}")
         refuse_out_of_travel(self.rig, self.duration_s)
-        for table in [*self.fault, *(table for mutant in self.must_fail for table in mutant.fault)]:
-            if 0.0 < self.duration_s <= table.from_s:
-                line = f"fault: {table.in_words()}: from_s = {table.from_s:g}: must be before the end of the run"
-                raise ValueError(f"{line}, duration_s = {self.duration_s:g}; begin it earlier, or run longer")
-        for kind, tables in (("step", self.step), ("expect", self.expect)):
-            for number, table in enumerate(tables):
-                if late := table.after(self.duration_s or math.inf):
-                    line = f"{kind}.{number}.{late}: must not be after the end of the run, duration_s = {self.duration_s:g}"
-                    raise ValueError(f"{line}; set an earlier time, or run longer")
         rig = self.rig.model_copy(update={"drive": with_speeds(self.rig.drive, self.step)})
-        configurations(controller, self.step)  # raises for a setting that no controller has
         try:
             controller = within(seeing(controller, absent(self.rig.channels)), self.rig.vibration_limits)
             return self.model_copy(update={"controller": controller, "rig": rig})
@@ -81,13 +62,6 @@ def refuse_short_blocks(scenario: Scenario) -> None:
             "each block needs a message to the controller and back; lengthen it, or use --lockstep or --in-process"
         )
         raise Fault("CONFIG", line)
-
-
-def refuse_steps(scenario: Scenario) -> None:
-    """Raise Fault CONFIG for a step that a run of several processes cannot have."""
-    if any(step.speed_mps is None for step in scenario.step):
-        line = f"{scenario.name}: step: needs a run in one process, as only a change of speed is part of the rig"
-        raise Fault("CONFIG", f"{line}; use `stickslip test`, or --in-process")
 
 
 def load_rig(name: str, settings: list[str]) -> RigConfig:

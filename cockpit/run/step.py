@@ -7,10 +7,11 @@ from pydantic import Field, model_validator
 
 from bridge.config import Strict, validate, with_overrides
 from controller.config import ControllerConfig
-from plant.drive_config import DriveConfig
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from plant.drive_config import DriveConfig
 
 _CONTROLLER = "controller."
 _FIXED = ("block_s", "samples_per_block")
@@ -59,7 +60,7 @@ class StepTable(Strict):
         return round(self.at_s * 1e9)
 
 
-def with_speeds(drive: DriveConfig, steps: "Sequence[StepTable]") -> DriveConfig:
+def with_speeds(drive: "DriveConfig", steps: "Sequence[StepTable]") -> "DriveConfig":
     """A drive that changes its speed at the steps. Raises ValueError for a drive without a profile that runs once."""
     points = list(drive.profile)
     for step in sorted(steps, key=lambda step: step.at_s):

@@ -1,6 +1,12 @@
-"""`stickslip test`: scenarios with expectations, run in simulated time or judged on an old log.
+"""Tests of a rig: scenarios with expectations, in simulated time or judged on an old log, and the fixture `rig` of pytest.
 
-one      one scenario, or one of its mutants: the run, its results and its log
-suite    the scenarios of files and folders, in processes
-junit    the results as JUnit XML
+one        one scenario, or one of its mutants: the run, its results and its log
+suite      the scenarios of files and folders, in processes
+target     what a test runs on: a simulated rig, a model, or a device behind its guard
+lock       the lock of a real rig, and its quarantine
+realtime   a test of a real rig: arm, change, end
+junit      the results as JUnit XML
+api        a rig, its runs and expectations in Python
+session    the rigs of one test in Python; what remains of a failed one
+plugin     the plug-in of pytest
 """

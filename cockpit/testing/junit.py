@@ -1,9 +1,10 @@
 """Results of tests as JUnit XML, which build servers read."""
 
+from collections.abc import Sequence
 from importlib.metadata import version
 from xml.etree import ElementTree as Xml
 
-from cockpit.expect.judge import FAILED, PASSED, UNTESTED
+from cockpit.expect.judge import FAILED, PASSED, UNTESTED, Expected
 from cockpit.testing.one import ERROR, Tested
 from cockpit.testing.suite import Suite
 
@@ -16,7 +17,8 @@ def junit(suite: Suite) -> str:
         name = f"{test.name} with {test.defect}" if test.defect else test.name
         case = Xml.SubElement(root, "testcase", classname=test.file, name=name)
         properties = Xml.SubElement(case, "properties")
-        for key, value in _properties(test):
+        rows = properties_of(test.rig, test.seed, test.checksum, test.expectations)
+        for key, value in [*rows, *([("log", test.log)] if test.log else [])]:
             Xml.SubElement(properties, "property", name=key, value=value)
         kind = _kind(test, suite.mutants)
         if kind:
@@ -36,7 +38,8 @@ def _kind(test: Tested, mutant: bool) -> str:
     return {PASSED: "", FAILED: "failure", UNTESTED: "error", ERROR: "error"}[test.result]
 
 
-def _properties(test: Tested) -> list[tuple[str, str]]:
-    requirements = dict.fromkeys(row.requirement for row in test.expectations if row.requirement)
-    fixed = {"rig": test.rig, "seed": str(test.seed), "version": version("stickslip"), "log": test.log}
+def properties_of(rig: str, seed: int, checksum: str, expected: Sequence[Expected]) -> list[tuple[str, str]]:
+    """Properties of a run: its rig, seed, version, SHA-256 of its log, and the requirements that its expectations verify."""
+    requirements = dict.fromkeys(row.requirement for row in expected if row.requirement)
+    fixed = {"rig": rig, "seed": str(seed), "version": version("stickslip"), "checksum": checksum}
     return [*((key, value) for key, value in fixed.items() if value), *(("requirement", name) for name in requirements)]

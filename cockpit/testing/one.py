@@ -12,10 +12,9 @@ from bridge.log.logfile import read_run
 from bridge.results import in_json
 from bridge.units import counted
 from cockpit.expect.judge import FAILED, PASSED, UNTESTED, Expected, judge
-from cockpit.run.in_process import run_onboard
-from cockpit.run.run import about_run
-from cockpit.run.scenario import Scenario, load_scenario
-from cockpit.run.simulated.run import run_with_faults
+from cockpit.expect.record import Record
+from cockpit.run.run_tables import RunTables
+from cockpit.testing.target import NO_TARGET, Loaded, Target, load
 
 ERROR: Final = "ERROR"
 Verdict = Literal["PASSED", "FAILED", "UNTESTED", "ERROR"]
@@ -28,6 +27,7 @@ class TestCase(NamedTuple):
     name: str
     file: Path
     settings: list[str]
+    target: Target = NO_TARGET
     mutant: int | None = None  # index in `must_fail`; None: the scenario without a defect
 
 
@@ -36,19 +36,30 @@ class Tested(NamedTuple):
 
     name: str
     file: str
-    rig: str
-    seed: int
-    defect: str  # of a mutant; empty for the scenario itself
-    expectations: list[Expected]
-    error: str  # reason for which nothing could be judged; else empty
-    log: str  # kept log; empty for a log that was deleted
-    JSON_OPTIONAL = "defect", "error", "log"
+    rig: str = ""
+    seed: int = 0
+    defect: str = ""  # of a mutant; empty for the scenario itself
+    expectations: list[Expected] = []
+    error: str = ""  # reason for which nothing could be judged; else empty
+    log: str = ""  # kept log; empty for a log that was deleted
+    checksum: str = ""  # SHA-256 of the log
+    untested: bool = False  # the error is that this rig cannot run it
+    JSON_OPTIONAL = "defect", "error", "log", "checksum", "untested"
+
+    def judged(self, log: Path, run: RunTables) -> "Tested":
+        """The test with the results of its expectations on a log. Raises Fault BAD_LOG."""
+        record = Record(read_run(log), run.duration_s or None)
+        return self._replace(expectations=judge(record, run.expect), checksum=record.run.checksums.sha256)
+
+    def without_result(self, fault: Fault) -> "Tested":
+        """The test that could not be run or judged."""
+        return self._replace(error=f"{fault.kind.code}: {fault.line}", untested=fault.kind.code == "NOT_JUDGED")
 
     @in_json
     def result(self) -> Verdict:
         """ERROR if nothing was judged; FAILED with a failed expectation; PASSED only if all of them passed."""
         if self.error:
-            return ERROR
+            return UNTESTED if self.untested else ERROR
         results = {row.result for row in self.expectations}
         return FAILED if FAILED in results else PASSED if results == {PASSED} else UNTESTED
 
@@ -69,43 +80,40 @@ class Tested(NamedTuple):
         return [*lines, *([f"  replay   stickslip replay {self.log}"] if self.log else [])]
 
 
-def loaded(case: TestCase) -> tuple[Scenario, str]:
-    """The scenario of a test, with its mutant's defect, and the defect in words. Raises Fault CONFIG."""
+def loaded(case: TestCase) -> tuple[Loaded, str]:
+    """The test, with its mutant's defect, and the defect in words. Raises Fault CONFIG, NOT_JUDGED."""
+    plain = load(str(case.file), case.settings, case.target)
     if case.mutant is None:
-        return load_scenario(str(case.file), case.settings), ""
-    defect = load_scenario(str(case.file), case.settings).must_fail[case.mutant]
-    scenario = load_scenario(str(case.file), [*case.settings, *defect.settings])
+        return plain, ""
+    defect = plain.run.must_fail[case.mutant]
+    made = load(str(case.file), [*case.settings, *defect.settings], case.target)
     about = defect.about or ", ".join([*defect.settings, *(table.in_words() for table in defect.fault)])
-    return scenario.model_copy(update={"fault": [*scenario.fault, *defect.fault]}), about
+    return made._replace(run=made.run.model_copy(update={"fault": [*made.run.fault, *defect.fault]})), about
 
 
 def run_test(case: TestCase, keep: Path | None) -> Tested:
     """Run one test; a log whose test did not pass is moved into the folder `keep`, None: deleted."""
-    rig, seed, defect = "", 0, ""
+    tested = Tested(case.name, shown(case.file))
     try:
-        scenario, defect = loaded(case)
-        rig, seed = scenario.rig.name, scenario.seed
-        if scenario.duration_s <= 0.0:
-            raise Fault("CONFIG", f"{case.file}: duration_s = 0: a test must have an end; set duration_s")
+        test, defect = loaded(case)
+        tested = tested._replace(rig=test.run.rig.name, seed=test.run.seed, defect=defect)
         with TemporaryDirectory() as folder:
             log = Path(folder) / f"{case.name}.mcap"
-            (run_with_faults if scenario.fault else run_onboard)(scenario, log, about_run(scenario, lockstep=True))
-            tested = Tested(
-                case.name, shown(case.file), rig, seed, defect, judge(read_run(log), scenario.expect), "", ""
-            )
+            test.make(str(case.file), log)
+            tested = tested.judged(log, test.run)
             if keep is None or tested.result == PASSED:
                 return tested
             keep.mkdir(parents=True, exist_ok=True)
             return tested._replace(log=shown(Path(shutil.move(log, keep / log.name))))
     except Fault as fault:
-        return Tested(case.name, shown(case.file), rig, seed, defect, [], f"{fault.kind.code}: {fault.line}", "")
+        return tested.without_result(fault)
 
 
 def judge_old(case: TestCase, log: Path) -> Tested:
     """Judge the expectations of a scenario on a log of any rig."""
+    tested = Tested(case.name, shown(case.file))
     try:
-        scenario, _ = loaded(case)
-        expected = judge(read_run(log), scenario.expect)
-        return Tested(case.name, shown(case.file), scenario.rig.name, scenario.seed, "", expected, "", shown(log))
+        run = loaded(case)[0].run
+        return tested._replace(rig=run.rig.name, seed=run.seed, log=shown(log)).judged(log, run)
     except Fault as fault:
-        return Tested(case.name, shown(case.file), "", 0, "", [], f"{fault.kind.code}: {fault.line}", "")
+        return tested.without_result(fault)

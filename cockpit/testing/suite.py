@@ -13,8 +13,8 @@ from bridge.kernel_cache import compile_once
 from bridge.results import in_json
 from bridge.units import counted
 from cockpit.expect.judge import FAILED, PASSED, UNTESTED
-from cockpit.run.scenario import load_scenario
 from cockpit.testing.one import ERROR, TestCase, Tested, run_test
+from cockpit.testing.target import NO_TARGET, Target, load
 
 _ORDER = (PASSED, FAILED, UNTESTED, ERROR)
 
@@ -64,7 +64,7 @@ class Suite(NamedTuple):
         return lines
 
 
-def cases_of(paths: Sequence[Path], settings: list[str]) -> tuple[list[TestCase], int]:
+def cases_of(paths: Sequence[Path], settings: list[str], target: Target = NO_TARGET) -> tuple[list[TestCase], int]:
     """The tests of files and folders, and the number of other .toml files in the folders. Raises Fault CONFIG.
 
     A file in a folder is a test if it holds `[[expect]]` or cannot be read; a file that is named itself is always one.
@@ -83,7 +83,7 @@ def cases_of(paths: Sequence[Path], settings: list[str]) -> tuple[list[TestCase]
         raise Fault("CONFIG", f"{', '.join(map(str, paths))}: holds no scenario with [[expect]]; add one to a scenario")
     stems = Counter(file.stem for file in files)
     names = [file.stem if stems[file.stem] == 1 else "-".join(file.with_suffix("").parts[-2:]) for file in files]
-    return [TestCase(name, file, settings) for name, file in zip(names, files, strict=True)], others
+    return [TestCase(name, file, settings, target) for name, file in zip(names, files, strict=True)], others
 
 
 def _is_test(file: Path) -> bool:
@@ -98,7 +98,7 @@ def mutants_of(cases: Sequence[TestCase]) -> tuple[list[TestCase], list[str]]:
     mutants: list[TestCase] = []
     without: list[str] = []
     for case in cases:
-        defects = load_scenario(str(case.file), case.settings).must_fail
+        defects = load(str(case.file), case.settings, case.target).run.must_fail
         mutants += [case._replace(mutant=number) for number in range(len(defects))]
         without += [] if defects else [case.name]
     return mutants, without

@@ -163,6 +163,7 @@ _RESULTS = {
     "rig check": "bridge.rig.check:RigCheck",
     "rig conformance": "bridge.rig.conformance.report:Conformance",
     "rig box": "cockpit.commands.rig:Boxed",
+    "rig release": "cockpit.commands.rig:Released",
     "status": "cockpit.live.status:Status",
     "fault": "cockpit.faults.injection:Injected",
     "test": "cockpit.testing.suite:Suite",

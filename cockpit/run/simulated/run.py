@@ -8,13 +8,16 @@ from typing import Any, cast
 from bridge.faults import Fault
 from bridge.rig.faults.kinds import PROCESS
 from bridge.rig.faults.table import FaultTable
+from bridge.rig.node import GuardedNode
 from bridge.rig.process import GuardedRig
+from bridge.rig.real import open_node
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.complaints import BAD_MESSAGE, Complaints
 from bridge.wire.inbox import WAITING, Received
 from bridge.wire.session import LEASE_S
 from bridge.wire.topics import OPERATOR, SENSORS, TOPICS
-from cockpit.run.in_process import TimedAction, actions_of, log_of
+from cockpit.run.device_run import DeviceRun
+from cockpit.run.in_process import TimedAction, actions_of, log_of, run_onboard
 from cockpit.run.scenario import Scenario
 from cockpit.run.simulated.stage import Hub, Player, Receive, Session, Stage, WaitingInbox
 from cockpit.run.step import configurations
@@ -31,7 +34,7 @@ _GRANTED = "simulated time"  # text of the START events, in place of the granted
 class SimulatedRun:
     """One run with its faults. Runs share the simulated clock, so a process can make only one at a time."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario | DeviceRun) -> None:
         self._scenario = scenario
         self._config = scenario.controller
         self._stage = Stage()
@@ -44,7 +47,7 @@ class SimulatedRun:
         for table in faults:
             self._stage.cue(round(table.from_s * 1e9), lambda table=table: self._disturb(table))
         self._loop_node: ControllerNode | None = None
-        self._rig_node: PlantNode | None = None
+        self._rig_node: GuardedNode | None = None
         self.command(actions_of(scenario))
         for t_ns, config in configurations(scenario.controller, scenario.step):
             self._stage.cue(t_ns, lambda config=config: self._reconfigure(config))
@@ -64,7 +67,7 @@ class SimulatedRun:
             self._loop_node.reconfigure(config)
 
     def _load(self, ratio: float) -> None:
-        if self._rig_node is not None:
+        if isinstance(self._rig_node, PlantNode):
             self._rig_node.set_load(ratio)
 
     def listen(self, receive: Receive) -> None:
@@ -72,8 +75,8 @@ class SimulatedRun:
         for topic in TOPICS:
             self._hub.listen("recorder", topic, receive)
 
-    def plant_node(self, **settings: Any) -> PlantNode:
-        """Create the rig's node. A subclass may override this to record the simulated truth."""
+    def plant_node(self, **settings: Any) -> GuardedNode:
+        """Create the rig's node. A subclass may override this, to record the simulated truth or for a device."""
         return PlantNode(**settings)
 
     def controller_node(self) -> ControllerNode:
@@ -157,19 +160,46 @@ class SimulatedRun:
             stage.cue(stage.now_ns + for_ns, begin)
 
 
+class DevicesRun(SimulatedRun):
+    """A run of a device that makes a block for each command, such as a model: simulated time, as nothing real moves.
+
+    Args:
+        run: its configuration.
+        folder: of its rig file.
+        arm: it starts ARMED.
+
+    """
+
+    def __init__(self, run: DeviceRun, folder: Path, arm: bool) -> None:
+        super().__init__(run)
+        self._run, self._folder, self._arm = run, folder, arm
+
+    def plant_node(self, **settings: Any) -> GuardedNode:
+        """Open the device; a rig that is started again opens it again."""
+        self.close()
+        run, arm = self._run, self._arm and settings["run"] == 1
+        return open_node(run.rig, self._folder, settings["run"], settings["faults"], run.seed, arm)
+
+    def close(self) -> None:
+        """Disconnect from the device."""
+        if self._rig_node is not None:
+            self._rig_node.close()
+
+
 def run_with_faults(
-    scenario: Scenario,
+    scenario: Scenario | DeviceRun,
     path: Path,
     about: dict[str, Any],
     progress: Callable[[float], None] | None = None,
     stopped: Callable[[], bool] = lambda: False,
+    run: SimulatedRun | None = None,
 ) -> None:
     """Run a scenario with its faults and write its log. Raises Fault LOG_WRITE.
 
     `about` is metadata for the log; `progress` is called every 0.1 s of simulated time with that time [s]; `stopped`, called at
-    every turn, ends the run as at its full duration.
+    every turn, ends the run as at its full duration; `run`: not given for a simulated rig.
     """
-    run = SimulatedRun(scenario)
+    run = run or SimulatedRun(scenario)
     log = log_of(scenario, path, about)
     complaints = Complaints(log.add_event)
     block_s = scenario.rig.solver.block_s
@@ -195,3 +225,8 @@ def run_with_faults(
         run.play(stopped)
     finally:
         log.close()
+
+
+def simulate(scenario: Scenario, path: Path, about: dict[str, Any]) -> None:
+    """Run a scenario in one process and write its log: many blocks at once without faults, else message by message."""
+    (run_with_faults if scenario.fault else run_onboard)(scenario, path, about)

@@ -9,6 +9,7 @@ from bridge.config import validate
 from bridge.log.logfile import RunData
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.expect.judge import FAILED, PASSED, UNTESTED, Expected, judge
+from cockpit.expect.record import Record
 from cockpit.expect.tables import ExpectTable
 
 STEADY = {"from_s": 0.5}
@@ -17,7 +18,7 @@ RATIO = {"signal": "velocity_ratio", "within": [1.1, 1.3]} | STEADY
 
 
 def of(run: RunData, **table: Any) -> Expected:
-    return judge(run, [validate(ExpectTable, table, "mine.toml")])[0]
+    return judge(Record(run), [validate(ExpectTable, table, "mine.toml")])[0]
 
 
 def changed(run: RunData, topic: str, **columns: Any) -> RunData:

@@ -9,7 +9,8 @@ from bridge.faults import Fault
 from bridge.log.logfile import read_run
 from cockpit.run.in_process import run_onboard
 from cockpit.run.replay import replay_log
-from cockpit.run.scenario import Scenario, load_scenario, refuse_steps
+from cockpit.run.run_tables import refuse_for_processes
+from cockpit.run.scenario import Scenario, load_scenario
 from cockpit.run.simulated.run import run_with_faults
 
 HEAD = 'duration_s = 1.0\narm = true\nrig = { file = "paper-c45-c45" }\n'
@@ -80,4 +81,4 @@ def test_steps_act_alike_with_and_without_the_loops_of_the_processes(tmp_path: P
 
 def test_runs_of_several_processes_refuse_steps(tmp_path: Path) -> None:
     with pytest.raises(Fault, match="use `stickslip test`, or --in-process"):
-        refuse_steps(scenario(tmp_path, STEPS))
+        refuse_for_processes(scenario(tmp_path, STEPS), lockstep=False)
