@@ -36,7 +36,7 @@ def cost_of_freedom(fit: Fit, noise: float) -> float:
 
     Args:
         fit: a fit, with its columns.
-        noise: chi2 of one feature that the best explanation leaves; the likelihood of `of_remainder` is flatter where it is large.
+        noise: chi2 that the best explanation leaves of one feature; a large one flattens the likelihood of `of_remainder`.
 
     """
     scaled: Floats = fit.columns / prior_of(fit.hypothesis, fit.deviations)
