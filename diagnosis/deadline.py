@@ -52,11 +52,12 @@ def limited(until_s: float) -> Generator[None]:
 
 
 @contextmanager
-def ended_by_ctrl_c() -> Generator[None]:
-    """A body in which the first Ctrl-C raises EndedError; the next, or an unhandled first, KeyboardInterrupt."""
+def ended_by_ctrl_c(pressed: threading.Event) -> Generator[None]:
+    """A body: its first Ctrl-C sets `pressed` and raises EndedError; the next, or an unhandled first, KeyboardInterrupt."""
 
     def on_signal(_number: int, _frame: Any) -> Never:
         signal.signal(signal.SIGINT, handler)
+        pressed.set()
         raise EndedError
 
     handler = signal.signal(signal.SIGINT, on_signal)

@@ -29,7 +29,7 @@ class Candidate(NamedTuple):
     """One explanation: an effect of the library, or `none`."""
 
     effect: str
-    probability: float  # NaN where the time ran out before any cause was tried
+    probability: float  # NaN where the work ended before any cause was tried
     form: str = ""  # the formula of the effect that fitted best
     parameters: dict[str, Estimate] = {}  # names carry their units
     chi2: float | None = None  # of the fit with this effect alone, with the priors of the nuisances; None: not refitted

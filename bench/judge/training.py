@@ -17,7 +17,7 @@ from bench.judge.rigs import drawn_rig
 from bridge.arrays import Floats
 from bridge.files import read_json
 from bridge.results import strict_json, write_json
-from diagnosis.judge.judge import Explained, explained_by, probabilities, remainders
+from diagnosis.judge.judge import ERROR, Explained, explained_by, probabilities, remainders
 from diagnosis.judge.ledger import Ledger, Names
 from diagnosis.judge.witnesses import before_fits, ledger_of, with_fits
 from diagnosis.processes import one_thread
@@ -27,6 +27,7 @@ _HELD = 1e-3  # penalty on squares of the numbers. Larger: they stay near 0. Sma
 _KNOWN = 0.5  # probability of its effect from which a rig without this effect in the library counts as outside
 # Evidence of the truth from which an effect is visible, and of anything else from which a rig misleads and is kept.
 _SEEN, _MISLEADS = 2.0, 10.0
+_FOLDS = 10  # of the cross-validation
 _BEYOND = 0.15  # of the rigs have an effect that the library lacks. More: known effects are called unknown
 
 
@@ -59,6 +60,11 @@ def train(
     typer.echo(f"{len(examples)} rigs with a visible effect or none")
     typer.echo("_WEIGHT, _REFITTED, _PRIOR = " + ", ".join(f"{value:.2f}" for value in numbers.explanations))
     typer.echo(f"_MISLED = {numbers.misled:.3f}")
+    typer.echo(
+        f"log loss, cross-validated: {log_loss(examples):.2f}; without misleading {log_loss(examples, misleads=False):.2f}"
+    )
+    for error in (0.0, 0.3 * ERROR, 3.0 * ERROR):
+        typer.echo(f"with {error:.3f} as ERROR: {log_loss(examples, error):.2f}")
     typer.echo("_ELSE, _LEFT, _LEFT_OF_KEPT = " + ", ".join(f"{value:.2f}" for value in numbers.something_else))
 
 
@@ -92,18 +98,7 @@ def from_json(table: dict[str, Any]) -> Ledger:
 def numbers_of(examples: list[Example]) -> Numbers:
     """The numbers of the highest likelihood."""
     explained = [explained_by(example.ledger) for example in examples]
-    targets = [_target(each, example.effects) for each, example in zip(explained, examples, strict=True)]
-
-    def loss(at: Floats) -> float:
-        misled = float(expit(at[-1]))
-        of_rigs = [
-            -math.log(max(float(target @ probabilities(each.columns, at[:-1], misled)), 1e-300))
-            for each, target in zip(explained, targets, strict=True)
-        ]
-        return float(np.mean(of_rigs)) + 0.5 * _HELD * float(at[:-1] @ at[:-1])
-
-    at = minimize(loss, np.array([0.3, 1.0, -1.0, -3.0, -2.5])).x
-    numbers, misled = at[:-1], float(expit(at[-1]))
+    numbers, misled = _of_explanations(explained, _targets(explained, examples))
     lacks = [
         without
         for example, each in zip(examples, explained, strict=True)
@@ -120,6 +115,55 @@ def numbers_of(examples: list[Example]) -> Numbers:
         return float(counts @ (np.logaddexp(0.0, scores) - outside * scores)) + 0.5 * _HELD * float(odds[1:] @ odds[1:])
 
     return Numbers(numbers, misled, minimize(loss_of_else, np.zeros(3)).x)
+
+
+def log_loss(examples: list[Example], error: float = ERROR, *, misleads: bool = True) -> float:
+    """Mean of - log(probability of the truth) of every rig, by the numbers from the other folds.
+
+    Args:
+        examples: rigs.
+        error: share of the largest evidence that its error makes, as `diagnosis.judge.judge.ERROR`.
+        misleads: whether the evidence may mislead.
+
+    """
+    explained = [explained_by(example.ledger, error) for example in examples]
+    targets = _targets(explained, examples)
+    losses: list[float] = []
+    for fold in range(_FOLDS):
+        others = [i for i in range(len(examples)) if i % _FOLDS != fold]
+        numbers, misled = _of_explanations(
+            [explained[i] for i in others], [targets[i] for i in others], misleads=misleads
+        )
+        mine = slice(fold, None, _FOLDS)
+        losses += _losses(explained[mine], targets[mine], numbers, misled)
+    return float(np.mean(losses))
+
+
+def _of_explanations(
+    explained: list[Explained], targets: list[Floats], *, misleads: bool = True
+) -> tuple[Floats, float]:
+    """The numbers of the explanations [4], and the probability that the evidence misleads."""
+
+    def misled_at(at: Floats) -> float:
+        return float(expit(at[-1])) if misleads else 0.0
+
+    def loss(at: Floats) -> float:
+        of_rigs = _losses(explained, targets, at[:-1], misled_at(at))
+        return float(np.mean(of_rigs)) + 0.5 * _HELD * float(at[:-1] @ at[:-1])
+
+    at = minimize(loss, np.array([0.3, 1.0, -1.0, -3.0, -2.5])).x
+    return at[:-1], misled_at(at)
+
+
+def _losses(explained: list[Explained], targets: list[Floats], numbers: Floats, misled: float) -> list[float]:
+    return [
+        -math.log(max(float(target @ probabilities(each.columns, numbers, misled)), 1e-300))
+        for each, target in zip(explained, targets, strict=True)
+    ]
+
+
+def _targets(explained: list[Explained], examples: list[Example]) -> list[Floats]:
+    return [_target(each, example.effects) for each, example in zip(explained, examples, strict=True)]
 
 
 def _target(explained: Explained, effects: frozenset[str]) -> Floats:

@@ -1,6 +1,7 @@
 """`stickslip diagnose`: the effect that makes a rig differ from its description; for one evidence folder or many."""
 
 import sys
+import threading
 from collections.abc import Callable
 from contextlib import closing
 from functools import partial
@@ -189,7 +190,8 @@ def _diagnose_one(source: "EvidenceFolder", options: _Options) -> int:
         fitted_s = sum(float(run.t_s[-1] - run.t_s[0]) for run in evidence.runs if not run.holdout)
         limit = "" if options.budget_s is None else f", {options.budget_s:g} s at most"
         progress(f"the simulated fits of {fitted_s:.0f} s take about {forecast(fitted_s, options.jobs)}{limit}", 0.0)
-        diagnosis = _result(source, evidence, options, progress)
+        pressed = threading.Event()
+        diagnosis = _result(source, evidence, options, progress, pressed)
     refused: list[Fault] = []
     _print(options, diagnosis, [*diagnosis.summary, *(details(diagnosis) if options.all else ())], refused)
     wanted: list[tuple[str, Path | None, Callable[[Path], None]]] = [
@@ -202,7 +204,7 @@ def _diagnose_one(source: "EvidenceFolder", options: _Options) -> int:
     for label, path, write in wanted:
         if path is not None and written(partial(write, path), refused):
             _print_line(options, f"{label}{path}")
-    return _report_refused(refused)
+    return _report_refused(refused) or (FAULTS["INTERRUPTED"].exit_status if pressed.is_set() else 0)
 
 
 def _print(options: _Options, result: "Diagnosis | Diagnoses", words: list[str], refused: list[Fault]) -> None:
@@ -226,7 +228,11 @@ def _print_line(options: _Options, line: str) -> None:
 
 
 def _result(
-    source: "EvidenceFolder", evidence: "Evidence", options: _Options, progress: Callable[[str, float], None]
+    source: "EvidenceFolder",
+    evidence: "Evidence",
+    options: _Options,
+    progress: Callable[[str, float], None],
+    pressed: threading.Event,
 ) -> "Diagnosis":
     from joblib import parallel_config
 
@@ -235,7 +241,7 @@ def _result(
 
     if not options.cluster:
         workers = parallel_config(backend="loky", initializer=many.leave_interrupt_to_parent)
-        with workers, ended_by_ctrl_c():
+        with workers, ended_by_ctrl_c(pressed):
             return options.diagnose(evidence, progress, options.jobs)
     with closing(many.diagnose_many([source], 1, options.cluster, options.diagnose, options.certs)) as outcomes:
         outcome = next(outcomes)

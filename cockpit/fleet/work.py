@@ -150,7 +150,7 @@ def _title(group: RigGroup) -> str:
     if group.kind == "named":
         return group.what
     if group.kind == "not-finished":
-        return "not finished: the time ran out before any cause was tried"
+        return "not finished: the work ended before any cause was tried"
     return f"unexplained: {group.what}" if group.what else "unexplained, without a known common cause"
 
 

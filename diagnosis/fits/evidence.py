@@ -32,6 +32,13 @@ def of_remainder(chi2: float, features: int) -> float:
 
 
 def cost_of_freedom(fit: Fit, noise: float) -> float:
-    """Logarithm of the volume that the data leave of the prior of nuisances and coordinates (Laplace), at most 0."""
+    """Logarithm of the volume that the data leave of the prior of nuisances and coordinates (Laplace), at most 0.
+
+    Args:
+        fit: a fit, with its columns.
+        noise: chi2 that the best explanation leaves of one feature; a large one flattens the likelihood of `of_remainder`.
+
+    """
     scaled: Floats = fit.columns / prior_of(fit.hypothesis, fit.deviations)
-    return -0.5 * float(np.linalg.slogdet(np.eye(scaled.shape[1]) + scaled.T @ scaled / noise)[1])
+    information = scaled.T @ scaled * _INDEPENDENT / (noise * (1.0 + _SHARED * noise / NOISE))
+    return -0.5 * float(np.linalg.slogdet(np.eye(scaled.shape[1]) + information)[1])

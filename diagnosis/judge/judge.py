@@ -69,7 +69,7 @@ def judge(ledger: Ledger) -> Judged:
     return Judged(dict(sorted(effects.items(), key=lambda item: -item[1])), explanations, complete)
 
 
-def explained_by(ledger: Ledger) -> Explained:
+def explained_by(ledger: Ledger, share_of_error: float = ERROR) -> Explained:
     """The log evidence of each explanation."""
     total: dict[Names, float] = defaultdict(float, {frozenset(): 0.0})
     total |= {frozenset((name,)): 0.0 for name in ledger.possible}
@@ -80,7 +80,7 @@ def explained_by(ledger: Ledger) -> Explained:
             total[names] += row.evidence
         if row.source == "fit":
             fitted.add(names)
-    error = 1.0 + ERROR * max(total.values())
+    error = 1.0 + share_of_error * max(total.values())
     rows = [(value / error, names in fitted, len(names) == 1, len(names) == 2) for names, value in total.items()]
     return Explained(list(total), np.array(rows, np.float64))
 

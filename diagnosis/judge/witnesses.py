@@ -25,7 +25,7 @@ from plant.effects.library import EFFECTS
 
 _FOR_FITS = 0.7  # share of the budget for the fits; the rest is for held-out runs, the next experiment and pictures
 _LEADERS = 3  # explanations that are fitted because they lead by the linear model of the rig. More: 2 s of CPU each
-_TIME_IS_UP = "the time is up: the best answer so far"
+_ENDED_EARLY = "ended early: the best answer so far"
 NO_FIT = Finding("budget", "fits", "none was made: names and shares come from relations and friction alone")
 CUT_SHORT = Finding("budget", "fits", "ended before every effect was tried: this is the best answer by then")
 
@@ -76,7 +76,7 @@ def with_fits(seen: Witnesses, progress: Progress) -> Witnesses:
     try:
         baseline = baseline_of(problem, progress, seen.jobs)
     except OutOfTimeError:
-        progress(_TIME_IS_UP, 0.2)
+        progress(_ENDED_EARLY, 0.2)
         return seen
     search = Search(baseline, tried, lambda names: evidence_of(answered, names), seen.jobs)
     seen = seen._replace(evidence=evidence, runs=runs, search=search)
@@ -86,7 +86,7 @@ def with_fits(seen: Witnesses, progress: Progress) -> Witnesses:
             if not search.add(judge(ledger_of(seen)).names):
                 break
     except OutOfTimeError as error:
-        progress(_TIME_IS_UP, 0.75)
+        progress(_ENDED_EARLY, 0.75)
         seen = seen._replace(jobs=1)  # the interruption ended the workers; new ones would take seconds
         if isinstance(error, EndedError):
             seen = seen._replace(until_s=min(seen.until_s, time.monotonic() + GRACE_S))

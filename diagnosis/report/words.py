@@ -50,7 +50,7 @@ def answer(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "described":
         return "; ".join(map(closing_number_in_words, diagnosis.numbers))
     if diagnosis.verdict == "not-finished":
-        return "the time ran out before any cause was tried"
+        return "the work ended before any cause was tried"
     sure = sum(row.probability for row in diagnosis.candidates if row.effect in diagnosis.effects)
     return f"{names}, probability {percent(sure)}: {sizes_of_effects(diagnosis)}"
 

@@ -46,13 +46,15 @@ def test_another_thread_has_no_limit():
 
 
 def test_the_first_ctrl_c_asks_for_the_answer_and_the_second_ends():
-    before = signal.getsignal(signal.SIGINT)
-    with pytest.raises(KeyboardInterrupt), ended_by_ctrl_c():  # noqa: PT012
+    before, pressed = signal.getsignal(signal.SIGINT), threading.Event()
+    with pytest.raises(KeyboardInterrupt), ended_by_ctrl_c(pressed):  # noqa: PT012
+        assert not pressed.is_set()
         with pytest.raises(EndedError):
             os.kill(os.getpid(), signal.SIGINT)
+        assert pressed.is_set()
         os.kill(os.getpid(), signal.SIGINT)
     assert signal.getsignal(signal.SIGINT) is before
-    with pytest.raises(KeyboardInterrupt), ended_by_ctrl_c():
+    with pytest.raises(KeyboardInterrupt), ended_by_ctrl_c(threading.Event()):
         os.kill(os.getpid(), signal.SIGINT)  # nothing handles it
 
 

@@ -219,7 +219,7 @@ STIFFNESS = "drive stiffness 11.01 kN/m (90 %: 10.95 to 11.07), described 11.7 k
             STIFFNESS,
         ),
         ("no-gap", "the described rig explains these runs", "98 % that nothing else acts; leading", STIFFNESS),
-        ("not-finished", "the time ran out before any cause was tried", "nothing was judged", STIFFNESS),
+        ("not-finished", "the work ended before any cause was tried", "nothing was judged", STIFFNESS),
     ],
 )
 def test_every_verdict_without_an_effect_has_its_words(verdict, answer, sure, numbers):
