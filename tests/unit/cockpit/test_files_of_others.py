@@ -240,6 +240,36 @@ def test_a_rate_replaces_a_time_and_says_so(tmp_path: Path) -> None:
     assert "column t [s] is not used as the time: the rate of 1000 Hz replaces it" in found(seen)
 
 
+_AREA_M2 = 1.2e-3
+PRESSURES = "t [s],pA [bar],pB [bar],x [mm]\n" + rows(T_S, 2.0 + FORCE_N / _AREA_M2 / 1e5, 2.0 + 0.0 * T_S, PLACE_MM)
+
+
+def test_a_force_comes_from_two_pressures(tmp_path: Path) -> None:
+    """By the command line, by the map that it writes, and by a map with the keys of a rig file."""
+    path, saved, map_path = tmp_path / "cylinder.csv", tmp_path / "saved.toml", tmp_path / "map.toml"
+    path.write_text(PRESSURES)
+    seen = look(path, "--force", "1.2e-3 * (pA - pB)", "--out", str(saved))
+    is_right(seen)
+    assert "derived: from pA [bar], pB [bar], each in its SI unit" in found(seen)
+    is_right(look(path, "--map", str(saved)))
+    map_path.write_text(
+        '[numbers]\narea = 1.2e-3\n[channels]\nt_s = "t [s]"\ndrive_force_N = { derive = "area * (pA - pB)" }\n'
+    )
+    is_right(look(path, "--map", str(map_path)))
+    assert "column 1.2e-3 * (pA - pC): not in the file" in look(path, "--force", "1.2e-3 * (pA - pC)")["line"]
+    map_path.write_text('[channels]\ndrive_force_N = { derive = "area * (pA -" }\n')
+    assert "channels.drive_force_N: derive: character" in look(path, "--map", str(map_path))["line"]
+
+
+def test_an_import_asks_about_results_that_no_rig_has(tmp_path: Path) -> None:
+    path = tmp_path / "whole.csv"
+    path.write_text("time,F [N]\n" + "".join(f"{2 * i},{force:.3f}\n" for i, force in enumerate(FORCE_N)))
+    words = ["log", "import", str(path), "--out", str(tmp_path / "run.mcap"), "--json"]
+    line = json.loads(CliRunner().invoke(app, words).stdout)["line"]
+    assert 'add --time "time [ms]"' in line
+    assert CliRunner().invoke(app, [*words, "--time", "time [ms]"]).exit_code == 0
+
+
 def convert_command(line: str) -> list[str]:
     words = shlex.split(line.partition("convert it: ")[2].partition(", and give")[0])
     return [sys.executable if word == "python" else word for word in words]
