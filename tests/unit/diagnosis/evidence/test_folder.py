@@ -47,7 +47,9 @@ def test_a_run_states_how_its_file_is_written_its_piece_and_its_derived_force(tm
     manifest = (path / "manifest.toml").read_text().replace("run-01.parquet", "run-01.csv")
     rate_Hz = 1.0 / float(np.diff(data["t_s"]).mean())
     keys = f'piece = 2\nsource = {{ encoding = "cp1252", sample_rate_Hz = {rate_Hz!r}, delimiter = ";" }}\n'
-    channels = '[channels]\ndrive_force_N = { derive = "area * Kräft" }\ndrive_position_m = "s"\n[numbers]\narea = 1.2e-3\n'
+    channels = (
+        '[channels]\ndrive_force_N = { derive = "area * Kräft" }\ndrive_position_m = "s"\n[numbers]\narea = 1.2e-3\n'
+    )
     manifest = manifest.replace("[[run]]\n", f"{channels}[[run]]\n{keys}")
     (path / "manifest.toml").write_text(manifest)
     (run,) = load_evidence(path).runs
