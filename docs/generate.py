@@ -2,6 +2,8 @@
 
 import inspect
 import json
+import shlex
+import tomllib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -11,6 +13,7 @@ from typer.testing import CliRunner
 
 from bridge.config import Strict
 from bridge.faults import FAULTS
+from bridge.tables.kinds import FOREIGN
 from bridge.wire.event_codes import EVENTS, SEVERITIES
 from bridge.wire.words import words
 from cockpit import cli
@@ -22,6 +25,8 @@ from docs import constants, zenoh_files
 from plant.effects.library import EFFECTS
 from plant.effects.row import Formula
 from plant.pairs import PAIRS
+from tests.unit.cockpit import files_of_others
+from tests.unit.diagnosis.evidence import foreign_tables
 
 FOLDER = Path(__file__).parent / "reference"
 _MADE = "<!-- Made by `make docs`; change the code instead. -->\n"
@@ -53,6 +58,9 @@ key, rule and remedy. Units are in the names."""
 _GONE_INTRO = """\
 Keys of older scenarios. They are still read, so that an old file works, but ignored: a line on stderr names the
 replacement."""
+_PROGRAMS_INTRO = """\
+The tests open a file in the way of each program. Columns are found by their names and units, so files with other
+names open too; [look](../guides/look.md) prints an option to add if it needs one."""
 _FILES: tuple[tuple[str, str, type[Strict]], ...] = (
     (
         "Scenario",
@@ -73,6 +81,7 @@ def pages() -> dict[str, str]:
     """Text of every made page, by file name in docs/reference."""
     made = {"commands.md": _commands(), "effects.md": _effects(), "faults.md": _faults(), "files.md": _files()}
     made["constants.md"] = _constants()
+    made["programs.md"] = _programs()
     return {name: "\n".join((title, "", _MADE, *lines, "")) for name, (title, *lines) in made.items()}
 
 
@@ -221,6 +230,23 @@ def _faults() -> list[str]:
 
 
 # files
+
+
+def _programs() -> list[str]:
+    """Programs of whose files the tests have an example, with the words that open it, and kinds of files that are not read."""
+    opened = {kind.name: shlex.join(kind.options) for kind in files_of_others.KINDS}
+    opened |= {kind.file: shlex.join(["--force", kind.columns[1]]) for kind in foreign_tables.KINDS}
+    rows = [
+        (program, f"`{file}`", f"`{opened[file]}`" if opened[file] else "")
+        for file, program in (files_of_others.PROGRAMS | foreign_tables.PROGRAMS).items()
+    ]
+    foreign = tomllib.loads(FOREIGN.read_text(encoding="utf-8"))["kind"]
+    lines = ["# Programs whose files open", _PROGRAMS_INTRO, ""]
+    lines += _table(("program", "file of the tests", "words behind `stickslip look FILE`"), sorted(rows))
+    lines += ["## Files that are named and not read", "", "`look` prints the name and the command.", ""]
+    return lines + _table(
+        ("kind", "conversion"), dict.fromkeys((row["name"], f"`{row['convert']}`") for row in foreign)
+    )
 
 
 def _files() -> list[str]:

@@ -21,9 +21,8 @@ _MARKS: tuple[tuple[bytes, Kind], ...] = (
     (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "sheet"),
     (b"\x89MCAP0\r\n", "mcap"),
 )
-_FOREIGN: list[dict[str, Any]] = tomllib.loads(Path(__file__).with_name("foreign.toml").read_text(encoding="utf-8"))[
-    "kind"
-]
+FOREIGN = Path(__file__).with_name("foreign.toml")
+_FOREIGN: list[dict[str, Any]] = tomllib.loads(FOREIGN.read_text(encoding="utf-8"))["kind"]
 _HDF5_AT = 512  # MATLAB v7.3 writes a head of 512 bytes before the HDF5 data
 _BY_SUFFIX: dict[str, Kind] = {".parquet": "parquet", ".mat": "mat", ".tdms": "tdms"}
 _BY_SUFFIX.update(dict.fromkeys((".xlsx", ".xls", ".ods"), "sheet"))

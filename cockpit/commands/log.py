@@ -219,11 +219,9 @@ def _import_as_seen(path: Path, out: Path, kept: Path, asked: "LookOptions") -> 
         raise Fault("CONFIG", f"{line}; `stickslip look` reads it, and a map with scale = ... makes a force of it")
     if not record.map_text:
         raise Fault("CONFIG", f"{path.name}: is a run log of this project; use it without import")
-    made = record.map_text
-    if out.suffix != ".mcap":
-        seen = looked_at(record)
-        refuse_absurd(seen, path.name, record.counts)
-        made = full_map(record, seen)
+    seen = looked_at(record)
+    refuse_absurd(seen, path.name, record.counts)
+    made = record.map_text if out.suffix == ".mcap" else full_map(record, seen)
     refuse_to_replace_corrected(kept, made, str(kept))
     wanted = validate(ImportMap, tomllib.loads(made), kept.name)
     read = Mapped(columns_of(record), record.findings, record.starts_s)

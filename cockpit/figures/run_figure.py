@@ -37,6 +37,7 @@ _NEXT_MM = {SCREEN: 60.0, PAPER: 30.0}
 _FOOT_MM = 1.35  # width of a letter in the foot line
 _LETTER_MM, _KEY_MM = 0.18, 1.4  # width of a letter and of a key in the legend, per point of font size
 _ON_TOP = 3.0  # z-order of the first signal; later signals lie behind it
+_FAR_LIMIT = 3.0  # times the largest value of a curve, beyond which a limit does not scale its axis
 _SECOND_ALPHA = 0.55  # opacity of the second log, whose lines are also dashed
 
 
@@ -169,7 +170,14 @@ def _panel(axes: Any, shown: Sequence[_Shown], curves: Sequence[LogCurve], windo
         zorder = _ON_TOP - 0.1 * signals.index(curve.signal)
         _draw(axes, curve, curve.signal.title + whose, names.index(curve.log) > 0, zorder)
     for words, value in limits_of(shown[0].run, first.axis):
-        axes.axhline(value * first.factor, color=_SLIP, linewidth=0.6, linestyle="--", label=words)
+        shown_to = max(abs(axes.get_ylim()[0]), abs(axes.get_ylim()[1]))
+        far = (
+            value * first.factor > _FAR_LIMIT * shown_to
+        )  # the axis is the curve's; a limit beyond it is in the legend alone
+        at, label = (
+            (np.nan, f"{words}, {value * first.factor:.4g} {first.unit}") if far else (value * first.factor, words)
+        )
+        axes.axhline(at, color=_SLIP, linewidth=0.6, linestyle="--", label=label)
     if first.name == "drive_force_N":
         for number, log in enumerate(shown):
             _mark_slips(axes, log, window_s, second=number > 0, several=len(shown) > 1)

@@ -102,13 +102,15 @@ function drawOver(plot, panel, logs) {
   ctx.textAlign = "left";
   ctx.textBaseline = "alphabetic";
   for (const limit of panel.limits) {
-    const y = plot.valToPos(limit.value, "y", true), low = y > bbox.top + bbox.height / 2;
+    // a limit beyond the axis, which the curve scales, is named at its edge
+    const at = plot.valToPos(limit.value, "y", true), beyond = at < bbox.top ? ", above" : at > bbox.top + bbox.height ? ", below" : "";
+    const y = Math.min(Math.max(at, bbox.top), bbox.top + bbox.height), low = y > bbox.top + bbox.height / 2;
     ctx.setLineDash([8, 5]);
     ctx.beginPath();
     ctx.moveTo(bbox.left, y);
     ctx.lineTo(bbox.left + bbox.width, y);
     ctx.stroke();
-    ctx.fillText(`${limit.words}, ${Number(limit.value.toPrecision(4))} ${panel.unit}`, bbox.left + 8, y + (low ? -5 : 14) * devicePixelRatio);
+    ctx.fillText(`${limit.words}, ${Number(limit.value.toPrecision(4))} ${panel.unit}${beyond}`, bbox.left + 8, y + (low ? -5 : 14) * devicePixelRatio);
   }
   ctx.setLineDash([]);
   const size = 5 * devicePixelRatio;
@@ -128,10 +130,11 @@ function drawOver(plot, panel, logs) {
   ctx.restore();
 }
 
-/** Vertical range of a panel: all curves and limits, with a margin. */
+/** Vertical range of a panel: all curves, and the limits that are at most three times as large, with a margin. */
 function heightOf(panel) {
   return (plot, least, most) => {
-    const limits = panel.limits.map((limit) => limit.value);
+    const size = Math.max(Math.abs(least ?? 0), Math.abs(most ?? 0));
+    const limits = panel.limits.map((limit) => limit.value).filter((value) => !size || Math.abs(value) <= 3 * size);
     let low = Math.min(least ?? 0, ...limits), high = Math.max(most ?? 1, ...limits);
     if (["velocity", "amplitude", "time to slip"].includes(panel.axis)) low = Math.min(low, 0);
     const room = 0.08 * (high - low || Math.abs(high) || 1);

@@ -32,9 +32,9 @@ _MOST_EVENTS = 2000  # events listed per log
 def review_data(paths: Sequence[Path], made: Provenance) -> tuple[dict[str, Any], list[RunVerdict]]:
     """Data of the page, and the verdict of each log. Raises Fault BAD_LOG."""
     runs = [read_run(path) for path in paths]
-    grid = _grid(runs)
     judged = [judge_tables(run) for run in runs]
     verdicts = [verdict for verdict, _ in judged]
+    grid = _grid(runs, all(verdict.imported for verdict in verdicts))
     bands = [_bands(run, grid) for run in runs]
     data = {
         "format": FORMAT,
@@ -52,13 +52,17 @@ def review_data(paths: Sequence[Path], made: Provenance) -> tuple[dict[str, Any]
     return data, verdicts
 
 
-def _grid(runs: Sequence[RunData]) -> Grid:
-    """One grid for all logs: a bin per block, or wider bins for long runs."""
+def _grid(runs: Sequence[RunData], imported: bool) -> Grid:
+    """One grid for all logs: a bin per block, or per sample of imported logs, whose blocks are long; wider bins for long runs."""
     t_s = [run.sensors["t_ns"] * 1e-9 for run in runs if len(run.sensors)]
     if not t_s:
         return Grid(0.0, 1e-3, 1)
     start_s, end_s = min(float(times.min()) for times in t_s), max(float(times.max()) for times in t_s)
     step_s = min(block_period_ns(run.sensors) for run in runs if len(run.sensors)) * 1e-9
+    if imported:
+        samples = max(run.sensors["drive_force_N"].shape[1] for run in runs if len(run.sensors))
+        step_s /= samples
+        start_s -= (samples - 1) * step_s  # a block is stamped at its last sample
     if (end_s - start_s) / step_s > _MOST_BINS:
         step_s = (end_s - start_s) / (_MOST_BINS // len(runs))
     return Grid(start_s, step_s, math.floor((end_s - start_s) / step_s + 0.5) + 1)
@@ -69,6 +73,7 @@ def _log(run: RunData, verdict: RunVerdict, cycles: Cycles | None, label: str) -
         "label": label,
         "name": shown_name(run.path.name),
         "answer": headline(verdict),
+        "imported": verdict.imported,
         "good": None if verdict.imported and verdict.good else verdict.good,  # an import has no controller to judge
         "in_charge_from_s": verdict.enabled_from_s if verdict.enabled_from_s > 0 and not verdict.imported else None,
         "slips": []

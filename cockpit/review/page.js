@@ -3,6 +3,7 @@
 
 const data = JSON.parse(document.getElementById("data").textContent);
 const logs = data.logs;
+const controlled = logs.some((log) => !log.imported); // an imported log has no controller
 const axis = new TimeAxis(data.grid.start_s, data.grid.start_s + (data.grid.bins - 1) * data.grid.step_s);
 
 function answers() {
@@ -35,7 +36,7 @@ function differences() {
 
 function curves() {
   const x = Array.from({ length: data.grid.bins }, (_, at) => data.grid.start_s + at * data.grid.step_s);
-  document.getElementById("key").hidden = logs.length > 1;
+  document.getElementById("key").hidden = logs.length > 1 || !controlled;
   const step_ms = 1e3 * data.grid.step_s;
   document.getElementById("step").textContent = `${Number(step_ms.toPrecision(3))} ms`;
   for (const panel of data.panels) {
@@ -84,6 +85,7 @@ function zoom() {
 }
 
 function latency() {
+  if (!controlled) return;
   const with_ = logs.filter((log) => log.latency);
   into("latency", made("h2", "Latency: block to command"));
   if (!with_.length) {
@@ -97,6 +99,7 @@ function latency() {
 
 function events() {
   const all = logs.flatMap((log) => log.events.map((event) => ({ ...event, log: log.label }))).sort((one, other) => one.t_s - other.t_s);
+  if (!controlled && !all.length) return;
   const isPause = (event) => event.code.endsWith("PAUSE");
   const row = (event) => {
     const cells = [event.t_s.toFixed(3), ...(logs.length > 1 ? [event.log] : []), event.source, event.code, event.text, event.help];
@@ -121,7 +124,7 @@ function words() {
 
 function parameters() {
   const rows = data.parameters.map(({ key, value }) => made("tr", [made("td", key), made("td", value)]));
-  into("parameters", made("h2", "Parameters"), made("details", [made("summary", `all ${rows.length} of ${logs[0].name}`), table(["parameter", "value"], rows)]));
+  into("parameters", made("h2", controlled ? "Parameters" : "Import"), made("details", [made("summary", `all ${rows.length} of ${logs[0].name}`), table(["parameter", "value"], rows)]));
 }
 
 answers();

@@ -23,16 +23,7 @@ from pyarrow import feather
 from typer.testing import CliRunner
 
 from cockpit.cli import app
-
-T_S = np.arange(0, 4, 2e-3)
-_PHASE = T_S % 0.4
-FORCE_N = np.where(_PHASE < 0.37, 8 + 6 * _PHASE / 0.37, 11 + 3 * np.cos(np.pi * (_PHASE - 0.37) / 0.03))
-PLACE_MM = 1e3 * 1e-3 * T_S
-TOP_N, SLIPS = 14.0, 10
-
-
-def rows(*columns: Iterable[float], sep: str = ",", end: str = "\n") -> str:
-    return "".join(sep.join(f"{value:.6f}" for value in row) + end for row in zip(*columns, strict=True))
+from tests.unit.cockpit.files_of_others import FORCE_N, KINDS, PLACE_MM, SLIPS, T_S, TOP_N, Kind, rows
 
 
 def look(path: Path, *words: str) -> dict[str, Any]:
@@ -51,42 +42,6 @@ def is_right(seen: dict[str, Any], top: float = TOP_N, slips: int = SLIPS) -> No
     assert seen["numbers"]["static_force_N"]["value"] == pytest.approx(top, rel=0.01)
     assert abs(seen["slips"] - slips) <= 1
     assert seen["numbers"]["period_s"]["value"] == pytest.approx(0.4, rel=0.01)
-
-
-class Kind(NamedTuple):
-    """A file of a program, the words of the operator, and the force at breakaway in the file's unit."""
-
-    name: str
-    text: str
-    options: tuple[str, ...] = ()
-    top: float = TOP_N
-    unit: str = "N"
-    encoding: str = "utf-8"
-
-
-_TWINCAT = "Name\tscope\r\n\r\n\r\nName\tF\tName\tx\r\nSymbolComment\t\t\t\r\nSampleTime[ms]\t2\tSampleTime[ms]\t20\r\nUnit\tN (Force)\tUnit\tmm\r\n\r\n"
-_SLOW = [f"{20 * i:g}\t{20e-3 * i:.6f}" if 20 * i < 4000 else " \t " for i in range(len(T_S))]
-_STAMPS = [f"10:00:{s:06.3f}" for s in T_S]
-KINDS = [
-    Kind("twincat.csv", _TWINCAT + "".join(f"{1e3 * t:g}\t{f:.6f}\t{slow}\r\n" for t, f, slow in zip(T_S, FORCE_N, _SLOW, strict=True)), ("--force", "F")),
-    Kind("twincat-short-rows.csv", _TWINCAT + "".join(f"{1e3 * t:g}\t{f:.6f}" + (f"\t{slow}\r\n" if slow.strip() else "\r\n") for t, f, slow in zip(T_S, FORCE_N, _SLOW, strict=True))),
-    Kind("scope.csv", "X,CH1,Start,Increment,\nSequence,Volt,0.0,2.0e-3\n" + "".join(f"{i},{f / 10:.4f},\n" for i, f in enumerate(FORCE_N)), ("--force", "CH1"), TOP_N / 10, "V"),
-    Kind("keysight.csv", "x-axis,1,2\nsecond,Volt,Volt\n" + rows(T_S - 2, FORCE_N / 10, PLACE_MM), ("--force", "1"), TOP_N / 10, "V"),
-    Kind("plotter.txt", "".join(f"{s} -> F:{f:.3f},x:{x:.4f}\n" for s, f, x in zip(_STAMPS, FORCE_N, PLACE_MM, strict=True)), ("--force", "F")),
-    Kind("labels.txt", "".join(f"t={1e3 * t:.0f} ms  F={f:.3f} N\n" for t, f in zip(T_S, FORCE_N, strict=True))),
-    Kind("words.log", "Sampling period is 2000000 ns\n" + "".join(f"hm2.force {f:+.9f} pos-fb {x:+.9f}\n" for f, x in zip(FORCE_N, PLACE_MM, strict=True)), ("--force", "hm2.force")),
-    Kind("millis.csv", "millis,force_N\n" + "".join(f"{2 * i},{f:.4f}\n" for i, f in enumerate(FORCE_N))),
-    Kind("overflow.csv", "micros,force_N\n" + "".join(f"{(2**32 - 2_000_000 + 2000 * i) % 2**32},{f:.4f}\n" for i, f in enumerate(FORCE_N))),
-    Kind("percent.csv", "time_s,torque_percent,position_mm\n" + rows(T_S, 2 * FORCE_N, PLACE_MM), ("--force", "torque_percent"), 2 * TOP_N, "%"),
-    Kind("ampere.csv", "time_s,motor_current_A,position_mm\n" + rows(T_S, FORCE_N / 7, PLACE_MM), (), TOP_N / 7, "A"),
-    Kind("pounds.csv", "t [s],torque [lb-ft],angle [deg]\n" + rows(T_S, FORCE_N / 1.3558179483, PLACE_MM), (), TOP_N, "N m"),
-    Kind("long.csv", "Timestamp;Name;Value\n" + "".join(f"2026-03-01 10:00:{t:09.6f};F;{f:.5f}\n2026-03-01 10:00:{t:09.6f};x;{x:.6f}\n" for t, f, x in zip(T_S, FORCE_N, PLACE_MM, strict=True)), ("--force", "F")),
-    Kind("lines.jsonl", "".join(json.dumps({"t": t, "force_N": f}) + "\n" for t, f in zip(T_S.tolist(), FORCE_N.tolist(), strict=True))),
-    Kind("gbk.csv", "时间(s),摩擦力(N),位移(mm)\n" + rows(T_S, FORCE_N, PLACE_MM), ("--force", "摩擦力(N)"), encoding="gb18030"),
-    Kind("polish.csv", "Czas [s];Siła tarcia [N]\n" + rows(T_S, FORCE_N, sep=";"), ("--force", "Siła tarcia [N]"), encoding="cp1250"),
-    Kind("russian.csv", "Время, с;Сила трения, Н\n" + rows(T_S, FORCE_N, sep=";"), ("--force", "Сила трения, Н"), encoding="cp1251"),
-    Kind("sjis.csv", "時間[s],荷重[N]\n" + rows(T_S, FORCE_N), ("--force", "荷重[N]"), encoding="shift_jis"),
-]  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
@@ -238,6 +193,36 @@ def test_a_rate_replaces_a_time_and_says_so(tmp_path: Path) -> None:
     seen = look(tmp_path / "a.csv", "--rate", "1kHz")
     assert seen["numbers"]["period_s"]["value"] == pytest.approx(0.2, rel=0.01)
     assert "column t [s] is not used as the time: the rate of 1000 Hz replaces it" in found(seen)
+
+
+_AREA_M2 = 1.2e-3
+PRESSURES = "t [s],pA [bar],pB [bar],x [mm]\n" + rows(T_S, 2.0 + FORCE_N / _AREA_M2 / 1e5, 2.0 + 0.0 * T_S, PLACE_MM)
+
+
+def test_a_force_comes_from_two_pressures(tmp_path: Path) -> None:
+    """By the command line, by the map that it writes, and by a map with the keys of a rig file."""
+    path, saved, map_path = tmp_path / "cylinder.csv", tmp_path / "saved.toml", tmp_path / "map.toml"
+    path.write_text(PRESSURES)
+    seen = look(path, "--force", "1.2e-3 * (pA - pB)", "--out", str(saved))
+    is_right(seen)
+    assert "derived: from pA [bar], pB [bar], each in its SI unit" in found(seen)
+    is_right(look(path, "--map", str(saved)))
+    map_path.write_text(
+        '[numbers]\narea = 1.2e-3\n[channels]\nt_s = "t [s]"\ndrive_force_N = { derive = "area * (pA - pB)" }\n'
+    )
+    is_right(look(path, "--map", str(map_path)))
+    assert "column 1.2e-3 * (pA - pC): not in the file" in look(path, "--force", "1.2e-3 * (pA - pC)")["line"]
+    map_path.write_text('[channels]\ndrive_force_N = { derive = "area * (pA -" }\n')
+    assert "channels.drive_force_N: derive: character" in look(path, "--map", str(map_path))["line"]
+
+
+def test_an_import_asks_about_results_that_no_rig_has(tmp_path: Path) -> None:
+    path = tmp_path / "whole.csv"
+    path.write_text("time,F [N]\n" + "".join(f"{2 * i},{force:.3f}\n" for i, force in enumerate(FORCE_N)))
+    words = ["log", "import", str(path), "--out", str(tmp_path / "run.mcap"), "--json"]
+    line = json.loads(CliRunner().invoke(app, words).stdout)["line"]
+    assert 'add --time "time [ms]"' in line
+    assert CliRunner().invoke(app, [*words, "--time", "time [ms]"]).exit_code == 0
 
 
 def convert_command(line: str) -> list[str]:

@@ -193,6 +193,24 @@ KINDS = (
     Kind("two-rates.tdms", _tdms(Force={"wf_increment": 2e-3}, Temperature={"wf_increment": 1.0}), ("", "Force", "")),
     Kind("start-offset.tdms", _tdms(Force={"wf_increment": 2e-3}, Position={"wf_increment": 2e-3, "wf_start_offset": 0.05}), ("", "Force", "Position"), slice(25, 1000), says="begins 0.05 s later"),
 )  # fmt: skip
+# the programs of docs/reference/programs.md, by the file that is written as they write it
+PROGRAMS = {
+    "german-excel.csv": "Excel, CSV with decimal commas",
+    "book.xlsx": "Excel, LibreOffice: workbooks",
+    "klipper.csv": "Klipper, raw data of an accelerometer",
+    "halsampler.txt": "LinuxCNC halsampler",
+    "catman.csv": "HBM catman, ASCII",
+    "labview.lvm": "LabVIEW, .lvm",
+    "two-rates.tdms": "LabVIEW, TDMS",
+    "plotjuggler.csv": "PlotJuggler, CSV",
+    "rosbag.csv": "rostopic echo -p, CSV of ROS 1",
+    "sec-nanosec.csv": "ros2 topic echo --csv",
+    "ros.mcap": "ROS 2, rosbag2 in MCAP",
+    "dspace-names.mat": "dSPACE ControlDesk, .mat",
+    "v73.mat": "MATLAB v7.3",
+    "record.h5": "HDF5 of h5py and PyTables",
+    "struct.parquet": "Parquet of pandas, Polars and Arrow",
+}
 
 
 def write(kind: Kind, folder: Path) -> Path:

@@ -36,12 +36,36 @@ def test_a_good_folder(tmp_path: Path) -> None:
         assert (values == data[name]).all()
 
 
+def test_a_run_states_how_its_file_is_written_its_piece_and_its_derived_force(tmp_path: Path) -> None:
+    """The keys are those of a channel map and of `look`: [source] with a rate, `piece`, `derive` with [numbers]."""
+    data = columns()
+    pressure_Pa = data["drive_force_N"] / 1.2e-3
+    rows = [f"{1e-5 * p:.9f};{1e3 * x:.9f}" for p, x in zip(pressure_Pa, data["drive_position_m"], strict=True)]
+    path = folder(tmp_path, data)
+    head = "Kräft [bar];s [mm]"
+    (path / "run-01.csv").write_text("\n".join([head, *(2 * [*rows, head])][:-1]) + "\n", encoding="cp1252")
+    manifest = (path / "manifest.toml").read_text().replace("run-01.parquet", "run-01.csv")
+    rate_Hz = 1.0 / float(np.diff(data["t_s"]).mean())
+    keys = f'piece = 2\nsource = {{ encoding = "cp1252", sample_rate_Hz = {rate_Hz!r}, delimiter = ";" }}\n'
+    channels = (
+        '[channels]\ndrive_force_N = { derive = "area * Kräft" }\ndrive_position_m = "s"\n[numbers]\narea = 1.2e-3\n'
+    )
+    manifest = manifest.replace("[[run]]\n", f"{channels}[[run]]\n{keys}")
+    (path / "manifest.toml").write_text(manifest)
+    (run,) = load_evidence(path).runs
+    assert run.file == "run-01-2.csv"
+    assert run.columns["drive_force_N"] == pytest.approx(data["drive_force_N"], abs=1e-3)
+    (path / "manifest.toml").write_text(manifest.replace("piece = 2\n", ""))
+    with pytest.raises(Fault, match="holds 2 runs, and must hold one; give piece = 1"):
+        load_evidence(path)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
         ('"evidence/1"', '"evidence/2"', "manifest.toml: format = 'evidence/2': must be"),
         ('format = "evidence/1"', "", "manifest.toml: format: missing"),
-        ("[[run]]", "[[runs]]", ": unknown key; perhaps run; known here: channels, format, rig, run"),
+        ("[[run]]", "[[runs]]", ": unknown key; perhaps run; known here: channels, format, numbers, rig, run"),
         ('"spring"', '"springs"', "manifest.toml: rig.drive = 'springs'"),
         ('"spring"', '"force"', 'rig: drive_stiffness_N_per_m: unknown with drive = "force"'),
         ("drive_stiffness_N_per_m = 11700.0", "", "rig: drive_stiffness_N_per_m: missing"),

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from diagnosis.look.creep import climb_of, fitted, limit_of
 from diagnosis.look.look import LookResult, RecordFacts, look
 from diagnosis.look.slip_shape import StackedFalls, shape_of
 from diagnosis.look.words import limits_of_look
@@ -120,6 +121,27 @@ def test_intervals_hold_the_truth_nine_times_in_ten() -> None:
         number = seen.numbers["swing_N"]
         held += number.low <= 5.0 <= number.high
     assert 11 <= held <= 16
+
+
+@pytest.mark.parametrize("noise_N", [0.0, 0.02])
+def test_a_stick_that_ends_below_the_limit_of_the_friction_shows_it(noise_N: float) -> None:
+    """Dahl's contact on a spring, loaded to 95 % of its limit of 10 N, where a creeping slide breaks away."""
+    random, fine_N = np.random.default_rng(3), np.linspace(6.0, 9.5, 5000)
+    way_m = fine_N / 1e4 - 10.0 / 3e5 * np.log(1.0 - fine_N / 10.0)
+    t_s = np.linspace(way_m[0], way_m[-1], 2000)
+    climbs = [
+        climb_of(t_s, np.interp(t_s, way_m, fine_N) + noise_N * random.standard_normal(len(t_s))) for _ in range(12)
+    ]
+    limit = limit_of([(climb, 9.5) for climb in climbs if climb is not None])
+    assert limit is not None
+    assert limit.value == pytest.approx(10.0 / 9.5, rel=0.01)
+    assert climbs[0] is not None
+    fit = fitted(climbs[0], 1.0, np.array([10.0]))
+    assert fit.drive_m_per_N[0] == pytest.approx(1e-4, rel=0.03)
+    assert fit.contact_m_per_N[0] == pytest.approx(1.0 / 3e5, rel=0.1)
+    straight = climb_of(t_s, np.linspace(6.0, 9.5, len(t_s)) + 0.02 * random.standard_normal(len(t_s)))
+    assert straight is not None
+    assert limit_of([(straight, 9.5)] * 4) is None
 
 
 def test_a_harmonic_swing_and_noise_are_not_taken_for_stick_slip() -> None:
