@@ -127,7 +127,7 @@ LOCK = uv pip compile pyproject.toml --universal --python-version 3.11 --generat
 lock: ## needs uv
 	$(LOCK) --extra editable --output-file requirements.lock
 	$(LOCK) --extra dev --constraint requirements.lock --output-file requirements-dev.lock
-	$(LOCK) --extra bench --extra viewers --constraint requirements-dev.lock --output-file requirements-nightly.lock
+	$(LOCK) --extra bench --extra fmi --extra viewers --constraint requirements-dev.lock --output-file requirements-nightly.lock
 
 proto: $(READY) ## after a change of a .proto file
 	$(BIN)/python -m grpc_tools.protoc -I bridge/wire --python_out=bridge/wire --pyi_out=bridge/wire \

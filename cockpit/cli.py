@@ -111,6 +111,12 @@ _PANELS: dict[str, dict[str, tuple[str, ...]]] = {
             "stickslip test tests/ --jobs 4 --junit results.xml",
             "stickslip test limits.toml --log runs/old.mcap",
             "stickslip test --mutants",
+            "stickslip test --rig my-axis.toml --arm",
+        ),
+        "fmu": (
+            "fmu.fmu",
+            "stickslip fmu paper-c45-c45 --out rig.fmu",
+            "stickslip fmu belt-axis --set slide.mass_kg=2.0 --out heavy.fmu",
         ),
         "fault": (
             "proof.fault",

@@ -84,7 +84,7 @@ def is_real(name: str, settings: Sequence[str]) -> bool:
 
 def load_device_run(name: str, settings: list[str]) -> tuple[DeviceRun, Path]:
     """A run of a real rig by scenario and settings, and the folder of its rig file. Raises Fault CONFIG."""
-    of_rig = [setting for setting in settings if setting.startswith(RIG_FILE)]
+    of_rig = [setting for setting in settings if setting.startswith((RIG_FILE, "arm="))]
     _, source, folder = _tables(name, settings)
 
     def make(given: Sequence[str]) -> DeviceRun:

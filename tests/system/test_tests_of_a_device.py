@@ -25,7 +25,7 @@ def test_the_same_tests_run_on_a_device(tmp_path: Path) -> None:
         rig = written(tmp_path, port)
         status, text = call(TESTS / "stop.toml", TESTS / "kill.toml", "--rig", rig, "--arm")
         assert (status, text.count("PASSED   ")) == (0, 2), text
-        status, text = call(TESTS / "limits.toml", "--rig", rig, "--logs", tmp_path, "--set", "duration_s=1.0")
+        status, text = call(TESTS / "limits.toml", "--rig", rig, "--logs", tmp_path, "--set", "duration_s=1.1")
         assert "FAILED" in text  # without --arm it never vibrates
         status, text = call(TESTS / "load-step.toml", TESTS / "clip.toml", TESTS / "reverse.toml", "--rig", rig)
         assert status == 14
