@@ -1,15 +1,12 @@
 """The log evidence of a fit: its remainders in the fitted and the kept runs, and the cost of its free numbers."""
 
 import math
-from typing import Final
 
 import numpy as np
 
 from bridge.arrays import Floats
-from diagnosis.fits.fit import Fit, prior_of
+from diagnosis.fits.fit import NOISE, Fit, prior_of
 
-# chi2 that a right explanation leaves of one compared feature: floors hold more than noise.
-NOISE: Final = 0.25
 # Independent differences for each compared feature, as features share their errors. Half: small effects get no name. Twice: rigs
 # without a gap get names.
 _INDEPENDENT = 0.2

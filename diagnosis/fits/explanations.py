@@ -9,8 +9,8 @@ import numpy as np
 from bridge.arrays import Floats
 from diagnosis.fits.baseline import Baseline, Progress
 from diagnosis.fits.batch import Work, together
-from diagnosis.fits.evidence import NOISE, cost_of_freedom, of_remainder
-from diagnosis.fits.fit import Fit
+from diagnosis.fits.evidence import cost_of_freedom, of_remainder
+from diagnosis.fits.fit import NOISE, Fit
 from diagnosis.fits.gauss_newton import FAR_KNEE, Fitter
 from diagnosis.fits.refits import best_of_each, each_beside, refits
 from diagnosis.fits.screening import Screened, Screening

@@ -1,6 +1,6 @@
 """A fit: values of nuisances and effect, how well the model matches the runs there, and the Newton step from there."""
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -8,6 +8,12 @@ import numpy.typing as npt
 from bridge.arrays import Floats
 from diagnosis.hypotheses.hypothesis import Hypothesis
 from diagnosis.model.rig import Effects
+
+# chi2 that a right explanation leaves of one compared feature: floors hold more than noise.
+NOISE: Final = 0.25
+# Weight of a feature's square, over the square that the fit leaves, in the covariance: features share errors, and chi2 has many
+# valleys. Numbers of 59 simulated rigs within their 90 % interval: 0.2 holds 63 %, 0.02 83 %, 0.01 86 %.
+_CERTAINTY = 0.02
 
 
 class Fit(NamedTuple):
@@ -31,10 +37,9 @@ class Fit(NamedTuple):
 
         Raises numpy.linalg.LinAlgError when the columns hold values that are not finite.
         """
-        prior = np.concatenate(
-            [np.ones(len(self.deviations)), [coordinate.prior**-2 for coordinate in self.hypothesis.coordinates]]
-        )
-        result: Floats = np.linalg.inv(self.columns.T @ self.columns + np.diag(prior))
+        prior = np.diag(prior_of(self.hypothesis, self.deviations) ** 2)
+        left = max(self.chi2 / max(len(self.residual), 1), NOISE)
+        result: Floats = np.linalg.inv(self.columns.T @ self.columns * _CERTAINTY / left + prior)
         return result
 
 

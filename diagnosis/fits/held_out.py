@@ -17,7 +17,6 @@ from diagnosis.gap.problem import Problem
 from diagnosis.model.per_run import has_own_phases
 
 _REPLICATES = 24  # for the floor of the held-out runs. Fewer: it is uncertain. More: 0.01 s of CPU each
-_DRAWS = 8  # of a fit's parameters
 _RESAMPLES = 400  # of the cells
 _SEED = 3  # of the replicates and of the intervals
 _SMALLEST_GAP = 0.05  # above the floor: less leaves nothing to divide by
@@ -68,14 +67,19 @@ class HeldOut:
         ]
 
     def closed_by(self, fit: Fit) -> GapLeft:
-        """The gap under a fit, with an interval from the spread over cells and the fit's own uncertainty."""
-        random = np.random.default_rng(_SEED)
-        at = np.concatenate([fit.deviations, fit.w])
-        spread = np.linalg.cholesky(fit.covariance() + 1e-12 * np.eye(len(at)))
-        moved = [at, *(at + spread @ random.normal(size=len(at)) for _ in range(_DRAWS))]
-        count = len(fit.deviations)
-        drawn = self._squares([fit._replace(deviations=vector[:count], w=vector[count:]) for vector in moved])
-        return self._closed(drawn)
+        """The gap under a fit; the interval of its share is the spread over cells."""
+        (squares,) = self._squares([fit])
+        gap = self._gap(squares)
+        if not self.retuned - 1.0 >= _SMALLEST_GAP:  # no number where nothing can be compared
+            return GapLeft(gap, None, None)
+        shrinkage = (self.retuned - gap) / (self.retuned - 1.0)
+        picks = np.random.default_rng(_SEED).integers(len(squares), size=(_RESAMPLES, len(squares)))
+        before, after = (np.sqrt(values[picks].mean(axis=1)) for values in (self._retuned, squares))
+        gaps = before - 1.0 > _SMALLEST_GAP
+        if 2 * gaps.sum() < _RESAMPLES:
+            return GapLeft(gap, shrinkage, None)
+        low, high = np.quantile((before - after)[gaps] / (before - 1.0)[gaps], (0.05, 0.95))
+        return GapLeft(gap, shrinkage, (float(min(low, shrinkage)), float(max(high, shrinkage))))
 
     def left_by(self, fit: Fit) -> float:
         """The gap under a fit, in floors."""
@@ -94,25 +98,6 @@ class HeldOut:
         point = self._nuisances.point(best.deviations, effects)
         drawn = replicates(self.problem, point, self._rig.surface, _REPLICATES, _SEED, self._jobs)
         return floor_of(self.problem, point, drawn, before)
-
-    def _closed(self, drawn: list[Floats]) -> GapLeft:
-        gap = self._gap(drawn[0])
-        if not self.retuned - 1.0 >= _SMALLEST_GAP:  # no number where nothing can be compared
-            return GapLeft(gap, None, None)
-        random = np.random.default_rng(_SEED)
-        cells = len(drawn[0])
-        shares: list[float] = []
-        for number in range(_RESAMPLES):
-            pick = random.integers(cells, size=cells)
-            before = self._gap(self._retuned[pick])
-            after = self._gap(drawn[number % len(drawn)][pick])
-            if before - 1.0 > _SMALLEST_GAP:
-                shares.append((before - after) / (before - 1.0))
-        shrinkage = (self.retuned - gap) / (self.retuned - 1.0)
-        if len(shares) < _RESAMPLES // 2:
-            return GapLeft(gap, shrinkage, None)
-        low, high = np.quantile(shares, (0.05, 0.95))
-        return GapLeft(gap, shrinkage, (float(min(low, shrinkage)), float(max(high, shrinkage))))
 
     def _squares(self, fits: Sequence[Fit]) -> list[Floats]:
         """The square of every cell in floors, under points of one hypothesis [cells]; 1 on average under a right model."""

@@ -5,9 +5,9 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
-from diagnosis.fits.evidence import NOISE, cost_of_freedom, of_remainder
+from diagnosis.fits.evidence import cost_of_freedom, of_remainder
 from diagnosis.fits.explanations import Search
-from diagnosis.fits.fit import Fit
+from diagnosis.fits.fit import NOISE, Fit
 from diagnosis.judge.relations import SAME_SIZE, evidence_in
 from diagnosis.latent.answer import LatentSignal
 from diagnosis.model.per_run import is_phase

@@ -9,7 +9,7 @@ import pytest
 
 from diagnosis.evidence.folder import load_evidence
 from diagnosis.fits.baseline import baseline_of
-from diagnosis.fits.evidence import NOISE
+from diagnosis.fits.fit import NOISE
 from diagnosis.gap.prepare import prepare
 from diagnosis.gap.problem import Problem
 from tests.blind.generator import Case, make, runs

@@ -5,7 +5,7 @@ import pytest
 
 from diagnosis.features.feature import BOW
 from diagnosis.fits.baseline import baseline_of
-from diagnosis.fits.evidence import NOISE
+from diagnosis.fits.fit import NOISE
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.model.rig import rig_config

@@ -31,9 +31,10 @@ def test_a_wave_of_unknown_phase_is_measured_by_its_wider_floor() -> None:
     assert held_out._squares([fit_of(LOAD)])[0] == pytest.approx(exactly, rel=0.1)
 
 
-def test_without_compared_features_the_shrinkage_is_unknown() -> None:
+def test_without_compared_features_the_shrinkage_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
     held_out = HeldOut.__new__(HeldOut)
+    monkeypatch.setattr(HeldOut, "_squares", lambda _self, _fits: [np.zeros(0)])
     held_out.retuned = HeldOut._gap(np.zeros(0))
-    closed = held_out._closed([np.zeros(0)])
+    closed = held_out.closed_by(fit_of(NOTHING))
     assert math.isnan(closed.gap)
     assert closed.shrinkage is closed.interval_90 is None
