@@ -71,7 +71,7 @@ def test_a_promise_is_worth_less_than_a_fit() -> None:
 @pytest.mark.parametrize(
     "rest",
     [
-        ledger(row("", "fit", 0.0, 2.0), row("", "kept runs", 0.0, 8.0)),
+        ledger(row("", "fit", 0.0, 4.0), row("", "kept runs", 0.0, 4.0)),
         ledger(NOTHING, beyond=0.9),
         ledger(NOTHING, foreign=True),
     ],
