@@ -11,7 +11,7 @@ from bridge.rig.file import DeviceRig
 
 _REMEDIES = {
     "shape": "return float64 [channels, samples_per_block], as [converter] states",
-    "numbers": "count the blocks of the device, and report lost and waiting ones",
+    "numbers": "take all that the driver holds, then report lost blocks, and as waiting those behind this one",
     "rate": "correct converter.sample_rate_Hz, or the clock of the device",
     "repeated": "return each block once, then None until the next one",
     "amplitude": "correct stroke_m_per_V, the scale of base_accel_mps2, or guard.exciter_gain",
