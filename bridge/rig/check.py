@@ -94,7 +94,7 @@ class _Heard:
 
 def check(device: Device, rig: DeviceRig, seconds: float) -> RigCheck:
     """Check an open device for a time, with its exciter at rest."""
-    heard = _listen(device, seconds)
+    heard = _listen(device, rig.exciter.frequency_max_Hz, seconds)
     blocks = len(heard.samples)
     raw = Derived(rig)(np.concatenate(heard.samples, axis=1) if blocks else np.empty((rig.sources, 0)))
     rate_Hz, gap_s = _rate(device, heard)
@@ -116,12 +116,12 @@ def check(device: Device, rig: DeviceRig, seconds: float) -> RigCheck:
     )
 
 
-def _listen(device: Device, seconds: float) -> _Heard:
+def _listen(device: Device, frequency_Hz: float, seconds: float) -> _Heard:
     heard = _Heard()
     until_s, begun = time.monotonic() + seconds, False
     try:
         while time.monotonic() < until_s:
-            device.write(1.0, 0.0)
+            device.write(frequency_Hz, 0.0)  # within its range, as a generator refuses another
             block = device.read()
             problems = device.problems()
             begun = begun or (block is not None and not block.waiting)  # not with blocks from before
@@ -167,7 +167,9 @@ def _of_device(device: Device, heard: _Heard, rate_Hz: float, gap_s: float) -> l
         problems.append(Problem("device", f"{heard.lost} blocks were lost", "lower its rate, or use a faster link"))
     if gap_s > _JITTER_BLOCKS * device.block_s:
         text = f"a block came {gap_s * 1e3:.0f} ms after the one before"
-        problems.append(Problem("device", text, "end other programs, or shorten the device's own buffer"))
+        problems.append(
+            Problem("device", text, "end other programs, shorten the device's own buffer, or set TCP_NODELAY in it")
+        )
     return problems
 
 

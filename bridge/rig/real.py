@@ -45,6 +45,8 @@ def open_node(
     device = device_of(rig, folder)
     guard = build(rig.guard, _exciter(rig), run, arm, absent=absent(rig.channels), derived=rig.derived)
     injected = Faults(faults, seed, rig.converter.block_s, rig.converter.samples_per_block)
+    node = DeviceNode(device, guard, injected, calibration(rig), rig.exciter.stroke_m_per_V or 1.0, Derived(rig))
+    node.warm_up()  # before a device samples: its buffers overflow while kernels compile
     try:  # an adapter may be foreign code
         device.open()
         try:
@@ -54,7 +56,7 @@ def open_node(
             raise
     except Exception as error:
         raise Fault("NO_DEVICE", f"{rig.name}: {reason_of(error)}") from None
-    return DeviceNode(device, guard, injected, calibration(rig), rig.exciter.stroke_m_per_V or 1.0, Derived(rig))
+    return node
 
 
 def _hear_first_block(device: Device) -> None:

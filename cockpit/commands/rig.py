@@ -49,10 +49,12 @@ def rig_check(
     from bridge.rig.check import check
     from bridge.rig.device import reason_of
     from bridge.rig.load import device_of
+    from bridge.wire import realtime
     from cockpit.run.device_run import load_device_rig
 
     made, folder = load_device_rig(rig, shared.settings)
     device = device_of(made, folder)
+    realtime.claim(realtime.core(0))
     try:  # an adapter may be foreign code
         device.open()
         try:
