@@ -82,7 +82,7 @@ class Table:
         raise Fault("BAD_TABLE", f"{self.path.name}: column {wanted}: not in the file; known here: {known}")
 
     def _derive(self, text: str) -> bool:
-        """Add the column of a formula, in SI units, with the clock of its first column; False for a text that is no formula."""
+        """Add the column of a formula, in SI units, with the clock of its first column; False for other texts."""
         try:
             formula = Formula(text)
             sources = [self.find(name) for name in sorted(formula.names)] if not Formula.is_name(text) else []

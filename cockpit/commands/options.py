@@ -121,7 +121,12 @@ class FileOptions(NamedTuple):
     mass: Annotated[str, typer.Option(help="Known mass of the slide, e.g. 1.5kg; compared with the estimate.")] = ""
     rate: Annotated[str, typer.Option(help="Sampling rate, e.g. 1kHz; replaces a time column.")] = ""
     time: Annotated[str, typer.Option(help='Time column; with its unit if it states none: "T [ms]".')] = ""
-    force: Annotated[str, typer.Option(help="Force column, or a motor current, torque or following error.")] = ""
+    force: Annotated[
+        str,
+        typer.Option(
+            help="Force column or formula: '1.2e-3 * (pA - pB)'; or a motor current, torque or following error."
+        ),
+    ] = ""
     position: Annotated[str, typer.Option(help="Column of the drive's position.")] = ""
     piece: Annotated[
         int | None, typer.Option(min=1, help="One piece of a file whose time begins again; all if not given.")

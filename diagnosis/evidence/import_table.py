@@ -109,9 +109,9 @@ def import_columns(
     findings, refused = list(read.findings), list[Fault]()
     for number in range(1, count + 1) if piece is None else [piece]:
         inside = piece_of(read.columns["t_s"], read.starts_s, number, path.name)
-        columns = {key: values[inside] for key, values in read.columns.items()}
-        name, target = path, out
+        columns, name, target = read.columns, path, out
         if count > 1:
+            columns = {key: values[inside] for key, values in columns.items()}
             name = path.with_name(f"{path.stem}-{number}{path.suffix}")
             target = out.with_name(f"{out.stem}-{number}.mcap") if out.suffix == ".mcap" else out
         try:

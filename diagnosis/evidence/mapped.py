@@ -96,7 +96,7 @@ def piece_of(t_s: Floats, starts_s: Sequence[float], piece: int, file: str) -> B
     starts_s = (-np.inf, *starts_s[1:], np.inf)
     if not 1 <= piece < len(starts_s):
         raise Fault("CONFIG", f"--piece {piece}: must be from 1 to {len(starts_s) - 1}, the pieces of {file}")
-    return ~((t_s < starts_s[piece - 1]) | (t_s >= starts_s[piece]))
+    return (t_s >= starts_s[piece - 1]) & (t_s < starts_s[piece])
 
 
 def _sampled(times_s: Floats, values: Floats) -> Sampled:

@@ -31,7 +31,7 @@ class Fit(NamedTuple):
 
     drive_m_per_N: Floats
     contact_m_per_N: Floats
-    left: Floats  # sum of squares that the fit leaves, as a share of that of the way
+    left: Floats  # sum of squares that the fit leaves, over the sum of squares of the way
 
 
 def climb_of(t_s: Floats, force_N: Floats) -> Climb | None:

@@ -33,8 +33,8 @@ _OF_SPRING = ("series_N_per_m", "stiffness_N_per_m", "mass_kg")  # numbers that 
 _TURNING = {"N": "N m", "N/s": "N m/s", "N/m": "N m/rad", "kg": "kg m²", "N per decade": "N m per decade"}
 
 # Errors that all slips of a record share, so that their scatter does not show them. From 16 axes of `bench.control.drawn` at 1
-# and 10 kHz and 43 rigs of `tests.look`, half with a damped drive, against the numbers of the friction law; 24 other axes are in
-# docs/guides/look.md. Larger: wider intervals, which hold more often.
+# and 10 kHz and 43 rigs of `tests.look`, half with a damped drive, against the numbers of the friction law; others are in
+# tests/look/test_intervals.py. Larger: wider intervals, which hold more often.
 # F_s may be lower, in rises of the force until the slide is as fast as its drive (0 to 0.43 on the axes), and higher, as a share
 # of F_s - F_k (creep: 0.04 in the middle, 0.5 on the softest contact).
 _FALLS_SLOWLY, _CREEPS = 0.4, 0.06

@@ -164,6 +164,9 @@ class Refused(NamedTuple):
 
 
 REFUSED = [
+    Refused("piece.csv", "t [s],F [N]\n" + 2 * rows(T_S[:HALF], FORCE_N[:HALF]), ("--piece", "9"), "--piece 9: must be from 1 to 2", ("--piece", "1")),
+    Refused("speed.csv", "t [s],F [N]\n" + rows(T_S, FORCE_N), ("--speed", "0.5"), "has no unit, such as m/s; write for example --speed 0.5mm/s", ("--speed", "0.5mm/s")),
+    Refused("mass.csv", "t [s],F [N]\n" + rows(T_S, FORCE_N), ("--mass", "1.5N"), "must be a mass above 0; write for example --mass 1.5kg", ("--mass", "1.5kg")),
     Refused("no-time.csv", "F [N],a\n" + rows(FORCE_N, 5.0 + FORCE_N**2), ("--force", "F"), "no time: which column is the time", ("--rate", "500Hz")),
     Refused("no-force.csv", "t [s],p,q\n" + rows(T_S, FORCE_N, np.sin(T_S)), (), 'which column is the force? add --force "NAME"', ("--force", "p")),
     Refused("unit.csv", "Time [shake],F [N]\n" + rows(T_S, FORCE_N), (), "'shake' is not a known unit of time; add --rate 1kHz", ("--rate", "500Hz")),
@@ -193,6 +196,25 @@ def test_a_rate_replaces_a_time_and_says_so(tmp_path: Path) -> None:
     seen = look(tmp_path / "a.csv", "--rate", "1kHz")
     assert seen["numbers"]["period_s"]["value"] == pytest.approx(0.2, rel=0.01)
     assert "column t [s] is not used as the time: the rate of 1000 Hz replaces it" in found(seen)
+
+
+@pytest.mark.parametrize(
+    ("column", "every", "options", "line", "remedy"),
+    [
+        ("F [N]", 1, (), "the speed of the drive is unknown; add --speed 0.5mm/s", ("--speed", "0.5mm/s")),
+        ("F [N]", 5, ("--speed", "1mm/s"), "too short to estimate the mass of the slide; add --mass 1.5kg", ("--mass", "1.5kg")),
+        ("mu", 1, ("--speed", "1mm/s"), "the force is unknown; add --load 94.5N", ("--load", "94.5N")),
+    ],
+)  # fmt: skip
+@pytest.mark.slow
+def test_the_remedy_of_an_import_works(
+    tmp_path: Path, column: str, every: int, options: tuple[str, ...], line: str, remedy: tuple[str, ...]
+) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text(f"t [s],{column}\n" + rows(T_S[::every], FORCE_N[::every]))
+    words = ["log", "import", str(path), "--out", str(tmp_path / "ev"), "--json", *options]
+    assert line in json.loads(CliRunner().invoke(app, words).stdout)["line"]
+    assert CliRunner().invoke(app, [*words, *remedy]).exit_code == 0
 
 
 _AREA_M2 = 1.2e-3
