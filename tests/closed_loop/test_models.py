@@ -58,7 +58,7 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 def test_the_same_tests_run_on_a_model(fmu: Path, tmp_path: Path) -> None:
-    """Two of them; those of a box run all that a device can run."""
+    """Two of them; the tests of a box run all that a device can run."""
     rig = written(fmu.parent)
     paths = [deploy_folder() / "tests" / f"{name}.toml" for name in ("stop", "kill")]
     cases, _ = cases_of(paths, [], Target(str(rig), arm=True))

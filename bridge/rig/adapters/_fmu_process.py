@@ -1,4 +1,4 @@
-"""`python -m bridge.rig.adapters._fmu_process SETTINGS`: a model in its own process, with numpy and FMPy alone, which load fast.
+"""`python -m bridge.rig.adapters._fmu_process SETTINGS`: a model in a separate process, with numpy and FMPy alone.
 
 For each order, two float64 (frequency, amplitude), it answers with the float64 samples of the block, [outputs][samples]. It ends
 with a line on stderr that gives the reason.
@@ -22,7 +22,7 @@ _HEAD_BYTES = 1 << 16  # part of the description in which its version is
 
 
 class Model:
-    """The model in its own process. Raises ValueError for one that does not fit the settings."""
+    """The running model. Raises ValueError if it does not fit the settings."""
 
     def __init__(self, settings: dict[str, Any], folder: str) -> None:
         from fmpy import extract, read_model_description
@@ -31,8 +31,8 @@ class Model:
 
         kinds = {"2.0": FMU2Slave, "3.0": FMU3Slave}
         with zipfile.ZipFile(settings["file"]) as archive, archive.open("modelDescription.xml") as file:
-            found = re.search(rb'fmiVersion\s*=\s*"([^"]*)"', file.read(_HEAD_BYTES))
-        fmi = found[1].decode() if found else "unknown"
+            stated = re.search(rb'fmiVersion\s*=\s*"([^"]*)"', file.read(_HEAD_BYTES))
+        fmi = stated[1].decode() if stated else "unknown"
         about = read_model_description(settings["file"], validate=False) if fmi in kinds else None
         if about is None or about.coSimulation is None:
             raise ValueError(f"FMI {fmi}: must be a model of FMI 2.0 or 3.0 for co-simulation")
@@ -56,7 +56,8 @@ class Model:
         self._steps = samples // self._size
         self._step_s = settings["block_s"] / self._steps
         self._count = 0
-        self._model = kinds[fmi](
+        kind: Any = kinds[fmi]
+        self._model = kind(
             guid=about.guid,
             unzipDirectory=folder,
             modelIdentifier=about.coSimulation.modelIdentifier,
@@ -90,7 +91,7 @@ class Model:
 def _serve(settings: dict[str, Any]) -> None:
     """Answer orders until stdin ends."""
     answers = os.dup(1)
-    os.dup2(2, 1)  # what a model prints must not mix with the samples
+    os.dup2(2, 1)  # the prints of a model must not mix with the samples
     most = round(settings["memory_MB"] * 1e6)
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
     with tempfile.TemporaryDirectory(prefix="stickslip-fmu-") as folder:

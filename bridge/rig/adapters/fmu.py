@@ -1,4 +1,4 @@
-"""A model of another tool as a device: an FMU of FMI 2 or 3 for co-simulation, run by FMPy in a process of its own.
+"""A model of another tool as a device: an FMU of FMI 2 or 3 for co-simulation, run by FMPy in a separate process.
 
 The process may crash, hang or grow: it is ended and reported, and the exciter rests. One block is one step of the model, whose
 outputs are arrays of its samples, or a step for each part of it. The experiment that the model proposes is ignored.
@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 from contextlib import suppress
-from typing import IO, Annotated, Any
+from typing import IO, Annotated
 
 import numpy as np
 from pydantic import Field
