@@ -36,7 +36,7 @@ class Record:
 
     Args:
         run: the log.
-        duration_s: length of the test; not given: that of the run.
+        duration_s: length of the test; not given: the length of the run.
 
     """
 

@@ -2,11 +2,11 @@
 
 one        one scenario, or one of its mutants: the run, its results and its log
 suite      the scenarios of files and folders, in processes
-target     what a test runs on: a simulated rig, a model, or a device behind its guard
+target     the rig of a test: a simulated rig, a model, or a device behind its guard
 lock       the lock of a real rig, and its quarantine
 realtime   a test of a real rig: arm, change, end
 junit      the results as JUnit XML
 api        a rig, its runs and expectations in Python
-session    the rigs of one test in Python; what remains of a failed one
+session    the rigs of one test in Python; the logs and pictures of a failed one
 plugin     the plug-in of pytest
 """

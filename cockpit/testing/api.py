@@ -89,7 +89,7 @@ class Run:
         return samples
 
     def expect(self, **keys: Unpack[Expectation]) -> None:
-        """Judge an expectation; without keys those of the scenario. Raises AssertionError where one is FAILED or UNTESTED."""
+        """Judge an expectation; without keys all of the scenario. Raises AssertionError where one is FAILED or UNTESTED."""
         __tracebackhide__ = True
         tables = self.tables.expect
         if keys:
@@ -106,13 +106,13 @@ class Run:
 
 
 class Rig:
-    """A rig with the scenario of a test; each run begins anew, from rest.
+    """A rig with the scenario of a test; each run begins from rest.
 
     Args:
         scenario: a scenario by name or path.
         settings: `key=value` each, as of `--set`.
         folder: for the logs of its runs.
-        target: what it runs on.
+        target: its rig.
         folder: for the logs of its runs.
         runs: receives each finished run.
 
@@ -158,7 +158,7 @@ class Rig:
         self._settings = [*self._settings, f"{table}={_in_toml(self._changes[table])}"]
 
     def run(self, seconds: float | None = None) -> Run:
-        """Run for a time; without it for that of the scenario. Raises Fault."""
+        """Run for a time; not given: as long as the scenario. Raises Fault."""
         timed = [] if seconds is None else [f"duration_s={float(seconds)!r}"]
         test = load(self._scenario, [*self._settings, *timed], self._target)
         log = self._folder / f"{len(self._runs) + 1}.mcap"

@@ -1,6 +1,6 @@
 """The lock of a real rig for tests: one owner at a time. A rig that was not brought to rest stays QUARANTINED until its release.
 
-The system frees the lock of a dead owner. The mark in its file stays, and shows that nobody brought the rig to rest.
+The system frees the lock of a dead owner. The mark in its file stays, and shows that the rig was not brought to rest.
 """
 
 import fcntl

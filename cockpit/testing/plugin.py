@@ -1,4 +1,4 @@
-"""The pytest plug-in: the fixture `rig`, and what remains of a failed test. Heavy imports wait for the fixture."""
+"""The pytest plug-in: the fixture `rig`, and the logs and pictures of a failed test. Heavy imports wait for the fixture."""
 
 from collections.abc import Generator, Iterator
 from pathlib import Path

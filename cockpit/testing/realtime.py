@@ -47,7 +47,7 @@ def run_in_real_time(run: DeviceRun, name: str, settings: list[str], log: Path, 
 
     """
     if any(step.settings for step in run.step):
-        line = f"{name}: step.settings: the controller of a real rig is a process of its own"
+        line = f"{name}: step.settings: the controller of a real rig is a separate process"
         raise Fault("NOT_JUDGED", f"{line}; test it without --rig")
     bus = run.bus.model_copy(update={"endpoint": _free_endpoint()})
     rig_security(bus)

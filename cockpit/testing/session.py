@@ -17,7 +17,7 @@ class Session:
 
     Args:
         folder: of the test; scenarios may be files in it.
-        target: what it runs on.
+        target: their rig.
 
     """
 
@@ -40,7 +40,7 @@ class Session:
         return Rig(name, as_settings(settings), self._target, Path(self._logs.name), self._runs)
 
     def properties(self, marked: list[str]) -> list[tuple[str, str]]:
-        """Properties for JUnit XML: those of each run, and the requirements `marked` for the test."""
+        """Properties for JUnit XML: of each run, and the requirements `marked` for the test."""
         rows = [("requirement", name) for name in marked]
         for run in self._runs:
             rows += properties_of(run.tables.rig.name, run.tables.seed, run.checksum, run.results)

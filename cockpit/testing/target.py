@@ -1,4 +1,4 @@
-"""What a test runs on: the rig of its scenario, or a rig file in its place. The guard, and its limits, are those of the rig."""
+"""The rig of a test: the rig of its scenario, or a rig file in its place. Guard and limits belong to the rig."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -54,7 +54,7 @@ class Loaded(NamedTuple):
 
 
 def load(name: str, settings: list[str], target: Target) -> Loaded:
-    """A test on its target. Raises Fault CONFIG, and NOT_JUDGED for one that only a simulated rig carries out."""
+    """A test on its target. Raises Fault CONFIG, and NOT_JUDGED if only a simulated rig can carry it out."""
     given = with_overrides(read_toml(find(name, "scenarios")), settings)
     on_target = [*settings, *([rig_setting(target.rig)] if target.rig else [])]
     if not is_real(name, on_target):

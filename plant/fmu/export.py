@@ -8,11 +8,11 @@ import subprocess
 import sys
 import uuid
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from xml.etree import ElementTree as Xml
 
 import numpy as np
@@ -60,7 +60,8 @@ def export(rig: RigConfig, out: Path) -> Exported:
     samples, block_s = rig.solver.samples_per_block, rig.solver.block_s
     content = params.tobytes() + state.tobytes() + version("stickslip").encode()
     token = f"{{{uuid.UUID(hashlib.sha256(content).hexdigest()[:32])}}}"
-    offsets = {name: (PARAMS.fields or {})[name][1] for name in (*_PARAMETERS.values(), "F_c", "F_s")}
+    fields: Any = PARAMS.fields
+    offsets = {name: fields[name][1] for name in (*_PARAMETERS.values(), "F_c", "F_s")}
     defines = {
         "PARAMS_BYTES": params.nbytes, "STATE_BYTES": state.nbytes, "SAMPLES": samples, "BLOCK_S": repr(block_s),
         "TOKEN": f'"{token}"', "CHANNELS": len(CHANNELS), "TRUTHS": len(TRUTH), "PARAMETERS": len(_PARAMETERS),
@@ -95,10 +96,10 @@ def _array(declaration: str, values: Iterable[int]) -> str:
 
 
 def _headers() -> Path:
-    found = importlib.util.find_spec("fmpy")
-    if found is None or not found.submodule_search_locations:
+    package = importlib.util.find_spec("fmpy")
+    if package is None or not package.submodule_search_locations:
         raise Fault("MISSING_EXTRA", f"fmpy: has the headers of FMI: must be installed; {install('fmi')}")
-    return Path(found.submodule_search_locations[0]) / "c-code"
+    return Path(package.submodule_search_locations[0]) / "c-code"
 
 
 def _compiler() -> str:
@@ -127,8 +128,8 @@ def _run(words: list[str]) -> None:
         raise Fault("CONFIG", f"{words[0]}: ended with status {done.returncode}: {done.stderr.strip()[-2000:]}")
 
 
-def _description(name: str, token: str, defines: dict[str, object], start_values: list[float], is_pulled: bool) -> str:
-    """The file modelDescription.xml; the value references are those of fmi3.c."""
+def _description(name: str, token: str, defines: Mapping[str, Any], start_values: list[float], is_pulled: bool) -> str:
+    """The file modelDescription.xml; the value references are as in fmi3.c."""
     root = Xml.Element(
         "fmiModelDescription", fmiVersion="3.0", modelName=name, instantiationToken=token, version=version("stickslip"),
         description="A slide that is pulled through a compliant drive, on a base that an exciter vibrates",

@@ -1,6 +1,6 @@
 """`python -m plant.fmu.object_code nominal|disturbed SAMPLES FILE.o`: the plant's kernel as machine code that needs no Python.
 
-A process of its own: the code is for any x86-64 processor, and plain numba compiles the kernel with its callees, as a kernel
+A separate process: the code is for any x86-64 processor, and plain numba compiles the kernel with its callees, as a kernel
 that `bridge.kernel_linking` links by address would hold addresses of this process.
 """
 
@@ -20,14 +20,17 @@ def make(disturbed: bool, samples: int, out: Path) -> None:
 
     import bridge.kernel
 
-    plain = numba.njit(error_model="numpy", fastmath=False)
-    bridge.kernel.kernel = bridge.kernel.shared_kernel = plain  # before the modules of the plant are imported
+    kernels: Any = bridge.kernel
+    kernels.kernel = kernels.shared_kernel = numba.njit(
+        error_model="numpy", fastmath=False
+    )  # before the plant is imported
     from bridge.wire.channels import CHANNELS
     from plant.core import advance, advance_disturbed
     from plant.records import PARAMS, STATE, TRUTH
 
     step: Any = advance_disturbed if disturbed else advance
-    carray, double, channels, truths = numba.carray, numba.types.double, len(CHANNELS), len(TRUTH)
+    double, channels, truths = numba.types.double, len(CHANNELS), len(TRUTH)
+    carray: Any = vars(numba)["carray"]
     pointer = numba.types.CPointer
     params, state = pointer(numba.from_dtype(PARAMS)), pointer(numba.from_dtype(STATE))
 

@@ -20,7 +20,7 @@ def call(*words: object) -> tuple[int, str]:
 
 @pytest.mark.slow
 def test_the_same_tests_run_on_a_device(tmp_path: Path) -> None:
-    """Two of them; `make nightly` has all. What only a simulated rig carries out is UNTESTED."""
+    """Two of them; `make nightly` has all. A test for simulated rigs alone is UNTESTED."""
     with boxed(tmp_path) as port:
         rig = written(tmp_path, port)
         status, text = call(TESTS / "stop.toml", TESTS / "kill.toml", "--rig", rig, "--arm")

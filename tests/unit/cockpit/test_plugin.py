@@ -1,4 +1,4 @@
-"""The fixture `rig` of pytest: runs, expectations, what remains of a failed test, properties, and its cost for other tests."""
+"""The fixture `rig` of pytest: runs, expectations, logs of a failed test, properties, and its cost for other tests."""
 
 import subprocess
 import sys

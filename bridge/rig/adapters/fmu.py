@@ -1,0 +1,157 @@
+"""A model of another tool as a device: an FMU of FMI 2 or 3 for co-simulation, run by FMPy in a separate process.
+
+The process may crash, hang or grow: it is ended and reported, and the exciter rests. One block is one step of the model, whose
+outputs are arrays of its samples, or a step for each part of it. The experiment that the model proposes is ignored.
+"""
+
+import json
+import os
+import select
+import subprocess
+import sys
+import tempfile
+from contextlib import suppress
+from typing import IO, Annotated
+
+import numpy as np
+from pydantic import Field
+
+from bridge.config import Strict, validate
+from bridge.rig.adapters._fmu_process import ORDER, READY
+from bridge.rig.device import Device, DeviceBlock, DeviceError, Setup
+
+_OPEN_S = (
+    300.0  # longest time until a model has begun: it is unpacked and FMPy is loaded, 0.6 s of CPU on a quiet computer
+)
+_END_S = 1.0  # longest wait for the end of the process
+
+
+class FmuSettings(Strict):
+    """The table `[device]`."""
+
+    file: str = Field(description="The FMU; a relative path begins at the rig file.")
+    frequency: str = Field(description="Input of the exciter's frequency [Hz].")
+    amplitude: str = Field(description="Input of the exciter's amplitude, in metres or as `stroke_m_per_V` scales it.")
+    outputs: Annotated[list[str], Field(min_length=1)] = Field(
+        description="Outputs that make the device's channels 0, 1 and so on."
+    )
+    set: dict[str, float] = Field({}, description="Start values of inputs and parameters, by name.")
+    noise: dict[str, float] = Field({}, description="Standard deviation of the noise of an output, in its unit.")
+    resolution: dict[str, float] = Field({}, description="Step of an output's values, in its unit.")
+    seed: Annotated[int, Field(ge=0)] = 1
+    slowest_s: Annotated[float, Field(gt=0)] = Field(
+        1.5, description="Time for a block after which the model is ended, as MODEL_SLOW."
+    )
+    memory_MB: Annotated[float, Field(gt=0)] = Field(2000.0, description="Largest memory of its process.")
+
+
+class Adapter(Device):
+    """The model; a block is made for each `write`."""
+
+    pace = "caller"
+
+    def __init__(self, setup: Setup) -> None:
+        super().__init__(setup)
+        self._settings = settings = validate(FmuSettings, dict(setup.settings), "device")
+        self._shape = len(settings.outputs), setup.samples_per_block
+        self._process: subprocess.Popen[bytes] | None = None
+        self._errors: IO[bytes] | None = None
+        self._order, self._is_on = (0.0, 0.0), not setup.has_enable_line
+
+    def open(self) -> None:
+        """Start the process, and the model from its beginning."""
+        settings = self._settings.model_dump() | {
+            "file": str(self.setup.folder / self._settings.file),
+            "block_s": self.block_s,
+            "samples": self.setup.samples_per_block,
+        }
+        self._random = np.random.Generator(np.random.PCG64(self._settings.seed))
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115  # closed by `close`
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "bridge.rig.adapters._fmu_process", json.dumps(settings)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._errors,
+        )
+        try:
+            if self._answer(len(READY), _OPEN_S) != READY:
+                raise self._died()
+        except DeviceError as error:
+            self.close()
+            raise DeviceError(f"{self._settings.file}: {error}", error.code) from None
+
+    def read(self) -> DeviceBlock:
+        """The block of the newest order."""
+        if self._process is None or self._process.stdin is None:
+            raise self._died()
+        try:
+            os.write(self._process.stdin.fileno(), ORDER.pack(*self._order))
+        except OSError:
+            raise self._died() from None
+        rows = np.frombuffer(self._answer(8 * self._shape[0] * self._shape[1], self._settings.slowest_s)).reshape(
+            self._shape
+        )
+        return DeviceBlock(self._measured(rows), *self._order)
+
+    def _measured(self, rows: np.ndarray) -> np.ndarray:
+        """The outputs with noise and resolution."""
+        settings, rows = self._settings, rows.copy()
+        for row, name in enumerate(settings.outputs):
+            if sigma := settings.noise.get(name, 0.0):
+                rows[row] += sigma * self._random.standard_normal(self._shape[1])
+            if step := settings.resolution.get(name, 0.0):
+                rows[row] = np.round(rows[row] / step) * step
+        return rows
+
+    def _answer(self, size: int, longest_s: float) -> bytes:
+        process = self._process
+        if process is None or process.stdout is None:
+            raise self._died()
+        number, received = process.stdout.fileno(), b""
+        while len(received) < size:
+            if not select.select([number], [], [], longest_s)[0]:
+                process.kill()
+                raise DeviceError(f"no block within {longest_s:g} s: ended", "MODEL_SLOW")
+            piece = os.read(number, size - len(received))
+            if not piece:
+                raise self._died()
+            received += piece
+        return received
+
+    def _died(self) -> DeviceError:
+        """The error of a process that has ended, with the last line that it wrote."""
+        status, line = None, ""
+        if self._process is not None:
+            with suppress(subprocess.TimeoutExpired):
+                status = self._process.wait(_END_S)
+        if self._errors is not None and not self._errors.closed:
+            self._errors.seek(0)
+            lines = self._errors.read().decode(errors="replace").strip().splitlines()
+            line = lines[-1] if lines else ""
+        ended = f"ended by signal {-status}" if status is not None and status < 0 else "ended"
+        return DeviceError(f"the model {ended}{f': {line}' if line else ''}", "MODEL_DIED")
+
+    def write(self, frequency_Hz: float, amplitude: float) -> None:
+        """Set the order of the next block."""
+        self._order = frequency_Hz, amplitude if self._is_on else 0.0
+
+    def enable(self, on: bool, toggle: int) -> None:  # noqa: ARG002
+        """Set the enable line, without which the model rests."""
+        self._is_on = on
+
+    def safe(self) -> None:
+        """Rest in the next block."""
+        self._order = self._order[0], 0.0
+
+    def close(self) -> None:
+        """End the process."""
+        if self._process is not None:
+            for pipe in (self._process.stdin, self._process.stdout):
+                if pipe is not None:
+                    with suppress(OSError):
+                        pipe.close()
+            self._process.kill()
+            self._process.wait()
+        if self._errors is not None:
+            self._errors.close()
+        self._process = None
