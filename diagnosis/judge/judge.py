@@ -17,8 +17,8 @@ from diagnosis.judge.ledger import Ledger, Names
 
 NONE: Final = "none"
 # Share of the largest evidence that the error of its formula makes for other explanations; all evidence is counted in units of
-# this error. Cross-validated log loss of 78 simulated rigs: 1.20; with 0.002 1.25, with 0.018 1.17, but worse pairs and calibration
-# of development cases.
+# this error. Cross-validated log loss of 78 simulated rigs: 1.20; with 0.002 1.25; with 0.018 1.17, but pairs and calibration of
+# development cases get worse.
 ERROR: Final = 0.006
 # The following numbers maximise the likelihood of the truth of these rigs: `python -m bench.judge.training`.
 _WEIGHT = 0.22  # log odds of an explanation for each unit of evidence
