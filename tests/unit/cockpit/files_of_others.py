@@ -52,7 +52,7 @@ KINDS = [
     Kind("russian.csv", "Время, с;Сила трения, Н\n" + rows(T_S, FORCE_N, sep=";"), ("--force", "Сила трения, Н"), encoding="cp1251"),
     Kind("sjis.csv", "時間[s],荷重[N]\n" + rows(T_S, FORCE_N), ("--force", "荷重[N]"), encoding="shift_jis"),
 ]  # fmt: skip
-# the programs of docs/reference/programs.md, by the file that is written as they write it
+# the programs of a page that `make docs` makes, by the file that is written as they write it
 PROGRAMS = {
     "twincat.csv": "TwinCAT Scope (Beckhoff), CSV with a time before each channel",
     "twincat-short-rows.csv": "TwinCAT Scope, where slow channels end sooner",

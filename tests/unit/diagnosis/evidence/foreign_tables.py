@@ -193,7 +193,7 @@ KINDS = (
     Kind("two-rates.tdms", _tdms(Force={"wf_increment": 2e-3}, Temperature={"wf_increment": 1.0}), ("", "Force", "")),
     Kind("start-offset.tdms", _tdms(Force={"wf_increment": 2e-3}, Position={"wf_increment": 2e-3, "wf_start_offset": 0.05}), ("", "Force", "Position"), slice(25, 1000), says="begins 0.05 s later"),
 )  # fmt: skip
-# the programs of docs/reference/programs.md, by the file that is written as they write it
+# the programs of a page that `make docs` makes, by the file that is written as they write it
 PROGRAMS = {
     "german-excel.csv": "Excel, CSV with decimal commas",
     "book.xlsx": "Excel, LibreOffice: workbooks",
