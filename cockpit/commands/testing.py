@@ -43,7 +43,7 @@ def run_tests(
     report: Annotated[Path | None, typer.Option("--junit", metavar="FILE.xml", help="Write JUnit XML.")] = None,
     as_json: Json = None,
 ) -> int:
-    """Run scenarios and judge their expectations; exit status 0: all passed, 1: one failed, 14: one was not tested."""
+    """Run scenarios and judge their expectations; exit status 0: passed, 1: failed, 2: could not run, 14: not tested."""
     from joblib import cpu_count
 
     from bridge.files import write_whole
@@ -73,9 +73,7 @@ def run_tests(
         if mutants:
             cases, without = mutants_of(cases)
         with watched() as progress:
-            tests = run(
-                cases, jobs or cpu_count(), None if mutants else logs, lambda share, line: progress(line, share)
-            )
+            tests = run(cases, jobs or cpu_count(), None if mutants else logs, lambda share: progress("", share))
     suite = Suite(tests, mutants, without, others)
     if report is not None:
         with writing(report):

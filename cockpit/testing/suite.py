@@ -42,11 +42,12 @@ class Suite(NamedTuple):
 
     @property
     def exit_status(self) -> int:
-        """0: good; 1: a test failed, or a defect went unnoticed; 14: something was not tested."""
+        """0: good; 1: a test failed, or a defect went unnoticed; 2: a test could not run; 14: something was not tested."""
         results = {test.result for test in self.tests}
-        failed = bool(self.survivors) if self.mutants else bool(results & {FAILED, ERROR})
-        untested = bool(self.without_mutants) if self.mutants else UNTESTED in results
-        return 1 if failed else FAULTS["NOT_JUDGED"].exit_status if untested else 0
+        if self.mutants:
+            results = {FAILED if self.survivors else UNTESTED if self.without_mutants else PASSED}
+        statuses = {FAILED: 1, ERROR: FAULTS["CONFIG"].exit_status, UNTESTED: FAULTS["NOT_JUDGED"].exit_status}
+        return next((status for result, status in statuses.items() if result in results), 0)
 
     def in_words(self) -> list[str]:
         """Lines for the operator: each test, then the counts."""
@@ -105,7 +106,7 @@ def mutants_of(cases: Sequence[TestCase]) -> tuple[list[TestCase], list[str]]:
 
 
 def run_tests(
-    cases: Sequence[TestCase], jobs: int, keep: Path | None, progress: Callable[[float, str], None]
+    cases: Sequence[TestCase], jobs: int, keep: Path | None, progress: Callable[[float], None]
 ) -> list[Tested]:
     """Run tests in simulated time.
 
@@ -113,7 +114,7 @@ def run_tests(
         cases: the tests.
         jobs: number of processes.
         keep: folder for the logs of tests that did not pass; None: they are deleted.
-        progress: called with the share done and a line on the last test.
+        progress: called with the share done.
 
     """
     if cases and jobs > 1:
@@ -121,7 +122,7 @@ def run_tests(
     done: list[Tested] = []
     for tested in _each(cases, jobs, keep):
         done.append(tested)
-        progress(len(done) / len(cases), tested.in_words()[0])
+        progress(len(done) / len(cases))
     return done
 
 

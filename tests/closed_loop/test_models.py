@@ -62,7 +62,7 @@ def test_the_same_tests_run_on_a_model(fmu: Path, tmp_path: Path) -> None:
     rig = written(fmu.parent)
     paths = [deploy_folder() / "tests" / f"{name}.toml" for name in ("stop", "kill")]
     cases, _ = cases_of(paths, [], Target(str(rig), arm=True))
-    tests = run_tests(cases, 1, tmp_path, lambda _share, _line: None)
+    tests = run_tests(cases, 1, tmp_path, lambda _share: None)
     assert [test.result for test in tests] == ["PASSED"] * 2, [test.in_words() for test in tests]
 
 

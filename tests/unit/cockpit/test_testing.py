@@ -69,6 +69,10 @@ def test_a_test_without_evidence_ends_with_14(tmp_path: Path) -> None:
     assert (status, "UNTESTED doubtful: no [[expect]]" in text) == (14, True)
 
 
+def test_a_test_that_cannot_run_ends_with_2(tmp_path: Path) -> None:
+    assert call(folder_of(tmp_path, good=GOOD, broken="[[expect]]\n"))[0] == 2
+
+
 def test_an_old_log_is_judged_without_a_run(tmp_path: Path) -> None:
     folder = folder_of(tmp_path, bad=BAD)
     call(folder)
@@ -109,11 +113,11 @@ def test_the_shipped_tests_pass_and_each_of_their_defects_is_found() -> None:
     """Three of them; `make nightly` has all."""
     cases, _ = cases_of([deploy_folder() / "tests"], [])
     few = [case for case in cases if case.name in {"limits", "stop", "reverse"}]
-    assert [test.result for test in run_tests(few, 1, None, lambda _share, _line: None)] == ["PASSED"] * 3
+    assert [test.result for test in run_tests(few, 1, None, lambda _share: None)] == ["PASSED"] * 3
     mutants, without = mutants_of(cases)
     assert not without
     few = [case for case in mutants if case.name == "limits"]
-    assert {test.result for test in run_tests(few, 1, None, lambda _share, _line: None)} == {FAILED}
+    assert {test.result for test in run_tests(few, 1, None, lambda _share: None)} == {FAILED}
 
 
 @pytest.mark.nightly
