@@ -1,4 +1,4 @@
-"""Rigs without a gap of their own, with one number of the description wrong."""
+"""Rigs without a gap, and one wrong number in their description."""
 
 import math
 import re

@@ -37,7 +37,7 @@ def test_a_good_folder(tmp_path: Path) -> None:
 
 
 def test_a_run_states_how_its_file_is_written_its_piece_and_its_derived_force(tmp_path: Path) -> None:
-    """The keys are those of a channel map and of `look`: [source] with a rate, `piece`, `derive` with [numbers]."""
+    """The keys of a channel map and of `look`: [source] with a rate, `piece`, `derive` with [numbers]."""
     data = columns()
     pressure_Pa = data["drive_force_N"] / 1.2e-3
     rows = [f"{1e-5 * p:.9f};{1e3 * x:.9f}" for p, x in zip(pressure_Pa, data["drive_position_m"], strict=True)]
