@@ -85,7 +85,7 @@ readme: $(READY) ## after a change of what the commands of the README print
 bench: $(VENV)/.ready-nightly ## a quarter of an hour, with the machine to itself
 	@$(BIN)/python -m tests.speed
 
-bench-quick: $(READY) ## three minutes: no vibrated rig, Radau, MuJoCo, effects; one diagnosis
+bench-quick: $(READY) ## four minutes: no vibrated rig, Radau, MuJoCo, effects; one diagnosis
 	@$(BIN)/python -m tests.speed --quick
 
 blind: $(READY) ## hours; what has a result is not done again: make blind CASES=20 SEED=1 OUT=runs/blind GENERATOR=plant

@@ -6,7 +6,7 @@
 import sys
 import time
 
-from tests.speed import cycles, diagnosis, effects, files, kernel, loop, old_version, replay, side_by_side
+from tests.speed import cycles, diagnosis, effects, files, kernel, loop, old_version, replay, rig, side_by_side
 
 # the diagnosis first: its memory counts this process too, with the rest of the others in it
 BENCHES = [
@@ -16,6 +16,7 @@ BENCHES = [
     old_version.bench,
     loop.bench,
     side_by_side.bench,
+    rig.bench,
     replay.bench,
     files.bench,
     cycles.bench,

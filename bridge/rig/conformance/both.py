@@ -1,4 +1,4 @@
-"""The 19 checks that a device and a rig on the bus share; a side adds those of its own, and remedies in its own words."""
+"""The 19 checks that a device and a rig on the bus share; each adds others, and remedies in its words."""
 
 from collections.abc import Mapping
 
@@ -45,8 +45,3 @@ def shared(begin: tuple[str, ...], remedies: Mapping[str, str]) -> tuple[Check, 
         Check("answer-time", remedies["answer-time"], exciter.answer_time, vibration),
         Check("zero", "end the vibration for an amplitude of 0", exciter.zero, vibration),
     )
-
-
-def ends(checks: tuple[Check, ...]) -> tuple[str, ...]:
-    """The checks that one of the end of a vibration needs: those of `zero`."""
-    return checks[-1].needs

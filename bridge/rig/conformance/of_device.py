@@ -3,7 +3,7 @@
 import time
 
 from bridge.rig.conformance import data, exciter
-from bridge.rig.conformance.both import ends, shared
+from bridge.rig.conformance.both import shared
 from bridge.rig.conformance.report import Check, Conformance, judged
 from bridge.rig.conformance.session import DeviceSession
 from bridge.rig.device import Device
@@ -11,14 +11,14 @@ from bridge.rig.file import DeviceRig
 
 _REMEDIES = {
     "shape": "return float64 [channels, samples_per_block], as [converter] states",
-    "numbers": "take all that the driver holds, then report lost blocks, and as waiting those behind this one",
+    "numbers": "read the whole buffer of the driver, then report lost blocks, and as waiting those behind this one",
     "rate": "correct converter.sample_rate_Hz, or the clock of the device",
     "repeated": "return each block once, then None until the next one",
     "amplitude": "correct stroke_m_per_V, the scale of base_accel_mps2, or guard.exciter_gain",
     "answer-time": "return the newest block; state `slowest_answer_s` of the adapter if the exciter is slow",
 }
 _SHARED = shared(("open", "times"), _REMEDIES)
-_VIBRATION = ends(_SHARED)
+_VIBRATION = _SHARED[-1].needs  # as `zero`, the end of a vibration
 CHECKS = (
     Check("open", "check the address in [device], and that no other client holds it", data.opened),
     Check(
