@@ -182,7 +182,7 @@ class GuardedRig:
         self._bus = bus
         self._complaints = Complaints(self.event)
         self._commands = CommandQueue(self._complaints)
-        self._heard = threading.Event()  # a command arrived since the last block
+        self._heard = threading.Event()  # a command arrived since the newest block was sent
         self._answers = Inbox(64)  # commands, read in lockstep only
         self._on_the_way: collections.deque[Received] = collections.deque(maxlen=WAITING)  # commands on the faulty bus
         self._events = 0
@@ -331,7 +331,6 @@ class GuardedRig:
                 late_ns = pacer.wait(tick)
             elif not node.is_behind:  # a command after the newest block acts while the device makes the next one
                 self._heard.wait(longest_wait_s)
-            self._heard.clear()
             if tick % remind_ticks == 0 and (text := self._bus.expiring()):
                 self.event("CERTIFICATE", text)
             tick += 1
@@ -349,6 +348,7 @@ class GuardedRig:
                     late_commands += round_trip_ns > LATE_NS
             messages = node.advance(commands, late_commands, round_trip_ns, late_ns)
             sent_ns[(node.block - 1) % _ROUND_TRIPS_KEPT] = time.perf_counter_ns()
+            self._heard.clear()  # a late answer to an older block would end the wait for the next one, so that each is late
             self._send(messages)
             late_ns = int(node.applied.late_ns)
             self._complaints.report_when_due()

@@ -1,4 +1,4 @@
-"""A rig's process over the adapter `stream` beside the plant's, in turns: CPU time of a block, time until its command acts."""
+"""A rig's process over the adapter `stream` against the plant's, in turns: CPU time of a block, time until its command acts."""
 
 import os
 import signal
@@ -39,7 +39,7 @@ def bench(quick: bool = False) -> bool:
         for _ in range(turns):
             rigs.append(_figures(["--rig", str(rig)], seconds))
             plants.append(_figures(["--set", "duration_s=100"], seconds))
-    print(f"\na rig over `stream` beside the plant, {turns} turns of {seconds:g} s")
+    print(f"\na rig over `stream` against the plant, {turns} turns of {seconds:g} s")
     kept = True
     for what, field, bar in (("CPU time of a block", 0, CPU_BAR), ("block to command, median", 1, P50_BAR)):
         ours, theirs = (median(figures[field] for figures in all_of) for all_of in (rigs, plants))
