@@ -110,7 +110,7 @@ def of_singles(cases: Sequence[Opened]) -> Singles:
     """The scores of cases with one effect of the library."""
     return Singles(
         alarm=rate([case.verdict in {"effect", "partly", "described", "unexplained"} for case in cases]),
-        top_1=rate([case.truth == set(case.leading[:1]) for case in cases]),
+        top_1=rate([case.truth == frozenset(case.leading[:1]) for case in cases]),
         top_3=rate([case.truth <= set(case.leading[:3]) for case in cases]),
         in_group=rate([case.truth <= case.group for case in cases]),
         group_size=mean([float(len(case.group)) for case in cases if case.named]),

@@ -25,9 +25,9 @@ class Model:
     """The running model. Raises ValueError if it does not fit the settings."""
 
     def __init__(self, settings: dict[str, Any], folder: str) -> None:
-        from fmpy import extract, read_model_description
-        from fmpy.fmi2 import FMU2Slave
-        from fmpy.fmi3 import FMU3Slave
+        from fmpy import extract, read_model_description  # pyright: ignore[reportMissingImports]  # an extra
+        from fmpy.fmi2 import FMU2Slave  # pyright: ignore[reportMissingImports]
+        from fmpy.fmi3 import FMU3Slave  # pyright: ignore[reportMissingImports]
 
         kinds = {"2.0": FMU2Slave, "3.0": FMU3Slave}
         with zipfile.ZipFile(settings["file"]) as archive, archive.open("modelDescription.xml") as file:
