@@ -111,7 +111,6 @@ class Rig:
     Args:
         scenario: a scenario by name or path.
         settings: `key=value` each, as of `--set`.
-        folder: for the logs of its runs.
         target: its rig.
         folder: for the logs of its runs.
         runs: receives each finished run.
