@@ -54,13 +54,13 @@ def rig_check(
 
     made, folder = load_device_rig(rig, shared.settings)
     device = device_of(made, folder)
-    realtime.claim(realtime.core(0))
     try:  # an adapter may be foreign code
-        device.open()
-        try:
-            result = check(device, made, seconds)
-        finally:
-            device.close()
+        with realtime.raised_priority():
+            device.open()
+            try:
+                result = check(device, made, seconds)
+            finally:
+                device.close()
     except Exception as error:
         raise Fault("NO_DEVICE", f"{made.name}: {reason_of(error)}") from None
     print_result(as_json, result, result.in_words())

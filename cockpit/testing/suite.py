@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -68,7 +69,8 @@ class Suite(NamedTuple):
 def cases_of(paths: Sequence[Path], settings: list[str], target: Target = NO_TARGET) -> tuple[list[TestCase], int]:
     """The tests of files and folders, and the number of other .toml files in the folders. Raises Fault CONFIG.
 
-    A file in a folder is a test if it holds `[[expect]]` or cannot be read; a file that is named itself is always one.
+    A file in a folder is a test if it holds `[[expect]]`, or a key like it, or cannot be read; a file that is named itself
+    is always one.
     """
     files: list[Path] = []
     others = 0
@@ -89,7 +91,7 @@ def cases_of(paths: Sequence[Path], settings: list[str], target: Target = NO_TAR
 
 def _is_test(file: Path) -> bool:
     try:
-        return "expect" in read_toml(file)
+        return bool(get_close_matches("expect", read_toml(file)))
     except Fault:
         return True  # reported as an error of this test
 

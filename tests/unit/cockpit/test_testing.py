@@ -62,6 +62,15 @@ def test_results_exit_status_and_logs(tmp_path: Path) -> None:
     assert properties["rig"] == "paper-c45-c45"
 
 
+def test_a_misspelt_table_in_a_folder_is_an_error(tmp_path: Path) -> None:
+    (tmp_path / "rig.toml").write_text("mass_kg = 1.0\n")
+    (tmp_path / "misspelt.toml").write_text(HEAD + GOOD.replace("expect", "expct"))
+    status, text = call(str(tmp_path))
+    assert status == 2
+    assert "ERROR    misspelt: CONFIG: misspelt.toml" in text
+    assert "skipped  1 .toml file without [[expect]]" in text
+
+
 def test_a_test_without_evidence_ends_with_14(tmp_path: Path) -> None:
     folder = folder_of(tmp_path, doubtful=DOUBTFUL)
     assert call(folder)[0] == 14
