@@ -14,6 +14,7 @@ from tests.blind import judge_sets, machines
 from tests.blind.generators import Plan
 from tests.blind.judge_sets import Wanted, develop, wrong_number
 from tests.blind.machines import MACHINES, Machines
+from tests.blind.wrong_number import EFFECT_OF
 
 
 @pytest.mark.parametrize("name", MACHINES)
@@ -68,7 +69,7 @@ def test_a_wrong_number_is_far_from_the_right_one(tmp_path: Path) -> None:
         away = np.expm1(abs(np.log(getattr(wrong, key) / getattr(right, key))))
         assert away > 4.0 * right.tolerance[key]
         assert wrong.model_copy(update={key: getattr(right, key)}) == right
-        assert answer["effects"] in ([], [judge_sets._level_of().get(key)])
+        assert answer["effects"] in ([], [EFFECT_OF.get(key)])
 
 
 def test_a_set_has_every_kind_and_finished_cases_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -96,7 +96,7 @@ def test_an_adapter_is_a_file_next_to_the_rig_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "name", "line"),
     [
-        ("", "scope", "adapter = 'scope': no such adapter; known: scpi, stream; or give a file"),
+        ("", "scope", "adapter = 'scope': no such adapter; known: fmu, scpi, stream; or give a file"),
         ("import no_such_driver", "./mine.py", "needs the package no_such_driver; install it"),
         ("class Adapter: ...", "./mine.py", "must have a class Adapter that derives from"),
         ("class Adapter(", "./mine.py", "cannot be read: '\\(' was never closed"),
