@@ -61,9 +61,8 @@ class DeviceNode(GuardedNode):
         self._block = DeviceBlock(np.zeros((1, 1)), 0.0, 0.0)
         self._is_begun = False  # whether the vibration of the block under way is set
         self._accepted = 0  # number of commands accepted for it
-        self._took_s = self._answer_s = (
-            0.0  # of the newest of them: block complete to acknowledged; the exciter's part of it
-        )
+        # of the newest of them: block complete to acknowledged; the exciter's part of it
+        self._took_s = self._answer_s = 0.0
         self._heard_s = time.monotonic()  # of the newest block
         self._timeout_s = int(guard[0][0].timeout_blocks) * device.block_s
         self._silent_since_s: float | None = None  # None while blocks arrive

@@ -20,9 +20,8 @@ from bridge.config import Strict, validate
 from bridge.rig.adapters._fmu_process import ORDER, READY
 from bridge.rig.device import Device, DeviceBlock, DeviceError, Setup
 
-_OPEN_S = (
-    300.0  # longest time until a model has begun: it is unpacked and FMPy is loaded, 0.6 s of CPU on a quiet computer
-)
+# Longest time [s] until a model has begun: it is unpacked and FMPy is loaded, 0.6 s of CPU; the rest is for a busy computer.
+_OPEN_S = 300.0
 _END_S = 1.0  # longest wait for the end of the process
 
 
