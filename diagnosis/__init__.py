@@ -1,7 +1,7 @@
 """From an evidence folder to the place and the cause of the gap between rig and model.
 
 diagnose        all steps of a diagnosis, in order  result      the answer and its JSON
-diagnose_many   many folders, on cores or Dask      processes   one function on many items, in several processes
+diagnose_many   many folders, on cores or Dask      threads     one for linear algebra, several for simulations
 deadline        the estimate of the time, and its end by the budget or by Ctrl-C
 version         the version of a result: a hash over the definitions that make a diagnosis
 slips           turning points of a record, and the slips of a force record

@@ -7,10 +7,10 @@ from diagnosis.evidence.folder import Evidence
 from diagnosis.fits.baseline import Progress
 from diagnosis.judge.judge import judge
 from diagnosis.judge.witnesses import before_fits, ledger_of, with_fits
-from diagnosis.processes import one_thread
 from diagnosis.report.assemble import assembled
 from diagnosis.report.relations_block import with_relations
 from diagnosis.result import Diagnosis
+from diagnosis.threads import one_thread
 
 
 def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1, budget_s: float | None = None) -> Diagnosis:
@@ -21,7 +21,7 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1, budget_s: fl
     Args:
         evidence: the rig as described and the measured runs.
         progress: called with a text on the state of the work, and the share that is done (0 to 1).
-        jobs: processes.
+        jobs: threads.
         budget_s: seconds after which the best answer so far is returned; None: no limit.
 
     """

@@ -96,8 +96,8 @@ def diagnose_many(
 ) -> Generator[FolderResult]:
     """Yield the result of every source, in the order in which they finish.
 
-    Each folder has one process. If the last folders are at most half as many as the processes, they start when all others are
-    done and share the processes: two folders on eight processes have four each.
+    Each folder has one process. If the last folders are at most half as many as the processes of this computer, they start when
+    all others are done and have several threads each: two folders on eight cores have four each.
 
     A folder that cannot be diagnosed, or that kills its worker again and again, yields a fault and stops no other folder. Closing
     the generator, or Ctrl-C, ends the local workers; a cluster drops the folders that it has not begun.
@@ -110,26 +110,25 @@ def diagnose_many(
         cluster: address of a Dask scheduler; empty: none.
         diagnose: a function at the top level of a module, so that it can be sent to a worker.
         certs: folder of the certificates for a cluster at tls://; empty: the user's default folder.
-        shared: whether the last folders share the processes; False: one process each, so that times are comparable.
+        shared: whether the last folders have several threads; False: one each, so that times are comparable.
 
     """
     waiting = list(sources)
     with _workers(jobs, cluster, certs) as workers:
         last = len(waiting) % workers.cores
-        if not shared or 2 * last > workers.cores:  # there are not two processes for each
+        if cluster or not shared or 2 * last > workers.cores:  # there are not two cores for each
             last = 0
         first = len(waiting) - last
-        yield from _several(waiting[:first], _Task(diagnose, 1, workers.inner), workers)
+        yield from _several(waiting[:first], _Task(diagnose, 1), workers)
         if last:
-            yield from _several(waiting[first:], _Task(diagnose, workers.cores // last, workers.inner), workers)
+            yield from _several(waiting[first:], _Task(diagnose, workers.cores // last), workers)
 
 
 class _Task(NamedTuple):
     """How a worker diagnoses a folder."""
 
     diagnose: Diagnose
-    jobs: int  # processes for each folder
-    inner: dict[str, Any]  # arguments of joblib's `parallel_config`, where there are several jobs
+    jobs: int  # threads for each folder
 
 
 def _several(sources: list[EvidenceFolder], task: _Task, workers: "_Workers") -> Generator[FolderResult]:
@@ -157,14 +156,10 @@ def _alone(source: EvidenceFolder, task: _Task, workers: "_Workers") -> FolderRe
 
 def _one(source: EvidenceFolder, task: _Task) -> FolderResult:
     try:
-        # sequential for one job: Dask would spread the work of the folder over its workers
-        with parallel_config(**({"backend": "sequential"} if task.jobs == 1 else task.inner)):
-            diagnosis = task.diagnose(load_evidence(source.folder), lambda _text, _share: None, task.jobs)
+        diagnosis = task.diagnose(load_evidence(source.folder), lambda _text, _share: None, task.jobs)
         return FolderResult(source, diagnosis, None)
     except Fault as fault:
         return FolderResult(source, None, FolderFault(fault.kind.code, fault.line))
-    except BrokenProcessPool as error:
-        return _died(source, error)
     except Exception as error:  # an error in one folder must not end the work on the others
         at = traceback.extract_tb(error.__traceback__)[-1]
         line = f"{type(error).__name__}: {error} ({Path(at.filename).name}, line {at.lineno})"
@@ -184,7 +179,6 @@ class _Workers(NamedTuple):
     pool: Callable[[int], Any]  # makes a joblib.Parallel; argument: largest number of dispatched tasks
     cores: int
     dispatched: int  # largest useful number of dispatched tasks
-    inner: dict[str, Any]  # `_Task.inner` for several jobs a folder
     breakdowns: tuple[type[Exception], ...]  # exceptions that report a dead worker
 
 
@@ -218,8 +212,7 @@ def _workers(jobs: int, cluster: str, certs: str) -> Generator[_Workers]:
         if _NO_WARNING not in sys.warnoptions:
             sys.warnoptions.append(_NO_WARNING)
         config = {"backend": "loky", "n_jobs": jobs, "initializer": leave_interrupt_to_parent}
-        inner = {"backend": "loky", "initializer": leave_interrupt_to_parent}
-        yield _Workers(partial(_pool, config), jobs, 2 * jobs, inner, (BrokenProcessPool,))
+        yield _Workers(partial(_pool, config), jobs, 2 * jobs, (BrokenProcessPool,))
         return
     try:
         from distributed import Client, KilledWorker  # noqa: PLC0415
@@ -251,8 +244,8 @@ def _workers(jobs: int, cluster: str, certs: str) -> Generator[_Workers]:
             return _pool({"backend": Cluster(client=client, wait_for_workers_timeout=_CLUSTER_WAIT_S)}, dispatched)
 
         cores = sum(client.ncores().values())
-        # inner is empty: inside a worker joblib uses the workers of the cluster; TimeoutError: all workers are lost
-        yield _Workers(pool, cores, 2 * cores, {}, (KilledWorker, TimeoutError))
+        # TimeoutError: all workers are lost
+        yield _Workers(pool, cores, 2 * cores, (KilledWorker, TimeoutError))
 
 
 def _pool(config: dict[str, Any], dispatched: int) -> Any:

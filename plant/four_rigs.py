@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.arrays import Floats, Records
-from bridge.kernel import kernel
+from bridge.kernel import kernel, unlocked_kernel
 from bridge.layouts import PlantMemory, PlantParams
 from plant import four_rigs_step as at
 from plant.effects.drive import extension_m, unevenness, yield_m
@@ -24,7 +24,7 @@ from plant.four_rigs_step import LANES, Width
 from plant.piezo import delivered_share
 
 
-@kernel
+@unlocked_kernel
 def advance_lanes(
     width: Width,
     params: Records,

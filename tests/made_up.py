@@ -11,7 +11,6 @@ import numpy as np
 from bridge.faults import Fault
 from bridge.log.finding import Finding
 from diagnosis.evidence.folder import Evidence
-from diagnosis.processes import each
 from diagnosis.result import (
     Candidate,
     Cell,
@@ -186,17 +185,6 @@ def dies(evidence: Evidence, progress: Progress, jobs: int, budget_s: float | No
         os.kill(os.getpid(), signal.SIGKILL)
     time.sleep(0.1)
     return quick(evidence, progress, jobs)
-
-
-def spreads(evidence: Evidence, progress: Progress, jobs: int, budget_s: float | None = None) -> Diagnosis:
-    """Like `quick`, but reports 0 jobs where several jobs shared one process."""
-    result = quick(evidence, progress, jobs)
-    apart = jobs == 1 or os.getpid() not in each(jobs, _who, None, range(jobs))
-    return result if apart else result._replace(elapsed_s=0.0)
-
-
-def _who(_shared: None, _item: int) -> int:
-    return os.getpid()
 
 
 def marks(evidence: Evidence, progress: Progress, jobs: int, budget_s: float | None = None) -> Diagnosis:

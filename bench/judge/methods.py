@@ -15,7 +15,7 @@ from bench.judge.cases import ANSWERS, Case
 from bridge.faults import Fault
 from bridge.files import read_json
 from bridge.results import write_json
-from diagnosis.processes import one_thread
+from diagnosis.threads import one_thread
 from diagnosis.version import NOT_JUDGED, definitions_digest
 
 Answer = dict[str, float]

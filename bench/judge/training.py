@@ -20,8 +20,8 @@ from bridge.results import strict_json, write_json
 from diagnosis.judge.judge import ERROR, Explained, explained_by, probabilities, remainders
 from diagnosis.judge.ledger import Ledger, Names
 from diagnosis.judge.witnesses import before_fits, ledger_of, with_fits
-from diagnosis.processes import one_thread
 from diagnosis.result import LedgerRow
+from diagnosis.threads import one_thread
 
 _HELD = 1e-3  # penalty on squares of the numbers. Larger: they stay near 0. Smaller: chance is learned from few rigs
 _KNOWN = 0.5  # probability of its effect from which a rig without this effect in the library counts as outside

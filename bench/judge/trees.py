@@ -23,7 +23,7 @@ from diagnosis.hypotheses.catalogue import trials
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.hypotheses.starts import Trial
 from diagnosis.model.rig import Effects, Roughness
-from diagnosis.processes import one_thread
+from diagnosis.threads import one_thread
 
 RIGS = 1000  # simulated rigs of a campaign, 70 s of CPU. Fewer: 406 named 18 of 24 foreign effects. More: time.
 _NONE_SHARE = 0.15  # of them without an effect

@@ -58,7 +58,7 @@ def diagnose(
         ),
     ] = None,
     apply: Annotated[Path | None, typer.Option(help="Rig file to write, .toml, with the diagnosed effect.")] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Number of processes; all cores if not given.")] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Number of cores to use; all if not given.")] = None,
     cluster: Annotated[
         str,
         typer.Option(

@@ -127,7 +127,7 @@ class _Imagined:
     def __init__(self, problem: Problem, nuisances: Nuisances, plan: Plan, first: Fit, second: Fit, count: int) -> None:
         self._nuisances = nuisances
         first_point, second_point = (nuisances.point(fit.deviations, fit.effects) for fit in (first, second))
-        self.problem = Problem(problem.rig, [as_run(problem, plan, first_point)])
+        self.problem = Problem(problem.rig, [as_run(problem, plan, first_point)], problem.jobs)
         drawn = replicates(self.problem, first_point, ROUGHNESS, count, 3, perhaps=(first_point, second_point))
         self.floor: Floor = floor_of(self.problem, first_point, drawn)
         first_expected, second_expected = self._expected([first_point, second_point])

@@ -31,14 +31,16 @@ class Baseline(NamedTuple):
     surface: Roughness
 
 
-def baseline_of(problem: Problem, progress: Progress, jobs: int = 1) -> Baseline:
+def baseline_of(problem: Problem, progress: Progress) -> Baseline:
     """Refit the rig of a problem. Raises Fault BAD_EVIDENCE when nothing can be compared."""
     nuisances = Nuisances(problem.rig, problem.travel_m)
     described = np.zeros(len(nuisances))
     point = nuisances.point(described, {})
     drawn = replicates(problem, point, ROUGHNESS, _FIRST, 1)
     fitted_s = sum(len(run.commands.drive) for run in problem.runs) * BLOCK_S
-    progress(f"the simulated fits take about {forecast(fitted_s, jobs, problem.pace)} at the present pace", 0.05)
+    progress(
+        f"the simulated fits take about {forecast(fitted_s, problem.jobs, problem.pace)} at the present pace", 0.05
+    )
     floor = floor_of(problem, point, drawn)
     if not floor.compared.any():
         line = (
@@ -51,7 +53,7 @@ def baseline_of(problem: Problem, progress: Progress, jobs: int = 1) -> Baseline
     surface = surface_of(problem, drawn)
     fit = Fitter(problem, floor, nuisances).refit(NOTHING, described, np.zeros(0))
     point = nuisances.point(fit.deviations, {})
-    floor = floor_of(problem, point, replicates(problem, point, surface, _REPLICATES, 2, jobs), floor)
+    floor = floor_of(problem, point, replicates(problem, point, surface, _REPLICATES, 2), floor)
     fitter = Fitter(problem, floor, nuisances)
     (fit,) = together(fitter.predicted_many, [fitter.retuning(fit.deviations)])
     left = gap(floor, differences(floor, problem, fitter.predicted(fit.deviations, {})))

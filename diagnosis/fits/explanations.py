@@ -2,25 +2,24 @@
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from bridge.arrays import Floats
 from diagnosis.fits.baseline import Baseline, Progress
-from diagnosis.fits.batch import Work, together
+from diagnosis.fits.batch import together
 from diagnosis.fits.evidence import cost_of_freedom, of_remainder
 from diagnosis.fits.fit import NOISE, Fit
 from diagnosis.fits.gauss_newton import FAR_KNEE, Fitter
-from diagnosis.fits.refits import best_of_each, each_beside, refits
 from diagnosis.fits.screening import Screened, Screening
 from diagnosis.gap.measure import KNEE
 from diagnosis.hypotheses.hypothesis import LEVELS, NOTHING, Hypothesis
 from diagnosis.hypotheses.starts import Trial
 from diagnosis.model.per_run import is_phase
-from diagnosis.processes import spread
 
 Names = frozenset[str]
+_Formed = TypeVar("_Formed", Fit, Screened)
 # Starts that get two steps of a refit, of the rig as refitted and as described, and fits that go on to the end. Fewer: a right
 # effect is passed over, as a promise is rough. More: 0.3 s and 1 s of CPU each.
 _QUICK, _FULL, _FULL_PAIRS = (5, 4), 2, 1
@@ -50,12 +49,12 @@ class Search:
 
     """
 
-    def __init__(self, rig: Baseline, trials: list[Trial], related: Callable[[Names], float], jobs: int = 1) -> None:
+    def __init__(self, rig: Baseline, trials: list[Trial], related: Callable[[Names], float]) -> None:
         """`related`: log evidence of the relations for a set of effects, against no effect."""
         self.rig = rig
         self.fits = [rig.fit]
         self.promised: dict[Names, Screened] = {}
-        self._trials, self._related, self._jobs = trials, related, jobs
+        self._trials, self._related = trials, related
         self._places: list[Place] = []
 
     @property
@@ -73,7 +72,7 @@ class Search:
         progress("every effect was tried; the leading ones are fitted", 0.45)
         starts = [start for of_place, count in zip(promises, _QUICK, strict=True) for start in of_place[:count]]
         starts += [start for start in promises[0][_QUICK[0] :] if shown.issuperset(start.hypothesis.effects)]
-        singles = refitted(self.rig.fitter, starts, _FULL, self._jobs)
+        singles = refitted(self.rig.fitter, starts, _FULL)
         self._improve_baseline(singles)
         self.fits = [self.rig.fit, *singles]
         for lead in sorted(singles, key=lambda fit: -self._worth(fit))[:1]:
@@ -101,7 +100,7 @@ class Search:
         fit = self.fitted(names)
         if fit is None or not names:
             return fit
-        return together(self.rig.fitter.predicted_many, [self.rig.fitter.going_further(fit)])[0]
+        return _further(self.rig.fitter, [fit])[0]
 
     def _predict(self) -> None:
         """Predict the rig without effects, and every trial, as refitted and as described.
@@ -119,7 +118,7 @@ class Search:
             for at, trials in places
             for table in ({}, *(trial.hypothesis.tables(trial.w) for trial in trials))
         ]
-        predicted = spread(self._jobs, Fitter.predicted_many, fitter, points)
+        predicted = fitter.predicted_many(points)
         base, far = predicted[0], predicted[1 + len(self._trials)]
         self._places = [
             Place(self.rig.fit, KNEE, base, list(zip(self._trials, predicted[1:], strict=False))),
@@ -142,7 +141,7 @@ class Search:
         promised = [screening.promised(trial, fitter.column(place.base, moved, slope)) for trial, moved in known]
         linear = best_of_each(sorted((start for start in promised if start), key=lambda start: start.chi2))
         points = [(start.deviations, start.hypothesis.tables(start.w)) for start in linear]
-        predicted = spread(self._jobs, Fitter.predicted_many, fitter, points)
+        predicted = fitter.predicted_many(points)
         starts = [left(start[:3], features) for start, features in zip(linear, predicted, strict=True)]
         if fit is place.fit:
             starts += [left((trial.hypothesis, fit.deviations, trial.w), moved) for trial, moved in known]
@@ -157,7 +156,7 @@ class Search:
     def _improve_baseline(self, singles: Sequence[Fit]) -> None:
         """Refit the rig from the numbers of its nearest rival as well: more starts find deeper valleys of chi2."""
         near = [(NOTHING, fit.deviations, np.zeros(0)) for fit in singles[:1] if fit.chi2 > _NEAR * self.rig.fit.chi2]
-        fits = [self.rig.fit, *refits(self.rig.fitter, near, 1)]
+        fits = [self.rig.fit, *(self.rig.fitter.refit(*start) for start in near)]
         self.rig = self.rig._replace(fit=min(fits, key=lambda fit: fit.chi2))
 
     def _worth(self, fit: Fit) -> float:
@@ -169,7 +168,7 @@ class Search:
         """The best single effect with effects that relations show, and that promise most on top of it."""
         promised = self._promises(best, self._places[0])
         others = [start for start in promised if set(start.hypothesis.effects) & (shown - set(best.effects))]
-        return refitted(self.rig.fitter, best_of_each([*others, *promised[:_SECOND]]), _FULL_PAIRS, self._jobs)
+        return refitted(self.rig.fitter, best_of_each([*others, *promised[:_SECOND]]), _FULL_PAIRS)
 
     def _within(self, pairs: Sequence[Fit], singles: Sequence[Fit]) -> list[Fit]:
         """Each effect of two alone, refitted from their fit where that leaves less than its own fit."""
@@ -188,17 +187,30 @@ class Search:
                 at = deviations, np.array([w for _, w in alone])
                 starts.append(Screened(hypothesis, *at, fit.chi2, at))
         left = {frozenset(fit.effects): fit.chi2 for fit in singles}
-        quick = each_beside(self._jobs, _quick, self.rig.fitter, starts)
+        quick = _quick(self.rig.fitter, starts)
         better = [fit for fit in quick if fit.chi2 < left.get(frozenset(fit.effects), math.inf)]
-        return each_beside(self._jobs, Fitter.going_further, self.rig.fitter, better)
+        return _further(self.rig.fitter, better)
 
 
-def refitted(fitter: Fitter, starts: Sequence[Screened], full: int, jobs: int = 1) -> list[Fit]:
+def refitted(fitter: Fitter, starts: Sequence[Screened], full: int) -> list[Fit]:
     """The best fit of every set of effects: two steps each, and the best `full` of them to the end."""
-    quick = best_of_each(sorted(each_beside(jobs, _quick, fitter, starts), key=lambda fit: fit.chi2))
-    further = each_beside(jobs, Fitter.going_further, fitter, quick[:full])
+    quick = best_of_each(sorted(_quick(fitter, starts), key=lambda fit: fit.chi2))
+    further = _further(fitter, quick[:full])
     return best_of_each(sorted([*further, *quick], key=lambda fit: fit.chi2))
 
 
-def _quick(fitter: Fitter, start: Screened) -> Work[Fit]:
-    return fitter.quick(start.hypothesis, ((start.deviations, start.w), start.before))
+def _quick(fitter: Fitter, starts: Sequence[Screened]) -> list[Fit]:
+    works = [fitter.quick(start.hypothesis, ((start.deviations, start.w), start.before)) for start in starts]
+    return together(fitter.predicted_many, works)
+
+
+def _further(fitter: Fitter, fits: Sequence[Fit]) -> list[Fit]:
+    return together(fitter.predicted_many, [fitter.going_further(fit) for fit in fits])
+
+
+def best_of_each(formed: list[_Formed]) -> list[_Formed]:
+    """The first of every set of effects, in the order of `formed`."""
+    seen: dict[frozenset[str], _Formed] = {}
+    for candidate in formed:
+        seen.setdefault(frozenset(candidate.hypothesis.effects), candidate)
+    return list(seen.values())

@@ -43,9 +43,9 @@ class HeldOut:
 
     """
 
-    def __init__(self, problem: Problem, rig: Baseline, best: Fit, jobs: int = 1) -> None:
+    def __init__(self, problem: Problem, rig: Baseline, best: Fit) -> None:
         self.problem = problem
-        self._rig, self._jobs, self._nuisances = rig, jobs, rig.fitter.nuisances
+        self._rig, self._nuisances = rig, rig.fitter.nuisances
         known = {name: table for name, table in best.effects.items() if not has_own_phases(table)}
         self.floor: Floor = self._floor_at(best, known, None)
         self._wider = self.floor
@@ -96,7 +96,7 @@ class HeldOut:
 
     def _floor_at(self, best: Fit, effects: dict[str, dict[str, float | str]], before: Floor | None) -> Floor:
         point = self._nuisances.point(best.deviations, effects)
-        drawn = replicates(self.problem, point, self._rig.surface, _REPLICATES, _SEED, self._jobs)
+        drawn = replicates(self.problem, point, self._rig.surface, _REPLICATES, _SEED)
         return floor_of(self.problem, point, drawn, before)
 
     def _squares(self, fits: Sequence[Fit]) -> list[Floats]:

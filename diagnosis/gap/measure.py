@@ -27,7 +27,6 @@ from diagnosis.features.feature import DRIVE_WAVES, POWERS, Feature
 from diagnosis.gap.problem import Draw, Point, Problem
 from diagnosis.model.rig import Roughness
 from diagnosis.model.sensor_chain import BEND_S2
-from diagnosis.processes import spread
 
 # Difference, in noise floors, up to which it counts in full; beyond, it counts as its logarithm.
 # Too small: large differences, which identify the effect, count little. Too large: a signal that is far off hides all others.
@@ -90,12 +89,9 @@ def replicates(
     roughness: Roughness,
     count: int,
     seed: int,
-    jobs: int = 1,
     perhaps: Sequence[Point] = (),
 ) -> Floats:
     """Predicted features of a model on random rough surfaces with random sensor noise, [count, features].
-
-    The result does not depend on the number of processes.
 
     Args:
         problem: the runs.
@@ -103,22 +99,16 @@ def replicates(
         roughness: scatter of the friction, and the length around which the length of each replicate is drawn.
         count: number of replicates.
         seed: seed of the draws.
-        jobs: processes.
         perhaps: points that may be requested next, simulated where a lane is free.
 
     """
-    return np.array(spread(jobs, _drawn, (problem, point, roughness, seed, perhaps), range(count)))
-
-
-def _drawn(model: tuple[Problem, Point, Roughness, int, Sequence[Point]], numbers: list[int]) -> list[Floats]:
-    problem, point, roughness, seed, perhaps = model
     draws: list[Draw] = []
-    for number in numbers:
+    for number in range(count):
         random = np.random.default_rng([seed, number])
         length_m = float(roughness.length_m * np.exp(random.uniform(-1.0, 1.0)))
         surface = Roughness(roughness.ratio, length_m, int(random.integers(1_000_000)))
         draws.append(Draw(random, surface))
-    return problem.predicted_many([point] * len(draws), draws, perhaps)
+    return np.array(problem.predicted_many([point] * count, draws, perhaps))
 
 
 def floor_of(problem: Problem, point: Point, drawn: Floats, before: Floor | None = None) -> Floor:

@@ -2,9 +2,10 @@
 
 import math
 import time
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from pydantic import ValidationError
@@ -31,6 +32,7 @@ from diagnosis.model.sensor_chain import (
     true_commands,
     true_force_N,
 )
+from diagnosis.threads import each
 from plant.config import RigConfig
 from plant.effects.library import EFFECTS
 from plant.four_rigs_step import LANES, NARROW
@@ -73,10 +75,12 @@ class Problem:
     Arrays of features are [features]: the features of all runs, one run after the other; NaN where a run has no such feature.
     """
 
-    def __init__(self, rig: RigTable, runs: list[Prepared]) -> None:
+    def __init__(self, rig: RigTable, runs: list[Prepared], jobs: int = 1) -> None:
+        """`jobs`: threads of `predicted_many`, whose result does not depend on them."""
         self.rig = rig
         self.runs = runs
-        self.until_s = math.inf  # deadline of `predicted_many` by `time.monotonic`, which all processes share
+        self.jobs = jobs
+        self.until_s = math.inf  # deadline of `predicted_many` by `time.monotonic`
         self.pace = 0.0  # computing time for a simulated second of one lane, from the last batch [s/s]
         self.scales = scales_of(rig)
         longest_m = max(BLOCK_S * float(np.abs(run.commands.drive).sum()) for run in runs)
@@ -84,7 +88,7 @@ class Problem:
             longest_m + self.scales.force_N / self.scales.stiffness_N_per_m
         )  # of the drive; no meaning with force
         self.force_peak_N = max(float(np.abs(run.signals.get("drive_force_N", np.zeros(1))).max()) for run in runs)
-        self._simulated: dict[object, Signals | None] = {}
+        self._simulated: defaultdict[str, dict[object, Signals | None]] = defaultdict(dict)  # by run
         self._averaged = {run.file: averaged(run.commands.frequency_Hz) for run in runs}
         measured = [self._features(run, run.signals) for run in runs]
         self.measured = np.concatenate([np.array(features.values) for features in measured])
@@ -96,10 +100,6 @@ class Problem:
         self.place = np.array([numbers[place] for place in places], np.int64)  # segment of each feature, [features]
         segments = {run.file: run.commands.segments for run in runs}
         self.slips = [segments[file][segment].slips if segment >= 0 else 1 for file, segment in numbers]  # [places]
-
-    def __getstate__(self) -> dict[str, Any]:
-        """State for another process, without the kept simulations."""
-        return self.__dict__ | {"_simulated": {}}
 
     def predicted(self, point: Point) -> Floats:
         """Features of the model at `point`, [features]; all NaN where such a rig cannot be simulated."""
@@ -123,18 +123,36 @@ class Problem:
             return [
                 features for batch in batches for features in self.predicted_many(points[batch], draws[batch], perhaps)
             ]
-        parts: list[list[float]] = [[] for _ in points]
+        if not draws:
+            of_runs = each(self.jobs, lambda run: self._in_run(run, points, [None] * len(points), perhaps), self.runs)
+            return [self._joined(parts) for parts in zip(*of_runs, strict=True)]
+
+        def in_all_runs(numbers: range) -> list[Floats]:
+            share, drawn = [points[i] for i in numbers], [draws[i] for i in numbers]
+            of_runs = [self._in_run(run, share, drawn, perhaps) for run in self.runs]  # a draw goes on from run to run
+            return [self._joined(parts) for parts in zip(*of_runs, strict=True)]
+
+        shares = each(self.jobs, in_all_runs, [range(first, len(points), self.jobs) for first in range(self.jobs)])
+        return [shares[number % self.jobs][number // self.jobs] for number in range(len(points))]
+
+    def _in_run(
+        self, run: Prepared, points: Sequence[Point], draws: Sequence[Draw | None], perhaps: Sequence[Point]
+    ) -> list[Floats]:
+        """Features of each point in one run; a single NaN where such a rig cannot be simulated."""
         with np.errstate(over="ignore", invalid="ignore"):  # the model may diverge at the start of a refit
-            for run in self.runs:
-                signals_of_points = self._signals(run, points, draws or [None] * len(points), perhaps)
-                for part, signals in zip(parts, signals_of_points, strict=True):
-                    part.extend([math.nan] if signals is None else self._features(run, signals).values)
-        result: list[Floats] = []
-        for part in parts:
-            features = np.array(part) if len(part) == len(self.measured) else np.full(len(self.measured), np.nan)
-            with np.errstate(over="ignore"):  # a feature whose square overflows counts as missing
-                result.append(np.where(np.isfinite(features * features), features, np.nan))
-        return result
+            of_points = self._signals(run, points, draws, perhaps)
+            return [
+                np.array([math.nan] if signals is None else self._features(run, signals).values)
+                for signals in of_points
+            ]
+
+    def _joined(self, parts: Sequence[Floats]) -> Floats:
+        """Features of all runs [features] from the features of each."""
+        features = np.concatenate(parts)
+        if len(features) != len(self.measured):
+            return np.full(len(self.measured), np.nan)
+        with np.errstate(over="ignore"):  # a feature whose square overflows counts as missing
+            return np.where(np.isfinite(features * features), features, np.nan)
 
     def signals(self, run: Prepared, point: Point) -> Signals:
         """Noise-free predicted signals of a run behind its sensors, [blocks] each.
@@ -199,25 +217,24 @@ class Problem:
             number if request.draw is not None else _key(run, request, inputs)
             for number, request in enumerate(requests)
         ]
-        cached = {key: self._simulated.pop(key) for key in set(keys) if key in self._simulated}
+        kept = self._simulated[run.file]
+        cached = {key: kept.pop(key) for key in set(keys) if key in kept}
         todo = {key: request for key, request in zip(keys, requests, strict=True) if key not in cached}
         spare: dict[object, _Request] = {}
         if len(todo) % NARROW:
             soon = [_request(run, point, None) for point in perhaps]
-            known = todo.keys() | cached.keys() | self._simulated.keys()
+            known = todo.keys() | cached.keys() | kept.keys()
             spare = {key: request for request in soon if (key := _key(run, request, inputs)) not in known}
         simulated = self._simulate(commands, [*todo.values(), *spare.values()], len(todo))
         for key, signals in zip([*todo, *spare], simulated, strict=True):
             if key in todo:
                 cached[key] = signals
             elif signals is not None:
-                self._simulated[key] = signals
+                kept[key] = signals
         # The most recently used entries move to the end and are dropped last: the common start of all trials is needed often.
-        self._simulated |= {
-            key: cached[key] for key, request in zip(keys, requests, strict=True) if request.draw is None
-        }
-        for key in list(self._simulated)[:-_KEPT]:
-            del self._simulated[key]
+        kept |= {key: cached[key] for key, request in zip(keys, requests, strict=True) if request.draw is None}
+        for key in list(kept)[: -max(_KEPT // len(self.runs), 1)]:
+            kept.pop(key, None)  # another thread may have dropped it
         return [cached[key] for key in keys]
 
     def _simulate(self, commands: CommandedRun, requests: Sequence[_Request], wanted: int) -> list[Signals | None]:

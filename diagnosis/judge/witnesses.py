@@ -67,18 +67,18 @@ def with_fits(seen: Witnesses, progress: Progress) -> Witnesses:
     full, rig = seen.evidence, seen.evidence.rig
     evidence = excerpt(full)
     runs = seen.runs if evidence is full else prepare(evidence)
-    problem = Problem(rig, [run for run in runs if not run.holdout])
+    problem = Problem(rig, [run for run in runs if not run.holdout], seen.jobs)
     now = time.monotonic()
     problem.until_s = now + _FOR_FITS * (seen.until_s - now)
     hidden = {*cannot_show(rig, runs, evidence.assumed), *ruled_out(seen.relations, seen.decision)}
     answered = speaking(seen.relations.answered, rig)
     tried = [trial for trial in trials(problem) if not hidden & set(trial.hypothesis.effects)]
     try:
-        baseline = baseline_of(problem, progress, seen.jobs)
+        baseline = baseline_of(problem, progress)
     except OutOfTimeError:
         progress(_ENDED_EARLY, 0.2)
         return seen
-    search = Search(baseline, tried, lambda names: evidence_of(answered, names), seen.jobs)
+    search = Search(baseline, tried, lambda names: evidence_of(answered, names))
     seen = seen._replace(evidence=evidence, runs=runs, search=search)
     try:
         search.run(shown(answered), progress)
@@ -87,7 +87,6 @@ def with_fits(seen: Witnesses, progress: Progress) -> Witnesses:
                 break
     except OutOfTimeError as error:
         progress(_ENDED_EARLY, 0.75)
-        seen = seen._replace(jobs=1)  # the interruption ended the workers; new ones would take seconds
         if isinstance(error, EndedError):
             seen = seen._replace(until_s=min(seen.until_s, time.monotonic() + GRACE_S))
         evidence = evidence._replace(findings=(*evidence.findings, CUT_SHORT))
@@ -96,11 +95,11 @@ def with_fits(seen: Witnesses, progress: Progress) -> Witnesses:
     held_out = [run for run in runs if run.holdout]
     if held_out:
         progress("the fits are compared with the held-out runs", 0.8)
-        kept = Problem(rig, held_out)
+        kept = Problem(rig, held_out, seen.jobs)
         kept.until_s = seen.until_s
         with suppress(OutOfTimeError):
             best = min(search.fits, key=lambda fit: fit.chi2)
-            seen = seen._replace(held_out=HeldOut(kept, search.rig, best, seen.jobs))
+            seen = seen._replace(held_out=HeldOut(kept, search.rig, best))
     return seen
 
 

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.arrays import Floats, Records
-from bridge.kernel import kernel
+from bridge.kernel import unlocked_kernel
 from bridge.layouts import PlantMemory, PlantParams
 from bridge.wire.channels import CHANNELS
 from diagnosis.features.grid import BLOCK_S, SIGNALS
@@ -120,7 +120,7 @@ def _side_by_side(rigs: Sequence[Rig], commands: CommandedRun, entries: Sequence
     return out
 
 
-@kernel
+@unlocked_kernel
 def _follow(
     params: Records,
     state: Records,

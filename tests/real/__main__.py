@@ -9,8 +9,8 @@ from pathlib import Path
 from bridge.results import strict_json
 from diagnosis.diagnose import diagnose
 from diagnosis.evidence.folder import load_evidence
-from diagnosis.processes import one_thread
 from diagnosis.report.page import write_report
+from diagnosis.threads import one_thread
 from tests.real.evidences import AXIS, EVIDENCES, MISSING, SLIDER
 from tests.real.known import known
 from tests.real.table import lines, of_latent, of_relations

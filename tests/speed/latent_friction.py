@@ -14,7 +14,7 @@ import numpy.typing as npt
 from diagnosis.latent.answer import LatentSignal, named_by, signal_of
 from diagnosis.latent.causes import DIRECTION, FORCE_PLACE, LOAD, PLACE, SPEED, TIME
 from diagnosis.latent.rows import BREAKAWAY, SLIDING, ExcessRows
-from diagnosis.processes import one_thread
+from diagnosis.threads import one_thread
 
 Floats = npt.NDArray[np.floating[Any]]
 JUDGED = (PLACE, DIRECTION, FORCE_PLACE, TIME, SPEED, LOAD)

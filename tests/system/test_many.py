@@ -90,9 +90,9 @@ def cluster(at: Path, workers: int, certs: Path | None = None) -> Iterator[str]:
 
 
 def test_outcomes_on_two_processes(tmp_path):
-    """The last folder has both processes, as the substitute reports."""
+    """The last folder has two threads, as the substitute reports."""
     names = ["a", "b", "refused", "broken", "c"]
-    outcomes = by_name(diagnose_many(sources(tmp_path, names), 2, diagnose=made_up.spreads))
+    outcomes = by_name(diagnose_many(sources(tmp_path, names), 2, diagnose=made_up.quick))
     results = {name: outcome.diagnosis for name, outcome in outcomes.items() if outcome.diagnosis}
     assert {name: one.elapsed_s for name, one in results.items()} == {"a": 1.0, "b": 1.0, "c": 2.0}
     assert outcomes["refused"].fault == ("BAD_EVIDENCE", "run-01.csv: too short")

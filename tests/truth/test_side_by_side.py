@@ -8,6 +8,7 @@ import pytest
 from bridge.wire.channels import CHANNELS
 from diagnosis.features.grid import SIGNALS
 from diagnosis.features.segments import CommandedRun
+from diagnosis.gap.measure import replicates
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.catalogue import trials
 from diagnosis.hypotheses.nuisances import Nuisances
@@ -185,3 +186,14 @@ def test_likely_next_points_are_simulated_in_free_lanes(ladder, monkeypatch):
     problem.predicted(later[-1])  # there was no lane for it
     assert len(calls) == 2
     assert np.array_equal([*results, again], alone, equal_nan=True)
+
+
+def test_no_bit_depends_on_the_threads(ladder):
+    rig, runs = ladder
+    nuisances = Nuisances(rig)
+    points = [nuisances.point(0.1 * number * np.ones(len(nuisances)), {}) for number in range(3)]
+    one, three = (
+        [*problem.predicted_many(points), *replicates(problem, points[0], Roughness(0.003, 1.5e-4, 0), 5, 1)]
+        for problem in (Problem(rig, runs, jobs) for jobs in (1, 3))
+    )
+    assert np.array_equal(one, three, equal_nan=True)

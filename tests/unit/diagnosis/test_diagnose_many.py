@@ -26,7 +26,7 @@ def test_a_folder_that_always_kills_its_worker_costs_no_other_folder(monkeypatch
 
     @contextmanager
     def workers(*_: Any) -> Iterator[Any]:
-        yield many._Workers(pool, 2, 4, {}, (BrokenProcessPool,))
+        yield many._Workers(pool, 2, 4, (BrokenProcessPool,))
 
     monkeypatch.setattr(many, "_one", one)
     monkeypatch.setattr(many, "_workers", workers)
