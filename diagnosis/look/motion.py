@@ -107,7 +107,7 @@ def _at_rest(slips: list[RecordSlips], speed_mps: float) -> StickSlip:
     if share < _RESTS:
         return StickSlip("no", f"{why}: it moves on")
     if len(slopes) < _FEWEST_SLOPES:
-        return StickSlip("cannot tell", f"{why}, but in {counted(len(slopes), 'stick')} alone: record for longer")
+        return StickSlip("cannot tell", f"{why} in {counted(len(slopes), 'stick')}: too few; record for longer")
     return StickSlip("yes", f"{why}: it rests") if share < _SWINGS else StickSlip("no", f"{why}: it swings")
 
 
