@@ -101,7 +101,7 @@ def _at_rest(slips: list[RecordSlips], speed_mps: float) -> StickSlip:
     slopes = [cycle.slope_N_per_s for part in slips for cycle in cycles_of(part, None)]
     slopes = [slope for slope in slopes if np.isfinite(slope)]
     if not slopes:
-        return StickSlip("no", "no swing above the noise but those of the start and the turns of the drive")
+        return StickSlip("no", "0 swings above the noise, without the start and the turns of the drive")
     share = float(np.median(slopes)) / speed_mps
     why = f"between slips the slide falls behind at {100.0 * share:.0f} % of the drive's speed"
     if share < _RESTS:
