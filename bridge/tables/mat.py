@@ -68,7 +68,7 @@ def _fields(value: Any) -> dict[str, Any] | None:
 
 
 def _add_dspace(table: Table, name: str, value: Any) -> None:
-    """Add the signals of a recording of dSPACE by their Name, with their units and the raster of their XIndex."""
+    """Add the signals of a recording of dSPACE by their Name, with their units and the raster of their length."""
     fields = _fields(value)
     if fields is None or not {"X", "Y"} <= fields.keys():
         return
@@ -88,7 +88,7 @@ def _add_dspace(table: Table, name: str, value: Any) -> None:
         for at in keys:
             if unit := _text(signal.get("Unit")):
                 table.units[at] = unit
-            if raster is not None and len(raster) == len(data):
+            if raster is not None:
                 table.clocks[at] = ChannelClock(0.0, 0.0, raster)
     for key, axis in times:
         if unit := _text(axis.get("Unit")):
@@ -96,16 +96,9 @@ def _add_dspace(table: Table, name: str, value: Any) -> None:
 
 
 def _raster(signal: dict[str, Any], rasters: list[dict[str, Any]]) -> Any:
-    """The instants of a signal [samples], by its XIndex, from 0 or from 1; None without a matching raster."""
+    """The instants of a signal [samples]: the raster with as many; None without one."""
     data = [np.atleast_1d(raster["Data"]).ravel().astype(np.float64) for raster in rasters if "Data" in raster]
-    if len(data) == 1:
-        return data[0]
-    length = len(np.atleast_1d(signal["Data"]).ravel())
-    index = signal.get("XIndex")
-    at = int(np.atleast_1d(index).ravel()[0]) if index is not None and np.size(index) else 0
-    for number in (at - 1, at):
-        if 0 <= number < len(data) and len(data[number]) == length:
-            return data[number]
+    length = np.size(signal["Data"])
     return next((times for times in data if len(times) == length), None)
 
 

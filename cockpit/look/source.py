@@ -85,17 +85,6 @@ class MeasuredRecord(NamedTuple):
         return free
 
 
-class _Reading(NamedTuple):
-    """The columns of a table that are the record, and the facts that the table states."""
-
-    columns: Columns
-    known: RecordFacts
-    findings: list[Finding]
-    starts_s: tuple[float, ...]
-    map_text: str = ""
-    counts: str = ""
-
-
 def read_record(path: Path, asked: LookOptions) -> MeasuredRecord:
     """Read a table or a run log. Raises Fault BAD_TABLE, BAD_LOG, CONFIG."""
     if path.is_file() and kind_of(path) == "mcap" and (logged := _logged(path)) is not None:
@@ -103,11 +92,10 @@ def read_record(path: Path, asked: LookOptions) -> MeasuredRecord:
         return _record(path, logged.columns, known, logged.findings, "", logged.rig)
     if asked.map is not None:
         wanted = validate(ImportMap, read_toml(asked.map), asked.map.name)
-        read = _by_map(path, asked, overridden(wanted, asked))
+        record = _by_map(path, asked, overridden(wanted, asked))
     else:
-        read = _by_names(read_table(path, Dialect(encoding=asked.encoding)), asked)
-    record = _record(path, read.columns, read.known, read.findings, read.map_text)
-    return _piece(record._replace(starts_s=read.starts_s, counts=read.counts), asked.piece)
+        record = _by_names(read_table(path, Dialect(encoding=asked.encoding)), asked)
+    return _piece(record, asked.piece)
 
 
 def overridden(wanted: ImportMap, asked: LookOptions) -> ImportMap:
@@ -125,7 +113,7 @@ def overridden(wanted: ImportMap, asked: LookOptions) -> ImportMap:
     return wanted.model_copy(update={"source": source, "channels": channels, "run": run, "rig": rig})
 
 
-def _by_map(path: Path, asked: LookOptions, wanted: ImportMap) -> _Reading:
+def _by_map(path: Path, asked: LookOptions, wanted: ImportMap) -> MeasuredRecord:
     """The record as a map describes it."""
     table = read_table(path, wanted.source.dialect, wanted.source.format)
     columns, findings, starts_s = mapped(table, wanted.channels, wanted.source.sample_rate_Hz)
@@ -136,10 +124,11 @@ def _by_map(path: Path, asked: LookOptions, wanted: ImportMap) -> _Reading:
     if asked.speed_mps is not None:
         columns.pop("drive_position_m", None)
     mass_kg = asked.mass_kg if asked.mass_kg is not None else wanted.rig.get("mass_kg")
-    return _Reading(columns, RecordFacts(wanted.run.drive_velocity_mps, asked.load_N, mass_kg), findings, starts_s)
+    known = RecordFacts(wanted.run.drive_velocity_mps, asked.load_N, mass_kg)
+    return _record(path, columns, known, findings, "")._replace(starts_s=starts_s)
 
 
-def _by_names(table: Table, asked: LookOptions) -> _Reading:
+def _by_names(table: Table, asked: LookOptions) -> MeasuredRecord:
     """The record by the names, units and values of the columns."""
     path = table.path
     guessed = guess(table, {"time": asked.time, "force": asked.force, "position": asked.position})
@@ -226,9 +215,8 @@ def _by_names(table: Table, asked: LookOptions) -> _Reading:
     if left := unused(table, guessed):
         findings.append(Finding("unused", path.name, f"columns: {', '.join(map(repr, left))}"))
     known = RecordFacts(asked.speed_mps, load_N, asked.mass_kg, of_load and load_N is None, torsion, unit)
-    return _Reading(
-        columns, known, findings, starts_s, "" if unit else map_text(table, channels, asked), counts(table, channels)
-    )
+    record = _record(path, columns, known, findings, "" if unit else map_text(table, channels, asked))
+    return record._replace(starts_s=starts_s, counts=counts(table, channels))
 
 
 def _piece(record: MeasuredRecord, piece: int | None) -> MeasuredRecord:

@@ -219,7 +219,7 @@ def read_columns(
             raise Fault("BAD_EVIDENCE", line)
         standard, noted, starts_s = mapped(table, wanted, source.sample_rate_Hz, rotary)
         if piece is not None:
-            inside = piece_of(standard["t_s"], starts_s, piece, path.name)
+            inside = piece_of(standard["t_s"], starts_s, piece, path.name, "run.piece =")
             standard = {name: values[inside] for name, values in standard.items()}
         elif starts_s:
             line = f"{path.name}: t_s: begins again: holds {len(starts_s)} runs, and must hold one; give piece = 1 in [[run]]"

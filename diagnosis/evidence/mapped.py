@@ -91,11 +91,11 @@ def mapped(
     return Mapped({"t_s": t_s} | values, table.findings + findings + of_pieces, starts_s)
 
 
-def piece_of(t_s: Floats, starts_s: Sequence[float], piece: int, file: str) -> Bools:
-    """The rows of a piece, from 1, [rows]. Raises Fault CONFIG for a number without a piece."""
+def piece_of(t_s: Floats, starts_s: Sequence[float], piece: int, file: str, place: str = "--piece") -> Bools:
+    """The rows of a piece, from 1, [rows]. Raises Fault CONFIG, which names the `place`, for a number without a piece."""
     starts_s = (-np.inf, *starts_s[1:], np.inf)
     if not 1 <= piece < len(starts_s):
-        raise Fault("CONFIG", f"--piece {piece}: must be from 1 to {len(starts_s) - 1}, the pieces of {file}")
+        raise Fault("CONFIG", f"{place} {piece}: must be from 1 to {len(starts_s) - 1}, the pieces of {file}")
     return (t_s >= starts_s[piece - 1]) & (t_s < starts_s[piece])
 
 

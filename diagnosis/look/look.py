@@ -142,14 +142,15 @@ def look(
             if f"{key}_force_N" in numbers
         }
     mean_N = float(np.average([part.force_N.mean() for part in parts], weights=[len(part.t_s) for part in parts]))
-    if known.coefficient:
-        numbers = _of_coefficient(numbers)
-    elif known.unit:
+    if known.coefficient or known.unit:
         numbers = {
-            name: number._replace(unit=re.sub(r"^N\b", known.unit, number.unit))
+            (_MU.get(name, name) if known.coefficient else name): number._replace(
+                unit=re.sub(r"^N\b", known.force_unit, number.unit)
+            )
             for name, number in numbers.items()
             if name not in _OF_SPRING
         }
+    if known.unit:
         # the mean would hold the times over turns and starts of the drive too
         if sticks and (period := median_of(_periods(slips_of_parts), "s")) is not None:
             numbers["period_s"] = period.wider(step_s / math.sqrt(6.0))
@@ -178,15 +179,6 @@ def look(
 def _periods(slips_of_parts: list[RecordSlips]) -> Floats:
     """Times between breakaways of a part [s]."""
     return np.concatenate([np.diff(slips.part.t_s[slips.tops]) for slips in slips_of_parts])
-
-
-def _of_coefficient(numbers: dict[str, Number]) -> dict[str, Number]:
-    """Numbers of a friction coefficient: dimensionless, and without the numbers of the drive's spring."""
-    return {
-        _MU.get(name, name): number._replace(unit=re.sub(r"^N\b", "1", number.unit))
-        for name, number in numbers.items()
-        if name not in _OF_SPRING
-    }
 
 
 def _of_cycles(slips_of_parts: list[RecordSlips], cycles: list[Cycle], step_s: float) -> dict[str, Number]:

@@ -11,6 +11,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from bridge.arrays import Floats
+from bridge.units import counted
 from diagnosis.look.slips import OneWayPart, RecordSlips, find_slips
 from diagnosis.look.sticks import cycles_of
 from diagnosis.slips import turning_points
@@ -19,9 +20,9 @@ _FEWEST = 5  # fewest swings that show whether they are slips; start and turns o
 # Smallest fall over the usual one: smaller ones are ripple between slips. 0: ripple splits the currents of 4 of 80 axes; 0.5:
 # small slips in a following error are lost on 4 of 80.
 _LEAST_FALL = 0.3
-# Share of the drive's speed by which a slide falls behind: 0.7 to 1.1 if it rests, 0 to 0.2 if it moves on, on 80 drawn axes;
-# above _SWINGS it goes back.
-_RESTS, _SWINGS, _FEWEST_SLOPES = 0.5, 1.5, 3
+# Share of the drive's speed by which a slide falls behind: above _SWINGS it goes back. A slide that rests had 0.81 to 1.19, one
+# that moves on 0 to 0.57, on 280 drawn servo axes. _RESTS of 0.5: 3 axes without stick-slip are called "yes".
+_RESTS, _SWINGS, _FEWEST_SLOPES = 0.7, 1.5, 3
 _FEWEST_OF_FALL = 3  # fewest samples of a fall; shorter ones are steps of an encoder
 # Ratio of the durations of climb and fall: on 40 drawn servo axes the swings of those without stick-slip had 0.9 to 1.15, the
 # currents of those with it 1.2 to 7.5. Above _SLIPS it is stick-slip even if climbs are bent; between the two it stays open.
@@ -58,9 +59,7 @@ def best_way(
         ways.append([part._replace(force_N=-part.force_N, sign=-part.sign) for part in parts])
     slips_of = [[slips for slips in map(_alike, way) if slips is not None] for way in ways]
     way = max(range(len(ways)), key=lambda i: _shape(slips_of[i])[0])
-    if follows and speed_mps:
-        return ways[way], slips_of[way], _at_rest(slips_of[way], speed_mps)
-    return ways[way], slips_of[way], _answer(slips_of[way], follows)
+    return ways[way], slips_of[way], _answer(slips_of[way], follows, speed_mps)
 
 
 def _alike(part: OneWayPart) -> RecordSlips | None:
@@ -101,23 +100,28 @@ def _at_rest(slips: list[RecordSlips], speed_mps: float) -> StickSlip:
     """Stick-slip in a following error at a known speed: a slide at rest falls behind by the way of its drive."""
     slopes = [cycle.slope_N_per_s for part in slips for cycle in cycles_of(part, None)]
     slopes = [slope for slope in slopes if np.isfinite(slope)]
-    if len(slopes) < _FEWEST_SLOPES:
-        return StickSlip("no", f"{len(slopes)} swings above the noise: start and turns of the drive give as many")
+    if not slopes:
+        return StickSlip("no", "0 swings above the noise, without the start and the turns of the drive")
     share = float(np.median(slopes)) / speed_mps
     why = f"between slips the slide falls behind at {100.0 * share:.0f} % of the drive's speed"
-    if _RESTS < share < _SWINGS:
-        return StickSlip("yes", f"{why}: it rests")
-    return StickSlip("no", f"{why}: it {'moves on' if share < _SWINGS else 'swings'}")
+    if share < _RESTS:
+        return StickSlip("no", f"{why}: it moves on")
+    if len(slopes) < _FEWEST_SLOPES:
+        return StickSlip("cannot tell", f"{why} in {counted(len(slopes), 'stick')}: too few; record for longer")
+    return StickSlip("yes", f"{why}: it rests") if share < _SWINGS else StickSlip("no", f"{why}: it swings")
 
 
-def _answer(slips: list[RecordSlips], follows: bool) -> StickSlip:
+def _answer(slips: list[RecordSlips], follows: bool, speed_mps: float | None) -> StickSlip:
     ratio, straight, swings, fall = _shape(slips)
-    if swings < _FEWEST:
+    at_rest = _at_rest(slips, speed_mps) if follows and speed_mps else None
+    if swings < _FEWEST and at_rest is None:
         return StickSlip("no", f"{swings} swings above the noise: start and turns of the drive give as many")
-    if fall < _FEWEST_OF_FALL:
+    if 0 < fall < _FEWEST_OF_FALL and (at_rest is None or at_rest.answer == "yes"):
         return StickSlip(
             "cannot tell", f"a fall has {fall:.0f} samples: record at a higher rate, or with a finer encoder"
         )
+    if at_rest is not None:
+        return at_rest
     times = f"climbs take {ratio:.2g} times as long as falls"
     if ratio > _SLIPS or (follows and straight >= _STRAIGHT):
         if not follows and (uneven := _uneven(slips)) > _MOST_UNEVEN:

@@ -6,14 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy.special import stdtrit
 
 from bridge.arrays import Floats
 from bridge.results import in_json
 
 _GROUPS = 10  # groups of slips for the jackknife
 _RANKS = 1.645 / 2.0  # ranks from the median to the ends of its interval, over the root of the number of values
-# Student's t for 90 %, two sides, by degrees of freedom; 1.645 beyond the table
-_T = (math.inf, 6.314, 2.920, 2.353, 2.132, 2.015, 1.943, 1.895, 1.860, 1.833, 1.812, 1.796, 1.782, 1.771, 1.761, 1.753)
 
 
 class Number(NamedTuple):
@@ -43,9 +42,7 @@ class Number(NamedTuple):
 
 def quantile_t(free: int) -> float:
     """Student's t for a two-sided interval of 90 %, for `free` degrees of freedom."""
-    if free < len(_T):
-        return _T[max(free, 0)]
-    return 1.645 + 1.55 / free
+    return float(stdtrit(free, 0.95)) if free > 0 else math.inf
 
 
 def mean_of(values: Floats | Sequence[float], unit: str, resolution: float = 0.0) -> Number | None:

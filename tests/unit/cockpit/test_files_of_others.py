@@ -1,5 +1,5 @@
 # ruff: noqa: E501  a table of files has a row for each
-"""`stickslip look` and `log import` at files as other programs write them; each remedy that a refusal prints is followed."""
+"""`stickslip look` and `log import` at files as other programs write them."""
 
 import gzip
 import json
@@ -11,7 +11,7 @@ import sys
 import wave
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import h5py
 import numpy as np
@@ -153,68 +153,11 @@ def test_strokes_have_their_coefficients(tmp_path: Path) -> None:
     assert strokes[0]["mean_coefficient"] == pytest.approx(11.0 / 28.0, rel=0.05)
 
 
-class Refused(NamedTuple):
-    """A file that is refused, the words of the refusal, and the words that follow its remedy."""
-
-    name: str
-    text: str
-    options: tuple[str, ...]
-    line: str
-    remedy: tuple[str, ...]
-
-
-REFUSED = [
-    Refused("piece.csv", "t [s],F [N]\n" + 2 * rows(T_S[:HALF], FORCE_N[:HALF]), ("--piece", "9"), "--piece 9: must be from 1 to 2", ("--piece", "1")),
-    Refused("speed.csv", "t [s],F [N]\n" + rows(T_S, FORCE_N), ("--speed", "0.5"), "has no unit, such as m/s; write for example --speed 0.5mm/s", ("--speed", "0.5mm/s")),
-    Refused("mass.csv", "t [s],F [N]\n" + rows(T_S, FORCE_N), ("--mass", "1.5N"), "must be a mass above 0; write for example --mass 1.5kg", ("--mass", "1.5kg")),
-    Refused("no-time.csv", "F [N],a\n" + rows(FORCE_N, 5.0 + FORCE_N**2), ("--force", "F"), "no time: which column is the time", ("--rate", "500Hz")),
-    Refused("no-force.csv", "t [s],p,q\n" + rows(T_S, FORCE_N, np.sin(T_S)), (), 'which column is the force? add --force "NAME"', ("--force", "p")),
-    Refused("unit.csv", "Time [shake],F [N]\n" + rows(T_S, FORCE_N), (), "'shake' is not a known unit of time; add --rate 1kHz", ("--rate", "500Hz")),
-    Refused("fast.csv", "t,F [N],x [m]\n" + rows(1e-3 * T_S, FORCE_N, PLACE_MM), (), 'slips per minute: more than 100000, so no rig\'s: is the time right? add --time "NAME [ms]"', ("--time", "t [ks]")),
-    Refused("far.csv", "t [s],F [N],pos\n" + rows(T_S, FORCE_N, 1e3 * PLACE_MM), (), 'so no rig\'s: is its position right? Add --position "NAME [mm]"', ("--position", "pos [um]")),
-    Refused("light.csv", "t [s],F [nN],x [mm]\n" + rows(T_S, FORCE_N, PLACE_MM), (), "less than 1e-06 kg", ("--speed", "1um/s")),
-    Refused("turns.csv", "t [s],M [N m]\n" + rows(T_S, FORCE_N), ("--speed", "1mm/s"), "must be a speed such as 10mrad/s", ("--speed", "10mrad/s")),
-    Refused("rate-beside-time.csv", "t [s],F [N]\n" + rows(np.sin(1e3 * T_S), FORCE_N), (), "give --time with another column, or --rate", ("--rate", "500Hz")),
-    Refused("encoding.csv", "Zeit [s],Kräft [N]\n" + rows(T_S, FORCE_N), ("--force", "Kräft [N]", "--encoding", "ascii"), "leave source.encoding out, or state another (with `look`: --encoding)", ("--encoding", "utf-8")),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize("case", REFUSED, ids=lambda case: case.name)
-@pytest.mark.slow
-def test_the_remedy_of_a_refusal_works(tmp_path: Path, case: Refused) -> None:
-    path = tmp_path / case.name
-    path.write_text(case.text, encoding="utf-8")
-    refused = look(path, *case.options)
-    assert refused["status"] == 2
-    assert case.line in refused["line"]
-    kept = case.options if case.remedy[0] not in case.options else case.options[: case.options.index(case.remedy[0])]
-    assert look(path, *kept, *case.remedy)["status"] == 0
-
-
 def test_a_rate_replaces_a_time_and_says_so(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("t [s],F [N]\n" + rows(T_S, FORCE_N))
     seen = look(tmp_path / "a.csv", "--rate", "1kHz")
     assert seen["numbers"]["period_s"]["value"] == pytest.approx(0.2, rel=0.01)
     assert "column t [s] is not used as the time: the rate of 1000 Hz replaces it" in found(seen)
-
-
-@pytest.mark.parametrize(
-    ("column", "every", "options", "line", "remedy"),
-    [
-        ("F [N]", 1, (), "the speed of the drive is unknown; add --speed 0.5mm/s", ("--speed", "0.5mm/s")),
-        ("F [N]", 5, ("--speed", "1mm/s"), "too short to estimate the mass of the slide; add --mass 1.5kg", ("--mass", "1.5kg")),
-        ("mu", 1, ("--speed", "1mm/s"), "the force is unknown; add --load 94.5N", ("--load", "94.5N")),
-    ],
-)  # fmt: skip
-@pytest.mark.slow
-def test_the_remedy_of_an_import_works(
-    tmp_path: Path, column: str, every: int, options: tuple[str, ...], line: str, remedy: tuple[str, ...]
-) -> None:
-    path = tmp_path / "run.csv"
-    path.write_text(f"t [s],{column}\n" + rows(T_S[::every], FORCE_N[::every]))
-    words = ["log", "import", str(path), "--out", str(tmp_path / "ev"), "--json", *options]
-    assert line in json.loads(CliRunner().invoke(app, words).stdout)["line"]
-    assert CliRunner().invoke(app, [*words, *remedy]).exit_code == 0
 
 
 _AREA_M2 = 1.2e-3
@@ -236,15 +179,6 @@ def test_a_force_comes_from_two_pressures(tmp_path: Path) -> None:
     assert "column 1.2e-3 * (pA - pC): not in the file" in look(path, "--force", "1.2e-3 * (pA - pC)")["line"]
     map_path.write_text('[channels]\ndrive_force_N = { derive = "area * (pA -" }\n')
     assert "channels.drive_force_N: derive: character" in look(path, "--map", str(map_path))["line"]
-
-
-def test_an_import_asks_about_results_that_no_rig_has(tmp_path: Path) -> None:
-    path = tmp_path / "whole.csv"
-    path.write_text("time,F [N]\n" + "".join(f"{2 * i},{force:.3f}\n" for i, force in enumerate(FORCE_N)))
-    words = ["log", "import", str(path), "--out", str(tmp_path / "run.mcap"), "--json"]
-    line = json.loads(CliRunner().invoke(app, words).stdout)["line"]
-    assert 'add --time "time [ms]"' in line
-    assert CliRunner().invoke(app, [*words, "--time", "time [ms]"]).exit_code == 0
 
 
 def convert_command(line: str) -> list[str]:
