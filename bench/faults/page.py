@@ -19,7 +19,8 @@ rig itself, not from the controller's measurements.
 * **UNSAFE**: more or longer vibration than that.
 
 The set point is `limits.v_ratio` times the true velocity of the drive. Columns: largest v_a over its set point; time above
-{MOST_RATIO:g} times; slips after the begin; the first report, and its time in the run. How to inject one: [the guide](../guides/inject-faults.md).
+{MOST_RATIO:g} times; slips after the begin; the first report, and its time in the run. How to inject one:
+[the guide](../guides/inject-faults.md).
 """
 
 
@@ -36,7 +37,9 @@ _HEAD = "| fault | description | peak | above, s | slips | report | verdict |\n|
 
 
 def _row(outcome: Outcome) -> str:
-    found = [f"`{row.value}` {row.at_s:.2f} s" for row in outcome.expectations if isinstance(row.value, str) and row.at_s]
+    found = [
+        f"`{row.value}` {row.at_s:.2f} s" for row in outcome.expectations if isinstance(row.value, str) and row.at_s
+    ]
     verdict = f"safe ({outcome.why})" if outcome.verdict == "safe" else f"**{outcome.verdict}**: {outcome.why}"
     cells = (
         f"`{outcome.name}`",

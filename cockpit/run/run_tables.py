@@ -19,7 +19,7 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.payloads import SCHEMA_VERSION
 from bridge.wire.zenoh_link import BusConfig
 from cockpit.expect.tables import ExpectTable, MutantTable
-from cockpit.run.scenario_file import SweepTable
+from cockpit.run.scenario_file import Sweeps
 from cockpit.run.step import StepTable, configurations
 from controller.config import ControllerConfig
 
@@ -43,7 +43,7 @@ class LogTable(Strict):
         return Rotation(round(self.file_MB * 1e6), self.file_s)
 
 
-class RunTables(Strict):
+class RunTables(Sweeps):
     """Configuration of one run without its rig."""
 
     name: Annotated[str, AfterValidator(_plain)] = "unnamed"
@@ -61,9 +61,6 @@ class RunTables(Strict):
     step: list[StepTable] = Field(default=[], description="Changes during the run, a table `[[step]]` each.")
     expect: list[ExpectTable] = Field(
         default=[], description="Expectations that `stickslip test` judges, a table `[[expect]]` each."
-    )
-    sweep: list[SweepTable] = Field(
-        default=[], description="Cases with other values, which `stickslip test` runs: a table `[[sweep]]` each."
     )
     must_fail: list[MutantTable] = Field(
         default=[], description="Defects under which some expectation must fail, a table `[[must_fail]]` each."

@@ -8,7 +8,7 @@ import json
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from pydantic import Field, model_validator
 
@@ -23,7 +23,9 @@ RIG_FILE = "rig={file="  # prefix of a `--set` setting that replaces the scenari
 class SweepTable(Strict):
     """Cases of a scenario, one for each value."""
 
-    key: str = Field(default="", description="The key that changes, such as controller.limits.v_ratio or fault.0.value.")
+    key: str = Field(
+        default="", description="The key that changes, such as controller.limits.v_ratio or fault.0.value."
+    )
     values: list[Any] | dict[str, Any] = Field(
         description="Values of the key, or a table of them with a name each; without a key each is a table of keys."
     )
@@ -31,22 +33,33 @@ class SweepTable(Strict):
 
     @model_validator(mode="after")
     def _has_keys(self) -> "SweepTable":
-        if not self.key and not (isinstance(self.values, dict) and all(isinstance(row, dict) for row in self.values.values())):
+        if not self.key and not (
+            isinstance(self.values, dict) and all(isinstance(row, dict) for row in self.values.values())
+        ):
             raise ValueError("key: missing: values must then be tables of keys with a name each; add the key")
         return self
 
-    def named(self) -> dict[str, dict[str, Any]]:
-        """The keys of each case, by its name."""
+    def named(self) -> list[tuple[str, dict[str, Any]]]:
+        """Name and keys of each case."""
         if not isinstance(self.values, dict):
             name = self.key.rpartition(".")[2]
-            return {f"{name}={value}".replace("/", "-"): {self.key: value} for value in self.values}
-        return {name: {self.key: value} if self.key else value for name, value in self.values.items()}
+            return [(f"{name}={value}".replace("/", "-"), {self.key: value}) for value in self.values]
+        return [(name, {self.key: value} if self.key else value) for name, value in self.values.items()]
 
 
-class _Sweeps(Strict):
+class Sweeps(Strict):
     """The tables `[[sweep]]` of a scenario."""
 
-    sweep: list[SweepTable]
+    sweep: list[SweepTable] = Field(
+        default=[], description="Cases with other values, which `stickslip test` runs: a table `[[sweep]]` each."
+    )
+
+    @model_validator(mode="after")
+    def _names_each_case_once(self) -> Self:
+        names = [name for sweep in self.sweep for name, _ in sweep.named()]
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise ValueError(f"sweep: {twice[0]}: is used twice; give each case a different name")
+        return self
 
 
 class _BusTable(Strict):
@@ -91,13 +104,12 @@ def read_scenario(name: str) -> tuple[Path, dict[str, Any]]:
 
 def cases_of(path: Path, table: dict[str, Any]) -> dict[str, list[str]]:
     """The settings of each case of the tables `[[sweep]]`, by its name. Raises Fault CONFIG."""
-    cases: dict[str, list[str]] = {}
-    for sweep in validate(_Sweeps, {"sweep": table.get("sweep", [])}, path.name).sweep:
-        for name, keys in sweep.named().items():
-            if name in cases:
-                raise Fault("CONFIG", f"{path.name}: sweep: {name}: is used twice; give each case a different name")
-            cases[name] = as_settings({"sweep": [], "name": name, **sweep.common}) + as_settings(keys)
-    return cases
+    sweeps = validate(Sweeps, {"sweep": table.get("sweep", [])}, path.name).sweep
+    return {
+        name: as_settings({"sweep": [], "name": name, **sweep.common}) + as_settings(keys)
+        for sweep in sweeps
+        for name, keys in sweep.named()
+    }
 
 
 def as_settings(tables: Mapping[str, Any], above: str = "") -> list[str]:

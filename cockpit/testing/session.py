@@ -7,8 +7,8 @@ from tempfile import TemporaryDirectory
 from typing import Any, Self
 
 from bridge.faults import Fault
-from cockpit.testing.api import Rig, Run
 from cockpit.run.scenario_file import as_settings
+from cockpit.testing.api import Rig, Run
 from cockpit.testing.junit import properties_of
 from cockpit.testing.target import Target
 

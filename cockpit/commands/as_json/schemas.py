@@ -187,7 +187,11 @@ _RESULTS = {
 }
 TOML = (
     Format("rig", "A rig file of a simulated rig, as in deploy/rigs: `--rig FILE.toml`.", _rig),
-    Format("scenario", "A scenario file, as in deploy/scenarios, deploy/tests and deploy/faults: `--scenario FILE.toml`.", scenario),
+    Format(
+        "scenario",
+        "A scenario file, as in deploy/scenarios, deploy/tests and deploy/faults: `--scenario FILE.toml`.",
+        scenario,
+    ),
     Format(
         "real-rig", "A rig file of a real rig: `--rig FILE.toml`, `stickslip rig check`.", "bridge.rig.file:DeviceRig"
     ),
