@@ -104,7 +104,8 @@ def _decimal_comma(text: str, error: str) -> str:
 def with_overrides(table: dict[str, Any], settings: Iterable[str]) -> dict[str, Any]:
     """A copy of `table` with `key.sub=value` settings applied; values are TOML (`1.1`, `true`, `"text"`, `[1, 2]`).
 
-    Raises Fault CONFIG when a setting has no `=`, or goes below a value that is not a table.
+    A number in a key counts the entries of a list, and the next number adds an entry: `fault.0.value=0.5`.
+    Raises Fault CONFIG when a setting has no `=`, or goes below a value that is not a table or list.
     """
     result = dict(table)
     for setting in settings:
@@ -115,16 +116,25 @@ def with_overrides(table: dict[str, Any], settings: Iterable[str]) -> dict[str, 
             value = tomllib.loads(f"value = {text}")["value"]
         except (ValueError, RecursionError):
             value = text
-        at = result
-        parts = key.strip().split(".")
-        for part in parts[:-1]:
-            inner = at.get(part, {})
-            if not isinstance(inner, dict):
-                raise Fault("CONFIG", f"--set {setting}: {part} is a value, not a table; nothing lies below it")
-            at[part] = dict(inner)
-            at = at[part]
-        at[parts[-1]] = value
+        try:
+            result = _with(result, key.strip().split("."), value)
+        except ValueError as error:
+            raise Fault("CONFIG", f"--set {setting}: {error}") from None
     return result
+
+
+def _with(below: Any, keys: Sequence[str], value: Any, place: str = "") -> Any:
+    """A copy of a table or list with `value` in place of the value at `keys`. Raises ValueError."""
+    key, *rest = keys
+    if isinstance(below, dict):
+        return below | {key: _with(below.get(key, {}), rest, value, key) if rest else value}
+    if not isinstance(below, list):
+        raise ValueError(f"{place} is a value, not a table; nothing lies below it")
+    if not key.isdecimal() or int(key) > len(below):
+        raise ValueError(f"{place}.{key}: {place} is a list: must be {place}.0 to {place}.{len(below)}; change the key")
+    rows = [*below, {}]
+    rows[int(key)] = _with(rows[int(key)], rest, value, key) if rest else value
+    return rows if int(key) == len(below) else rows[:-1]
 
 
 def made_with(make: Callable[[Sequence[str]], T], source: str, settings: Sequence[str], kept: Sequence[str] = ()) -> T:

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableType]
 
-from bench.faults.judge import SAFE, SILENT, UNSAFE, Outcome, judge, refused
+from bench.faults.judge import SAFE, SILENT, UNSAFE, Outcome, judge
 from bridge.faults import Fault
 from bridge.kernel_cache import compile_once
 from bridge.results import in_json
@@ -40,28 +40,20 @@ class FaultBench(NamedTuple):
         counts = ", ".join(f"{count} {verdict}" for verdict, count in self.counts.items())
         lines = [f"faults   {counted(len(self.outcomes), 'fault')}: {counts}"]
         lines += [f"{row.verdict:<8} {row.name}: {row.why}" for row in self.outcomes if row.verdict != SAFE]
-        return lines + [f"WORSE    {bad.name}: is {bad.verdict}, must be {bad.open or SAFE}" for bad in self.worse]
+        return lines + [f"WORSE    {bad.name}: is {bad.verdict}, must be {bad.known}" for bad in self.worse]
 
 
 def chosen(catalogue: Sequence[CatalogueEntry], only: Sequence[str]) -> list[CatalogueEntry]:
     """Entries by group or by start of the name; all without a selection. Raises Fault CONFIG."""
 
     def fits(named: CatalogueEntry, word: str) -> bool:
-        return named.group == word or named.entry.name.startswith(word)
+        return named.group == word or named.name.startswith(word)
 
     for word in only:
         if not any(fits(named, word) for named in catalogue):
             groups = ", ".join(dict.fromkeys(named.group for named in catalogue))
             raise Fault("CONFIG", f"--only {word}: no such group or entry; groups: {groups}")
     return [named for named in catalogue if not only or any(fits(named, word) for word in only)]
-
-
-def judge_one(case: CatalogueEntry) -> Outcome:
-    """One entry; an invalid scenario is a finding, not a fault of the bench."""
-    try:
-        return judge(case)
-    except Fault as fault:
-        return refused(case, fault)
 
 
 def bench(catalogue: Sequence[CatalogueEntry], jobs: int, progress: Callable[[float, str], None]) -> FaultBench:
@@ -75,7 +67,7 @@ def bench(catalogue: Sequence[CatalogueEntry], jobs: int, progress: Callable[[fl
     """
     plan = list(catalogue)
     if plan and jobs > 1:
-        compile_once("the bench of faults", lambda: judge_one(_short(plan[0])))
+        compile_once("the bench of faults", lambda: judge(plan[0]))
     done: list[Outcome] = []
     for outcome in _each(plan, jobs):
         done.append(outcome)
@@ -83,13 +75,9 @@ def bench(catalogue: Sequence[CatalogueEntry], jobs: int, progress: Callable[[fl
     return FaultBench(done)
 
 
-def _short(case: CatalogueEntry) -> CatalogueEntry:
-    return case.model_copy(update={"entry": case.entry.model_copy(update={"begin_s": 0.05, "watch_s": 0.05})})
-
-
 def _each(plan: Sequence[CatalogueEntry], jobs: int) -> Iterator[Outcome]:
     if jobs == 1:
-        yield from map(judge_one, plan)
+        yield from map(judge, plan)
         return
     parallel: Any = Parallel(n_jobs=jobs, return_as="generator")
-    yield from parallel(delayed(judge_one)(case) for case in plan)
+    yield from parallel(delayed(judge)(case) for case in plan)

@@ -1,13 +1,13 @@
 """A run in simulated time with the true motion of its rig, block by block."""
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from bridge.wire.topics import Outgoing
-from cockpit.run.in_process import TimedAction
 from cockpit.run.scenario import Scenario
 from cockpit.run.simulated.run import SimulatedRun
 from plant.records import TRUTH
@@ -20,6 +20,7 @@ class Truth(NamedTuple):
     """True motion of the rig, [blocks] each."""
 
     t_s: npt.NDArray[np.float64]  # simulated time at the end of each block
+    amplitude_m: npt.NDArray[np.float64]  # of the base
     vibration_mps: npt.NDArray[np.float64]  # v_a of the base
     drive_mps: npt.NDArray[np.float64]  # v_d, mean of the block
     slide_mps: npt.NDArray[np.float64]  # slide velocity of largest magnitude in the block, negative backwards
@@ -30,7 +31,7 @@ class _TruthNode(PlantNode):
 
     def __init__(
         self,
-        truths: list[tuple[float, float, float, float]],
+        truths: list[tuple[float, ...]],
         now_ns: Callable[[], int],
         observe: Callable[[PlantNode], None],
         **rest: Any,
@@ -48,18 +49,20 @@ class _TruthNode(PlantNode):
         drive_mps = (drive_m - self._drive_m) / (self.block_ns * 1e-9)
         self._drive_m = drive_m
         fastest_mps = float(speeds[np.abs(speeds).argmax()])
-        self._truths.append((self._now_ns() * 1e-9, self.vibration_mps, drive_mps, fastest_mps))
+        rad_per_s = 2.0 * math.pi * max(float(self.applied.frequency_Hz), 1.0)  # at rest it is 0
+        amplitude_m = self.vibration_mps / rad_per_s
+        self._truths.append((self._now_ns() * 1e-9, amplitude_m, self.vibration_mps, drive_mps, fastest_mps))
         self._observe(self)
         return sent
 
 
 class TruthRun(SimulatedRun):
-    """A simulated run with operator commands `words`, which keeps the truth of its rig."""
+    """A simulated run, which keeps the truth of its rig."""
 
-    def __init__(self, scenario: Scenario, words: Sequence[TimedAction]) -> None:
+    def __init__(self, scenario: Scenario) -> None:
         SimulatedRun.__init__(self, scenario)
-        self._truths: list[tuple[float, float, float, float]] = []
-        self.command(words)
+        self.scenario = scenario
+        self._truths: list[tuple[float, ...]] = []
 
     def plant_node(self, **settings: Any) -> PlantNode:
         """The rig, which appends the truth of each block."""
@@ -71,4 +74,4 @@ class TruthRun(SimulatedRun):
     @property
     def truth(self) -> Truth:
         """The truth of all blocks so far."""
-        return Truth(*np.array(self._truths).reshape(-1, 4).T)
+        return Truth(*np.array(self._truths).reshape(-1, 5).T)

@@ -37,8 +37,10 @@ def fault(
     as_json: Json = None,
 ) -> None:
     """Inject a fault into a running loop with a simulated rig; a real rig refuses it. Its processes must belong to this user."""
+    from bridge.rig.faults.table import FaultTable
     from cockpit.faults.catalogue import FaultList, find_entry, known_faults
     from cockpit.faults.injection import inject
+    from cockpit.run.scenario import load_scenario
 
     if known:
         catalogue: FaultList = known_faults()
@@ -46,14 +48,18 @@ def fault(
         return
     if not (name or clear):
         raise Fault("CONFIG", "NAME: missing: must be a fault of the catalogue; see `stickslip fault --list`")
-    tables = list(find_entry(name).entry.fault) if name else []
+    tables = load_scenario(find_entry(name).scenario, []).fault if name else []
     if name and not tables:
         raise Fault(
             "CONFIG", f"{name}: is an operator command: must be a fault; see `stickslip {name.split('-')[0]} --help`"
         )
     changed = {} if for_s is None else {"for_s": for_s}
+    begin_s = min((table.from_s for table in tables), default=0.0)
     tables = [
-        type(table).model_validate(table.model_dump() | {"name": table.name or name} | changed) for table in tables
+        FaultTable.model_validate(
+            table.model_dump() | {"name": table.name or name, "from_s": table.from_s - begin_s} | changed
+        )
+        for table in tables
     ]
     done = inject(shared.bus(), name or "clear", tables, clear)
     print_result(as_json, done, done.in_words())

@@ -6,14 +6,14 @@ from typing import Any, NamedTuple
 
 from pydantic import model_validator
 
-from bridge.config import made_with, read_toml, validate, with_overrides
+from bridge.config import made_with, validate, with_overrides
 from bridge.faults import Fault
 from bridge.guard.absent import absent
 from bridge.rig.faults.kinds import EXCITER
 from bridge.rig.file import DeviceRig
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.run.run_tables import RunTables, header_of
-from cockpit.run.scenario_file import RIG_FILE, find, is_real_rig, path_of_rig, rig_table, with_rig
+from cockpit.run.scenario_file import RIG_FILE, find, is_real_rig, path_of_rig, read_scenario, rig_table, with_rig
 from controller.config import AmplitudeConfig, seeing, within
 
 # The default scenario describes the paper's simulated rig; a real rig without another scenario runs with the controller's
@@ -107,8 +107,8 @@ def load_device_rig(name: str, settings: list[str]) -> tuple[DeviceRig, Path]:
 
 
 def _tables(name: str, settings: Sequence[str]) -> _Tables:
-    path = find(name, "scenarios")
-    table = with_overrides({"name": path.stem} | read_toml(path), settings)
+    path, given = read_scenario(name)
+    table = with_overrides(given, settings)
     rig_path = path_of_rig(path, table)
     run, source = with_rig(path, table)
     rig: Any = run.get("rig")

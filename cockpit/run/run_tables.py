@@ -19,6 +19,7 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.payloads import SCHEMA_VERSION
 from bridge.wire.zenoh_link import BusConfig
 from cockpit.expect.tables import ExpectTable, MutantTable
+from cockpit.run.scenario_file import Sweeps
 from cockpit.run.step import StepTable, configurations
 from controller.config import ControllerConfig
 
@@ -42,7 +43,7 @@ class LogTable(Strict):
         return Rotation(round(self.file_MB * 1e6), self.file_s)
 
 
-class RunTables(Strict):
+class RunTables(Sweeps):
     """Configuration of one run without its rig."""
 
     name: Annotated[str, AfterValidator(_plain)] = "unnamed"

@@ -5,12 +5,12 @@ from typing import Any
 
 from pydantic import model_validator
 
-from bridge.config import made_with, read_toml, validate, with_overrides
+from bridge.config import made_with, validate, with_overrides
 from bridge.faults import Fault
 from bridge.guard.absent import absent
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.run.run_tables import RunTables, header_of
-from cockpit.run.scenario_file import RIG_FILE, find, is_real_rig, rig_table, with_rig
+from cockpit.run.scenario_file import RIG_FILE, find, is_real_rig, read_scenario, rig_table, with_rig
 from cockpit.run.sensor_needs import refuse_blind_sensors, refuse_out_of_travel
 from cockpit.run.step import with_speeds
 from controller.config import seeing, within
@@ -76,13 +76,12 @@ def load_scenario(name: str, settings: list[str]) -> Scenario:
 
     Its table `rig` names a rig file (`file`) and may override any of its keys.
     """
-    path = find(name, "scenarios")
-    given = read_toml(path)
+    path, given = read_scenario(name)
     if "contact" in given and "rig" not in given:
         raise Fault("CONFIG", f"{path}: is a rig, not a scenario; give it with --rig")
 
     def table(settings: Sequence[str]) -> tuple[dict[str, Any], str]:
-        return with_rig(path, with_overrides({"name": path.stem} | given, settings))
+        return with_rig(path, with_overrides(given, settings))
 
     if is_real_rig(table(settings)[0].get("rig")):
         raise Fault("CONFIG", f"{name}: names a real rig: this command needs a simulated rig; give another --rig")

@@ -5,9 +5,12 @@ another table of the scenario is wrong.
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
+
+from pydantic import Field, model_validator
 
 from bridge.config import Strict, made_with, read_toml, validate, with_overrides
 from bridge.faults import Fault
@@ -15,6 +18,48 @@ from bridge.wire.zenoh_link import BusConfig
 
 SIMULATED = "sim"  # the adapter of a rig file that describes a simulated rig
 RIG_FILE = "rig={file="  # prefix of a `--set` setting that replaces the scenario's rig file
+
+
+class SweepTable(Strict):
+    """Cases of a scenario, one for each value."""
+
+    key: str = Field(
+        default="", description="The key that changes, such as controller.limits.v_ratio or fault.0.value."
+    )
+    values: list[Any] | dict[str, Any] = Field(
+        description="Values of the key, or a table of them with a name each; without a key each is a table of keys."
+    )
+    common: dict[str, Any] = Field(default={}, description="Further keys of the scenario, for all these values.")
+
+    @model_validator(mode="after")
+    def _has_keys(self) -> "SweepTable":
+        if not self.key and not (
+            isinstance(self.values, dict) and all(isinstance(row, dict) for row in self.values.values())
+        ):
+            raise ValueError("key: missing: values must then be tables of keys with a name each; add the key")
+        return self
+
+    def named(self) -> list[tuple[str, dict[str, Any]]]:
+        """Name and keys of each case."""
+        if not isinstance(self.values, dict):
+            name = self.key.rpartition(".")[2]
+            return [(f"{name}={value}".replace("/", "-"), {self.key: value}) for value in self.values]
+        return [(name, {self.key: value} if self.key else value) for name, value in self.values.items()]
+
+
+class Sweeps(Strict):
+    """The tables `[[sweep]]` of a scenario."""
+
+    sweep: list[SweepTable] = Field(
+        default=[], description="Cases with other values, which `stickslip test` runs: a table `[[sweep]]` each."
+    )
+
+    @model_validator(mode="after")
+    def _names_each_case_once(self) -> Self:
+        names = [name for sweep in self.sweep for name, _ in sweep.named()]
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise ValueError(f"sweep: {twice[0]}: is used twice; give each case a different name")
+        return self
 
 
 class _BusTable(Strict):
@@ -41,6 +86,48 @@ def find(name: str, kind: str, key: str = "") -> Path:
             f"{key}{name}: no such {kind.removesuffix('s')}; known: {', '.join(known)}; or give the path of a .toml file",
         )
     return known[name]
+
+
+def read_scenario(name: str) -> tuple[Path, dict[str, Any]]:
+    """Path and table of a scenario by name or path; NAME:CASE is a case of its sweeps. Raises Fault CONFIG."""
+    given, _, case = name.partition(":")
+    path = find(given, "scenarios")
+    table = {"name": path.stem} | read_toml(path)
+    if not case:
+        return path, table
+    known = cases_of(path, table)
+    if case not in known:
+        near = get_close_matches(case, [*known], 3, 0.6)
+        raise Fault("CONFIG", f"{name}: no such case; {'perhaps' if near else 'known:'} {', '.join(near or known)}")
+    return path, with_overrides(table, known[case])
+
+
+def cases_of(path: Path, table: dict[str, Any]) -> dict[str, list[str]]:
+    """The settings of each case of the tables `[[sweep]]`, by its name. Raises Fault CONFIG."""
+    sweeps = validate(Sweeps, {"sweep": table.get("sweep", [])}, path.name).sweep
+    return {
+        name: as_settings({"sweep": [], "name": name, **sweep.common}) + as_settings(keys)
+        for sweep in sweeps
+        for name, keys in sweep.named()
+    }
+
+
+def as_settings(tables: Mapping[str, Any], above: str = "") -> list[str]:
+    """Settings `key=value` of tables in tables: {"controller": {"limits": {"v_ratio": 1.3}}}."""
+    settings: list[str] = []
+    for key, value in tables.items():
+        place = f"{above}{key}"
+        settings += as_settings(value, f"{place}.") if isinstance(value, Mapping) else [f"{place}={in_toml(value)}"]
+    return settings
+
+
+def in_toml(value: Any) -> str:
+    """A value as TOML in one line."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key} = {in_toml(inner)}" for key, inner in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(in_toml, value))}]"
+    return json.dumps(value, ensure_ascii=False)
 
 
 def merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
@@ -93,8 +180,7 @@ def with_rig(path: Path, table: dict[str, Any]) -> tuple[dict[str, Any], str]:
 
 def load_bus(name: str, settings: list[str]) -> BusConfig:
     """The bus of a scenario by name or path, with `bus.key=value` settings applied. Raises Fault CONFIG."""
-    path = find(name, "scenarios")
-    given = read_toml(path)
+    path, given = read_scenario(name)
 
     def bus(settings: Sequence[str]) -> BusConfig:
         table = with_overrides(given, settings)

@@ -1,14 +1,13 @@
 """The rig of a test in Python, as the fixture `rig` of pytest gives it: a scenario, its runs, and their expectations."""
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypedDict
 
 from typing_extensions import Unpack
 
 from bridge.arrays import Floats
-from bridge.config import read_toml, validate
+from bridge.config import validate
 from bridge.faults import Fault
 from bridge.log.logfile import read_run
 from cockpit.expect.judge import PASSED, Expected, judge
@@ -17,7 +16,7 @@ from cockpit.expect.tables import ExpectTable, refuse_word
 from cockpit.figures.signals import SIGNALS
 from cockpit.run.device_run import DeviceRun
 from cockpit.run.scenario import Scenario
-from cockpit.run.scenario_file import find
+from cockpit.run.scenario_file import in_toml, read_scenario
 from cockpit.testing.target import Target, load
 
 
@@ -120,7 +119,7 @@ class Rig:
     def __init__(self, scenario: str, settings: list[str], target: Target, folder: Path, runs: list[Run]) -> None:
         self._scenario, self._settings, self._target = scenario, settings, target
         self._folder, self._runs = folder, runs
-        given = read_toml(find(scenario, "scenarios"))
+        given = read_scenario(scenario)[1]
         self._changes: dict[str, list[dict[str, Any]]] = {name: list(given.get(name, [])) for name in ("fault", "step")}
 
     def fault(
@@ -154,7 +153,7 @@ class Rig:
     def _add(self, table: str, given: dict[str, Any]) -> None:
         row = {key: value for key, value in given.items() if value is not None}
         self._changes[table].append(row)
-        self._settings = [*self._settings, f"{table}={_in_toml(self._changes[table])}"]
+        self._settings = [*self._settings, f"{table}={in_toml(self._changes[table])}"]
 
     def run(self, seconds: float | None = None) -> Run:
         """Run for a time; not given: as long as the scenario. Raises Fault."""
@@ -164,20 +163,3 @@ class Rig:
         test.make(self._scenario, log)
         self._runs.append(Run(log, test.run))
         return self._runs[-1]
-
-
-def as_settings(tables: Mapping[str, Any], above: str = "") -> list[str]:
-    """Settings `key=value` of tables in tables: {"controller": {"limits": {"v_ratio": 1.3}}}."""
-    settings: list[str] = []
-    for key, value in tables.items():
-        place = f"{above}{key}"
-        settings += as_settings(value, f"{place}.") if isinstance(value, Mapping) else [f"{place}={_in_toml(value)}"]
-    return settings
-
-
-def _in_toml(value: Any) -> str:
-    if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key} = {_in_toml(inner)}" for key, inner in value.items()) + "}"
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_in_toml, value))}]"
-    return json.dumps(value, ensure_ascii=False)

@@ -7,7 +7,8 @@ from tempfile import TemporaryDirectory
 from typing import Any, Self
 
 from bridge.faults import Fault
-from cockpit.testing.api import Rig, Run, as_settings
+from cockpit.run.scenario_file import as_settings
+from cockpit.testing.api import Rig, Run
 from cockpit.testing.junit import properties_of
 from cockpit.testing.target import Target
 
@@ -35,8 +36,8 @@ class Session:
 
     def rig(self, scenario: str, **settings: Any) -> Rig:
         """The rig of a scenario. Raises Fault CONFIG."""
-        near = self._folder / scenario
-        name = str(near) if scenario.endswith(".toml") and near.is_file() else scenario
+        file = self._folder / scenario.partition(":")[0]  # a case of a sweep: FILE.toml:CASE
+        name = str(self._folder / scenario) if file.suffix == ".toml" and file.is_file() else scenario
         return Rig(name, as_settings(settings), self._target, Path(self._logs.name), self._runs)
 
     def properties(self, marked: list[str]) -> list[tuple[str, str]]:

@@ -14,6 +14,7 @@ from bridge.kernel_cache import compile_once
 from bridge.results import in_json
 from bridge.units import counted
 from cockpit.expect.judge import FAILED, PASSED, UNTESTED
+from cockpit.run.scenario_file import cases_of as sweep_cases
 from cockpit.testing.one import ERROR, TestCase, Tested, run_test
 from cockpit.testing.target import NO_TARGET, Target, load
 
@@ -70,12 +71,12 @@ def cases_of(paths: Sequence[Path], settings: list[str], target: Target = NO_TAR
     """The tests of files and folders, and the number of other .toml files in the folders. Raises Fault CONFIG.
 
     A file in a folder is a test if it holds `[[expect]]`, or a key like it, or cannot be read; a file that is named itself
-    is always one.
+    is always one. A file with `[[sweep]]` is a test for each of its cases; FILE.toml:CASE names one.
     """
     files: list[Path] = []
     others = 0
     for path in paths:
-        if not path.exists():
+        if not Path(str(path).partition(":")[0]).exists():
             raise Fault("CONFIG", f"{path}: does not exist: must be a scenario or a folder of them; give another path")
         for file in sorted(path.rglob("*.toml")) if path.is_dir() else [path]:
             if path.is_dir() and not _is_test(file):
@@ -84,9 +85,22 @@ def cases_of(paths: Sequence[Path], settings: list[str], target: Target = NO_TAR
                 files.append(file)
     if not files:
         raise Fault("CONFIG", f"{', '.join(map(str, paths))}: holds no scenario with [[expect]]; add one to a scenario")
-    stems = Counter(file.stem for file in files)
-    names = [file.stem if stems[file.stem] == 1 else "-".join(file.with_suffix("").parts[-2:]) for file in files]
-    return [TestCase(name, file, settings, target) for name, file in zip(names, files, strict=True)], others
+    bare = [Path(str(file).replace(".toml", "")) for file in files]
+    stems = Counter(file.name for file in bare)
+    names = [file.name if stems[file.name] == 1 else "-".join(file.parts[-2:]) for file in bare]
+    cases: list[TestCase] = []
+    for name, file in zip(names, files, strict=True):
+        parts = _cases(file)
+        cases += [TestCase(f"{name}-{part}", Path(f"{file}:{part}"), settings, target) for part in parts]
+        cases += [] if parts else [TestCase(name.replace(":", "-"), file, settings, target)]
+    return cases, others
+
+
+def _cases(file: Path) -> list[str]:
+    try:
+        return [] if ":" in file.name else [*sweep_cases(file, read_toml(file))]
+    except Fault:
+        return []  # reported as an error of this test
 
 
 def _is_test(file: Path) -> bool:

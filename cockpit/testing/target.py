@@ -3,13 +3,13 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from bridge.config import read_toml, with_overrides
+from bridge.config import with_overrides
 from bridge.faults import Fault
 from bridge.rig.load import device_of
 from cockpit.run.device_run import DeviceRun, is_real, load_device_run
 from cockpit.run.run import about_run
 from cockpit.run.scenario import Scenario, load_scenario
-from cockpit.run.scenario_file import find, rig_setting
+from cockpit.run.scenario_file import read_scenario, rig_setting
 from cockpit.run.simulated.run import DevicesRun, run_with_faults, simulate
 from cockpit.testing.lock import RigLock
 from cockpit.testing.realtime import run_in_real_time
@@ -55,7 +55,7 @@ class Loaded(NamedTuple):
 
 def load(name: str, settings: list[str], target: Target) -> Loaded:
     """A test on its target. Raises Fault CONFIG, and NOT_JUDGED if only a simulated rig can carry it out."""
-    given = with_overrides(read_toml(find(name, "scenarios")), settings)
+    given = with_overrides(read_scenario(name)[1], settings)
     on_target = [*settings, *([rig_setting(target.rig)] if target.rig else [])]
     if not is_real(name, on_target):
         return Loaded(load_scenario(name, on_target))

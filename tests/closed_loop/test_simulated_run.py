@@ -75,7 +75,8 @@ def test_a_frozen_controller_is_reported_and_nothing_arms_by_itself(tmp_path: Pa
 
 def test_an_operator_arms_the_rig_and_the_log_holds_its_true_state() -> None:
     disarmed = scenario(2.2).model_copy(update={"arm": False})
-    run = TruthRun(disarmed, [TimedAction(20_000_000, wire.Operator.ARM)])
+    run = TruthRun(disarmed)
+    run.command([TimedAction(20_000_000, wire.Operator.ARM)])
     run.play()
     truth = run.truth
     assert len(truth.t_s) >= 2200

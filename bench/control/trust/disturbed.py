@@ -1,26 +1,25 @@
 """The paper's rig with a sagging exciter, missing commands, and late or held blocks: in simulated time, judged by its truth."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from bench.control import record, rules
 from bench.control.run import wrong_from
 from bench.control.watch import watch
-from bench.faults.judge import happened
+from bench.faults.judge import happened, reports
 from bench.faults.truth import TruthRun
-from bridge.rig.faults.table import FaultTable
 from bridge.wire.messages import BLOCK
 from bridge.wire.messages import TRACE as TRACE_LAYOUT
 from bridge.wire.topics import COMMAND, Outgoing
-from cockpit.faults.catalogue import CatalogueEntry, NamedFault
-from cockpit.run.in_process import TimedAction
-from cockpit.run.scenario import Scenario
+from cockpit.run.scenario import Scenario, load_scenario
+from cockpit.run.scenario_file import in_toml
 from controller.config import ControllerConfig
 from controller.node import ControllerNode
 from plant.config import RigConfig
 from plant.rig.node import PlantNode
 
+_BEGIN_S = 2.5  # begin of the judged time; the loop check ends at 1.8 s
 _WATCH_S = 10.0  # time from the begin of the disturbance that is judged
 _PATTERNS_S = {"once": [1.0], "each-1-s": [1.0 + i for i in range(8)], "each-3-s": [1.0, 4.0, 7.0]}
 _INTERRUPTIONS = (
@@ -38,45 +37,51 @@ _TRUE = {
 }
 
 
-def disturbances() -> list[NamedFault]:
-    """All disturbed runs; `about` is the kind of the disturbance, a key of `_TRUE`."""
+class Disturbance(NamedTuple):
+    """One disturbed run."""
+
+    name: str
+    about: str  # kind of the disturbance, a key of `_TRUE`
+    scenario: Scenario
+
+
+def disturbances() -> list[Disturbance]:
+    """All disturbed runs. Raises Fault CONFIG."""
+
+    def made(name: str, about: str, watch_s: float, *settings: str) -> Disturbance:
+        arms = ["arm=false", 'step=[{at_s = 0.02, command = "ARM"}]', f"duration_s={_BEGIN_S + watch_s}"]
+        return Disturbance(name, about, load_scenario("from-the-start", [*arms, *settings]))
+
     sag = 'rig.effects.piezo-sag={form="heat",ratio=0.6,settling_s='
-    entries = [
-        NamedFault(name=f"sag-{tau_s:g}-s", about="sag", settings=[f"{sag}{tau_s}}}"], watch_s=20.0)
-        for tau_s in (1.0, 3.0)
-    ]
+    entries = [made(f"sag-{tau_s:g}-s", "sag", 20.0, f"{sag}{tau_s}}}") for tau_s in (1.0, 3.0)]
     for about, kind, target, lengths_ms in _INTERRUPTIONS:
         for ms in lengths_ms:
             for pattern, at in _PATTERNS_S.items():
-                faults = [FaultTable(kind=kind, target=target, from_s=at_s, for_s=1e-3 * ms) for at_s in at]
-                name = f"{about}-{ms}-ms-{pattern}"
-                entries.append(NamedFault(name=name, about=about, fault=faults, watch_s=_WATCH_S))
+                faults = [
+                    {"kind": kind, "target": target, "from_s": _BEGIN_S + at_s, "for_s": 1e-3 * ms} for at_s in at
+                ]
+                entries.append(made(f"{about}-{ms}-ms-{pattern}", about, _WATCH_S, f"fault={in_toml(faults)}"))
     for ms in (30, 48, 100):
-        late = FaultTable(kind="late", target="blocks", from_s=1.0, value=1e-3 * ms)
-        entries.append(NamedFault(name=f"late-{ms}-ms", about="late", fault=[late], watch_s=_WATCH_S))
+        late = [{"kind": "late", "target": "blocks", "from_s": _BEGIN_S + 1.0, "value": 1e-3 * ms}]
+        entries.append(made(f"late-{ms}-ms", "late", _WATCH_S, f"fault={in_toml(late)}"))
     return entries
 
 
-def disturbed_figures(entry: NamedFault, rule: int) -> tuple[dict[str, float], list[str]]:
+def disturbed_figures(entry: Disturbance, rule: int) -> tuple[dict[str, float], list[str]]:
     """Slips, surges and v_a over its set point from the disturbance on, and the false reports."""
-    made: list[_Run] = []
-
-    def make(scenario: Scenario, words: list[TimedAction]) -> _Run:
-        made.append(_Run(scenario, words, rule))
-        return made[0]
-
-    ran = happened(CatalogueEntry(group="trust", entry=entry, told=[], settings=entry.settings), True, make)
-    wrong = int(wrong_from(made[0].events, entry.begin_s).sum())
+    run = _Run(entry.scenario, rule)
+    ran = happened(run, _BEGIN_S)
+    wrong = int(wrong_from(run.events, _BEGIN_S).sum())
     figures = {"wrong": wrong, "above_s": ran.above_s, "peak_set_points": ran.peak_ratio}
-    words = sorted({word.word for word in ran.told}) if rule == rules.CONTROLLER else []
+    words = reports(ran.record, _BEGIN_S) if rule == rules.CONTROLLER else []
     return figures, [word for word in words if word not in _TRUE[entry.about]]
 
 
 class _Run(TruthRun):
     """A disturbed run of the controller or a rule, whose true motion is judged block by block."""
 
-    def __init__(self, scenario: Scenario, words: list[TimedAction], rule: int) -> None:
-        TruthRun.__init__(self, scenario, words)
+    def __init__(self, scenario: Scenario, rule: int) -> None:
+        TruthRun.__init__(self, scenario)
         self._rule, self._rig, self._config = rule, scenario.rig, scenario.controller
         slowest_mps = min(scenario.rig.drive.speeds_mps())
         self._judge = record.build(scenario.rig, slowest_mps, 0.0, scenario.controller.limits.velocity_max_mps, -1)

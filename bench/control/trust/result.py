@@ -113,8 +113,7 @@ def trust(
     if bank := [*axes, *never, *trials]:
         warm_up(bank[0])
     if entries:
-        short = entries[0].model_copy(update={"watch_s": 0.05})
-        compile_once("the bench of disturbances", lambda: disturbed_figures(short, CONTROLLER))
+        compile_once("the bench of disturbances", lambda: disturbed_figures(entries[0], CONTROLLER))
     plan = [
         *(("drawn", axis, subject) for axis in axes for subject in subjects),
         *(("never", axis, CONTROLLER) for axis in never),

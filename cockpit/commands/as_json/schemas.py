@@ -187,16 +187,15 @@ _RESULTS = {
 }
 TOML = (
     Format("rig", "A rig file of a simulated rig, as in deploy/rigs: `--rig FILE.toml`.", _rig),
-    Format("scenario", "A scenario file, as in deploy/scenarios: `--scenario FILE.toml`.", scenario),
+    Format(
+        "scenario",
+        "A scenario file, as in deploy/scenarios, deploy/tests and deploy/faults: `--scenario FILE.toml`.",
+        scenario,
+    ),
     Format(
         "real-rig", "A rig file of a real rig: `--rig FILE.toml`, `stickslip rig check`.", "bridge.rig.file:DeviceRig"
     ),
     Format("box", "A simulated device: `stickslip rig box FILE.toml`.", "plant.rig.box:BoxConfig"),
-    Format(
-        "faults",
-        "A group of the catalogue of `python -m bench faults`, as in deploy/faults.",
-        "cockpit.faults.catalogue:FaultGroup",
-    ),
     Format(
         "controller",
         "The table [controller] of a scenario, and the configuration in a log.",

@@ -9,7 +9,8 @@ import pytest
 
 from bridge.faults import Fault
 from cockpit.expect.tables import ExpectTable
-from cockpit.testing.api import Expectation, as_settings
+from cockpit.run.scenario_file import as_settings
+from cockpit.testing.api import Expectation
 from cockpit.testing.plugin import MakeRig
 
 CONTROLLED = {"controller": {"policy": {"enabled_from_s": 0.0}}}

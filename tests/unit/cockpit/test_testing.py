@@ -12,6 +12,7 @@ from bridge.log.logfile import read_run
 from cockpit.cli import app
 from cockpit.commands.as_json.schemas import FORMATS
 from cockpit.expect.judge import FAILED, UNTESTED
+from cockpit.run.scenario import load_scenario
 from cockpit.run.scenario_file import deploy_folder
 from cockpit.testing.suite import cases_of, mutants_of, run_tests
 
@@ -133,3 +134,52 @@ def test_the_shipped_tests_pass_and_each_of_their_defects_is_found() -> None:
 def test_all_shipped_tests_and_defects() -> None:
     assert call()[0] == 0
     assert call("--mutants")[0] == 0
+
+
+SWEEP = """
+[[sweep]]
+key = "seed"
+values = [1, 2]
+
+[[sweep]]
+common = { duration_s = 0.4 }
+[sweep.values]
+tight = { "expect.0.at_most" = "1 nm" }
+more = { "expect.1" = { slips = 0 }, controller.limits.v_ratio = 1.3 }
+"""
+
+
+def test_each_value_of_a_sweep_is_a_test(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path, one=GOOD + SWEEP)
+    status, text = call(folder)
+    assert status == 1
+    assert [line[:24].strip() for line in text.splitlines() if line[0] != " "] == [
+        "PASSED   one-seed=1: 1 e",
+        "PASSED   one-seed=2: 1 e",
+        "FAILED   one-tight: 1 FA",
+        "PASSED   one-more: 2 exp",
+        "tests    4 tests: 3 PASS",
+    ]
+    assert call(f"{folder}/one.toml:seed=2")[0] == 0
+    made = load_scenario(f"{folder}/one.toml:more", [])
+    assert (made.name, made.duration_s, made.controller.limits.v_ratio, len(made.expect)) == ("more", 0.4, 1.3, 2)
+
+
+@pytest.mark.parametrize(
+    ("sweep", "error"),
+    [
+        ('key = "seed"\nvalues = [1, 1]', "seed=1: is used twice"),
+        ("values = [1]", "key: missing"),
+        ('key = "expect.3.at_most"\nvalues = [1]', "expect is a list: must be expect.0 to expect.1"),
+        ('key = "sed"\nvalues = [1]', "sed = 1: unknown key; perhaps seed"),
+    ],
+)
+def test_a_wrong_sweep_is_an_error(tmp_path: Path, sweep: str, error: str) -> None:
+    status, text = call(folder_of(tmp_path, one=f"{GOOD}[[sweep]]\n{sweep}\n"))
+    assert (status, error in text) == (2, True), text
+
+
+def test_an_unknown_case_names_a_similar_one(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path, one=GOOD + SWEEP)
+    status, text = call(f"{folder}/one.toml:tigt")
+    assert (status, "no such case; perhaps tight" in text) == (2, True), text

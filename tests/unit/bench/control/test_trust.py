@@ -76,7 +76,7 @@ def test_trials_are_counted_on_axes_whose_sensors_reach_the_end_of_the_run() -> 
 def test_disturbances_hold_lengths_and_patterns() -> None:
     entries = {entry.name: entry for entry in disturbances()}
     assert len(entries) == 29
-    gaps = entries["gap-67-ms-each-1-s"].fault
+    gaps = entries["gap-67-ms-each-1-s"].scenario.fault
     assert {(fault.kind, fault.target, fault.for_s) for fault in gaps} == {("cut", "commands", 0.067)}
     np.testing.assert_allclose(np.diff([fault.from_s for fault in gaps]), 1.0)
 
