@@ -72,6 +72,8 @@ class Inbox:
 
     def get(self, timeout_s: float = 0.0) -> Received | None:
         """The oldest message; None if none waits or arrives within `timeout_s`."""
+        if timeout_s == 0.0 and self._queue.empty():
+            return None
         try:
             counts, received = self._queue.get(timeout=timeout_s)
         except queue.Empty:
