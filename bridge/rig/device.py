@@ -19,6 +19,7 @@ from bridge.wire.messages import ANNOUNCE
 LONGEST_READ_BLOCKS = 3  # a `read` returns after this many block lengths at the latest
 LONGEST_READ_S = 5.0  # and of a device that makes a block for each `write`, which has no clock, after this time
 Pace = Literal["device", "computer", "caller"]
+_NONE = ANNOUNCE.blank(0)
 
 
 class DeviceError(Exception):
@@ -137,7 +138,7 @@ class Device(Part):
 
     def announcements(self) -> Records:
         """Coming velocities of the drive, records of `Announce` before the next samples; by default none."""
-        return ANNOUNCE.blank(0)
+        return _NONE
 
 
 class Exciter(Part):
