@@ -37,7 +37,8 @@ class GuardEvents:
 
     def news(self, applied: Any) -> list[tuple[str, str]]:
         """Codes and texts of the new events in a record of `Applied`."""
-        state, limit, missing = int(applied.guard_state), int(applied.guard_limit), int(applied.fallback)
+        # by name: an attribute of a record takes 2 us longer, in each block
+        state, limit, missing = int(applied["guard_state"]), int(applied["guard_limit"]), int(applied["fallback"])
         if (state, limit, missing) == (self._state, self._limit, self._missing):
             return []
         events: list[tuple[str, str]] = []

@@ -1,7 +1,6 @@
 """Commands received by a rig's process: valid ones in order; all others are counted, reported and dropped."""
 
 import collections
-from typing import Any
 
 from bridge.faults import Fault
 from bridge.wire.complaints import BAD_MESSAGE, FLOOD, FOREIGN, Complaints
@@ -53,12 +52,12 @@ class CommandQueue:
     def answered(self, received: Received, block: int) -> int | None:
         """The block that a command answers; None for a dropped command."""
         try:
-            command: Any = COMMAND_LAYOUT.read(received.payload, COMMAND.name)[0]
+            command = COMMAND_LAYOUT.read(received.payload, COMMAND.name)
         except Fault as fault:
             self._complaints.note(BAD_MESSAGE, COMMAND.name, f"{fault.line.partition(': ')[2]}: dropped")
             return None
-        amplitude_m, frequency_Hz = float(command.amplitude_m), float(command.frequency_Hz)
-        answered = int(command.block)
+        amplitude_m, frequency_Hz = float(command["amplitude_m"][0]), float(command["frequency_Hz"][0])
+        answered = int(command["block"][0])
         if not (0.0 <= amplitude_m <= _LARGEST_M and 0.0 <= frequency_Hz <= _HIGHEST_HZ):
             text = f"{amplitude_m:g} m at {frequency_Hz:g} Hz is not a vibration: dropped"
             self._complaints.note(BAD_MESSAGE, f"{COMMAND.name} amplitude", text)

@@ -2,7 +2,8 @@
 file.
 
 Calls come from one thread, in this order: `open`, then `write` and `read` in turn, at last `safe` and `close`. The guard decides
-in front of the device; the device's own watchdog ends the vibration when this process is gone.
+in front of the device; the device's own watchdog ends the vibration when this process is gone. Any other exception counts as a
+DeviceError, so that the errors of sockets and drivers need no `try`.
 """
 
 import traceback
@@ -19,6 +20,7 @@ from bridge.wire.messages import ANNOUNCE
 LONGEST_READ_BLOCKS = 3  # a `read` returns after this many block lengths at the latest
 LONGEST_READ_S = 5.0  # and of a device that makes a block for each `write`, which has no clock, after this time
 Pace = Literal["device", "computer", "caller"]
+_NONE = ANNOUNCE.blank(0)
 
 
 class DeviceError(Exception):
@@ -37,7 +39,7 @@ class DeviceError(Exception):
 
 def reason_of(error: Exception) -> str:
     """The reason of a failed call. An adapter may be foreign code: its error must not end the loop of the guard."""
-    if isinstance(error, DeviceError):
+    if isinstance(error, DeviceError | OSError):  # the system's words for a lost connection need no place in a file
         return str(error)
     place = traceback.extract_tb(error.__traceback__)[-1]
     return f"{Path(place.filename).name}, line {place.lineno}: {type(error).__name__}: {error}"
@@ -137,7 +139,7 @@ class Device(Part):
 
     def announcements(self) -> Records:
         """Coming velocities of the drive, records of `Announce` before the next samples; by default none."""
-        return ANNOUNCE.blank(0)
+        return _NONE
 
 
 class Exciter(Part):

@@ -118,7 +118,7 @@ class GuardedNode(ABC):
     @property
     def block(self) -> int:
         """Number of the next block."""
-        return int(self._guard_state[0].block)
+        return int(self._guard_state["block"][0])
 
     @property
     def check_tones_Hz(self) -> list[float]:
@@ -153,5 +153,4 @@ class GuardedNode(ABC):
     @property
     def is_stopped(self) -> bool:
         """Whether the guard is in FAULT because of an operator's stop."""
-        s = self._guard_state[0]
-        return s.state == FAULT and s.cause in (STOP_BY_PERSON, STOP_KEPT)
+        return self._guard_state["state"][0] == FAULT and self._guard_state["cause"][0] in (STOP_BY_PERSON, STOP_KEPT)

@@ -182,8 +182,7 @@ class GuardedRig:
         self._bus = bus
         self._complaints = Complaints(self.event)
         self._commands = CommandQueue(self._complaints)
-        self._heard = threading.Event()  # a command arrived since the newest block was sent
-        self._answers = Inbox(64)  # commands, read in lockstep only
+        self._answers = Inbox(64)  # commands since the newest block was sent
         self._on_the_way: collections.deque[Received] = collections.deque(maxlen=WAITING)  # commands on the faulty bus
         self._events = 0
         self._paused_ns = 0  # length of a stall of this process that is not yet published
@@ -199,7 +198,6 @@ class GuardedRig:
         # while a bus fault acts, the loop passes the commands through it first
         (self._on_the_way.append if self._node.faults.on_the_bus else self._commands.push)(received)
         self._answers.push(received)
-        self._heard.set()
 
     def event(self, code: str, text: str) -> None:
         """Publish an event with a code and a text."""
@@ -293,13 +291,13 @@ class GuardedRig:
                 self._accepted_gain = self._node.accepted_gain
                 lost = "the next run of this rig has no gain to compare with"
                 self._keep(kept, partial(kept.save, self._accepted_gain), lost)
-        heat_share = float(applied.heat_share)
+        heat_share = float(applied["heat_share"])
         if (warmth := self._warmth) is not None and abs(heat_share - self._kept_heat) > _HEAT_STEP:
             self._kept_heat = heat_share
             self._keep(
                 warmth, partial(warmth.save, heat_share), "the next run of this rig counts its exciter as colder"
             )
-        if refused := int(applied.commands_refused):
+        if refused := int(applied["commands_refused"]):
             text = "refused; does a controller of an earlier run still run?"
             self._complaints.note(FOREIGN, f"{COMMAND.name} of another run, or not newer than the last", text, refused)
 
@@ -330,7 +328,7 @@ class GuardedRig:
             if not node.paced_by_rig:
                 late_ns = pacer.wait(tick)
             elif not node.is_behind:  # a command after the newest block acts while the device makes the next one
-                self._heard.wait(longest_wait_s)
+                self._answers.get(longest_wait_s)
             if tick % remind_ticks == 0 and (text := self._bus.expiring()):
                 self.event("CERTIFICATE", text)
             tick += 1
@@ -348,9 +346,12 @@ class GuardedRig:
                     late_commands += round_trip_ns > LATE_NS
             messages = node.advance(commands, late_commands, round_trip_ns, late_ns)
             sent_ns[(node.block - 1) % _ROUND_TRIPS_KEPT] = time.perf_counter_ns()
-            self._heard.clear()  # a late answer to an older block would end the wait for the next one, so that each is late
+            while (
+                self._answers.get() is not None
+            ):  # a late answer would end the wait for the next one, so that each is late
+                pass
             self._send(messages)
-            late_ns = int(node.applied.late_ns)
+            late_ns = int(node.applied["late_ns"])
             self._complaints.report_when_due()
             if self._keeper is not None:
                 self._keeper.at_rest = node.is_stopped and node.at_rest

@@ -1,6 +1,8 @@
 """Bounded queues between the receiving threads of the bus and a loop; messages that do not fit are dropped and counted."""
 
-import queue
+import collections
+import contextlib
+import threading
 import time
 from typing import NamedTuple
 
@@ -47,7 +49,9 @@ class Inbox:
         self._patient = patient
         self._pushed = _Counts(limit)
         self._kept: dict[str, _Counts] = {}
-        self._queue: queue.SimpleQueue[tuple[_Counts, Received]] = queue.SimpleQueue()
+        self._waiting: collections.deque[tuple[_Counts, Received]] = collections.deque()
+        self._arrived = threading.Lock()  # released for each message
+        self._arrived.acquire()
 
     def push(self, received: Received) -> None:
         """Add a message; called by receiving threads."""
@@ -68,13 +72,20 @@ class Inbox:
             self.dropped_of[received.topic.name] = self.dropped_of.get(received.topic.name, 0) + 1
         else:
             counts.added += 1
-            self._queue.put((counts, received))
+            self._waiting.append((counts, received))
+            if self._arrived.locked():
+                with contextlib.suppress(RuntimeError):  # another thread released it
+                    self._arrived.release()
 
     def get(self, timeout_s: float = 0.0) -> Received | None:
         """The oldest message; None if none waits or arrives within `timeout_s`."""
-        try:
-            counts, received = self._queue.get(timeout=timeout_s)
-        except queue.Empty:
+        if timeout_s > 0.0:
+            until_s = time.monotonic() + timeout_s
+            # `queue.SimpleQueue.get` (Python 3.11) may wait for ever after a stall: its remaining time becomes negative
+            while not self._waiting and (left_s := until_s - time.monotonic()) > 0.0:
+                self._arrived.acquire(timeout=left_s)
+        if not self._waiting:
             return None
+        counts, received = self._waiting.popleft()
         counts.taken += 1
         return received

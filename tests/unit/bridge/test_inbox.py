@@ -1,5 +1,11 @@
 """Inboxes are bounded, and rare topics have reserved capacity."""
 
+import threading
+from types import SimpleNamespace
+
+import pytest
+
+from bridge.wire import inbox as module
 from bridge.wire.inbox import Inbox, Received
 from bridge.wire.topics import ANNOUNCE, OPERATOR, SENSORS, Topic
 
@@ -31,3 +37,18 @@ def test_reading_frees_capacity() -> None:
         assert received.payload == bytes([number])
     assert inbox.get(0.0) is None
     assert inbox.dropped == 0
+
+
+def test_a_wait_ends_at_its_time_though_the_process_stalls_after_a_message_that_needed_no_wait(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """`queue.SimpleQueue` waits for ever here: the process of a rig did, and its exciter rested by the device's watchdog."""
+    inbox, came = Inbox(2), []
+    inbox.push(message(SENSORS))
+    assert inbox.get() is not None
+    times_s = iter([0.0, 0.0, 9.0])  # the wait begins, and goes on after a stall of 9 s
+    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: next(times_s)))
+    thread = threading.Thread(target=lambda: came.append(inbox.get(0.5)), daemon=True)
+    thread.start()
+    thread.join(5.0)
+    assert came == [None]
