@@ -16,7 +16,6 @@ _BOOKS = ("[Content_Types].xml", "_rels/", "mimetype", "docProps/", "xl/", "META
 _MARKS: tuple[tuple[bytes, Kind], ...] = (
     (b"PAR1", "parquet"),
     (b"MATLAB 5.0", "mat"),
-    (b"MATLAB 7.3", "hdf5"),  # MATLAB writes a head before the HDF5 data
     (b"TDSm", "tdms"),
     (b"\x89HDF\r\n\x1a\n", "hdf5"),
     (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "sheet"),
@@ -24,6 +23,7 @@ _MARKS: tuple[tuple[bytes, Kind], ...] = (
 )
 FOREIGN = Path(__file__).with_name("foreign.toml")
 _FOREIGN: list[dict[str, Any]] = tomllib.loads(FOREIGN.read_text(encoding="utf-8"))["kind"]
+_HDF5_AT = 512  # MATLAB v7.3 writes a head of 512 bytes before the HDF5 data
 _BY_SUFFIX: dict[str, Kind] = {".parquet": "parquet", ".mat": "mat", ".tdms": "tdms"}
 _BY_SUFFIX.update(dict.fromkeys((".xlsx", ".xls", ".ods"), "sheet"))
 _LOOKED_AT = 4096  # first bytes that decide whether a file is a text
@@ -43,6 +43,8 @@ def kind_of(path: Path) -> Kind:
     """
     with path.open("rb") as file:
         start = file.read(_LOOKED_AT)
+    if start[_HDF5_AT:].startswith(b"\x89HDF"):
+        return "hdf5"
     if start.startswith((_NUMPY, _ZIP)):
         return _of_zip(path, start)
     for mark, kind in _MARKS:

@@ -123,8 +123,8 @@ def unit_in_name(name: str) -> str:
     """The unit at the end of a column's name, as written there; empty without a known unit. `millis` is a name and its unit."""
     match = None if _INDEX.fullmatch(name) else _BEHIND.match(name)
     if match is None:
-        word = name.strip()
-        is_time = len(word) > 1 and word not in _NOT_BEHIND and (known_unit(word) or ("",))[0] == "time"
+        word = name.strip().removeprefix("in ")  # Rohde & Schwarz writes `in s`
+        is_time = len(name.strip()) > 1 and word not in _NOT_BEHIND and (known_unit(word) or ("",))[0] == "time"
         return word if is_time else ""
     unit = next((text for key in "abcdefgh" if (text := match[key]) is not None), "").strip()
     if (match["f"] or match["h"]) is not None and (unit in _NOT_BEHIND or not _fits(match["name"], unit)):

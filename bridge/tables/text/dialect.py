@@ -52,7 +52,9 @@ class TextLayout(NamedTuple):
             return line.split()
         if not self.quote:
             return line.split(self.delimiter)
-        row: list[str] = next(csv.reader([line], delimiter=self.delimiter, quotechar=self.quote), [])
+        row: list[str] = next(
+            csv.reader([line], delimiter=self.delimiter, quotechar=self.quote, skipinitialspace=True), []
+        )
         return row
 
     def is_number(self, cell: str) -> bool:

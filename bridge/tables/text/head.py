@@ -170,6 +170,8 @@ def _names_above(lines: Sequence[str], first: int, form: TextLayout, width: int,
         if len(cells) == width + 1 and width > 1 and re.fullmatch(r"\W*|.*:\s*", cells[-1]):
             cells = cells[:-1]  # a label behind the last name
         fits = len(cells) == width and any(cell.strip() and not form.is_number(cell) for cell in cells)
+        # a channel may be called 1, but not 0.1
+        fits = fits and all(cell.strip().isdigit() for cell in cells if form.is_number(cell))
         if fits:
             fitting.append(at)
         elif fitting:

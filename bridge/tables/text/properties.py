@@ -48,7 +48,7 @@ def properties_above(lines: Sequence[str], form: TextLayout, width: int) -> Prop
     rows = [_property(line, form, width) for line in lines]
     for at in range(len(lines) - 1, -1, -1):
         row = rows[at]
-        if row is None or not _NAMES.fullmatch(row.key):
+        if row is None or not _NAMES.fullmatch(row.key) or not "".join(row.cells[1:]).strip():
             continue
         end = next((below for below in range(at, len(lines)) if rows[below] is None), len(lines))
         block = [(line, below) for line in range(at, end) if (below := rows[line]) is not None]
