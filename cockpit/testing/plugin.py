@@ -68,6 +68,6 @@ def pytest_runtest_makereport(
         report.longrepr = str(fault)  # the line names the remedy; a traceback would hide it
     if session is not None and report.when == "call" and report.failed:
         logs, lines = session.keep(Path(str(item.config.getoption("--stickslip-logs"))), item.nodeid)
-        report.user_properties += [("log", str(log)) for log in logs]
+        item.user_properties += [("log", str(log)) for log in logs]
         report.sections.append(("stickslip", "\n".join(lines)))
     return report
