@@ -60,7 +60,7 @@ class Outcome(NamedTuple):
 
     @property
     def known(self) -> str:
-        """The worst verdict that is no news."""
+        """The worst verdict that was known before."""
         return KNOWN.get(self.name, SAFE)
 
     @property
@@ -86,13 +86,12 @@ class _TrueRecord(Record):
     A fault may also spoil the log, or prevent that a controller takes charge; a report counts all the same.
     """
 
-    damage = ""
-
     def __init__(self, run: RunData, truth: Truth, heard: dict[str, list[float]], block_s: float) -> None:
         super().__init__(run)
         t_s = truth.t_s
         self._amplitude = Samples(t_s, truth.amplitude_m, np.ones(len(t_s), bool), block_s)
         self.events = times_of(run) | heard
+        self.damage = ""
 
     def charge_share(self, from_s: float, to_s: float) -> float:  # noqa: ARG002
         """All of the time."""
@@ -121,7 +120,7 @@ def _judged(case: CatalogueEntry, scenario: Scenario) -> Outcome:
 
 
 def begin_s(scenario: Scenario) -> float:
-    """Time of the first fault or operator command, without the one that arms the rig."""
+    """Time of the first fault or operator command other than ARM."""
     steps = [step.at_s for step in scenario.step if step.command != "ARM"]
     return min([*(fault.from_s for fault in scenario.fault), *steps])
 

@@ -33,7 +33,7 @@ def _mark(text: str) -> dict[str, Any]:
 
 
 def _children_of(pid: int) -> list[int]:
-    """The living processes of a run that a process started; they have sessions of their own and may outlive it."""
+    """The living processes of a run that a process started; each is in another session and may outlive it."""
     living: list[int] = []
     for path in Path("/proc").glob("[0-9]*/cmdline"):
         with contextlib.suppress(OSError):  # it ended just now
