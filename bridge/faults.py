@@ -1,6 +1,7 @@
 """Every fault that an operator must act on: a short code, an exit status, a paragraph of help; `faults.toml` lists them."""
 
 import tomllib
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -36,8 +37,7 @@ class Fault(Exception):
 def install(extra: str) -> str:
     """The command that installs an extra of this project: in a checkout from its source tree, which no index holds."""
     root = Path(__file__).parents[1]
-    return (
-        f"pip install -e '{root}[{extra}]'"
-        if (root / "pyproject.toml").is_file()
-        else f"pip install 'stickslip[{extra}]'"
+    pip = "pip" if find_spec("pip") else "uv pip"  # an environment of uv has no pip
+    return f"{pip} install " + (
+        f"-e '{root}[{extra}]'" if (root / "pyproject.toml").is_file() else f"'stickslip[{extra}]'"
     )

@@ -16,6 +16,7 @@ from bench.faults.truth import Truth, TruthRun
 from bridge.faults import Fault
 from bridge.log.logfile import RunData, read_run
 from bridge.rig.faults.schedule import BEGAN, ENDED
+from cockpit.expect.events import times_of
 from cockpit.expect.judge import PASSED, Expected
 from cockpit.expect.judge import judge as judge_expectations
 from cockpit.expect.record import Record, Samples
@@ -59,7 +60,7 @@ class Outcome(NamedTuple):
 
     @property
     def known(self) -> str:
-        """The worst verdict that is no news."""
+        """The worst verdict that was known before."""
         return KNOWN.get(self.name, SAFE)
 
     @property
@@ -80,12 +81,21 @@ class Happened(NamedTuple):
 
 
 class _TrueRecord(Record):
-    """A log whose amplitude is the true one of the simulated rig."""
+    """A log whose amplitude is the true one, and whose events have their true times: a fault may change the time of the rig.
 
-    def __init__(self, run: RunData, truth: Truth, block_s: float) -> None:
+    A fault may also spoil the log, or prevent that a controller takes charge; a report counts all the same.
+    """
+
+    def __init__(self, run: RunData, truth: Truth, heard: dict[str, list[float]], block_s: float) -> None:
         super().__init__(run)
         t_s = truth.t_s
         self._amplitude = Samples(t_s, truth.amplitude_m, np.ones(len(t_s), bool), block_s)
+        self.events = times_of(run) | heard
+        self.damage = ""
+
+    def charge_share(self, from_s: float, to_s: float) -> float:  # noqa: ARG002
+        """All of the time."""
+        return 1.0
 
     def samples(self, name: str) -> Samples | None:
         """Samples of a signal; None if the log does not contain it."""
@@ -110,7 +120,7 @@ def _judged(case: CatalogueEntry, scenario: Scenario) -> Outcome:
 
 
 def begin_s(scenario: Scenario) -> float:
-    """Time of the first fault or operator command, without the one that arms the rig."""
+    """Time of the first fault or operator command other than ARM."""
     steps = [step.at_s for step in scenario.step if step.command != "ARM"]
     return min([*(fault.from_s for fault in scenario.fault), *steps])
 
@@ -145,7 +155,7 @@ def happened(run: TruthRun, from_s: float) -> Happened:
         log = Path(folder) / "run.mcap"
         run_with_faults(scenario, log, {}, run=run)
         block_s = scenario.rig.solver.block_s
-        record = _TrueRecord(read_run(log), run.truth, block_s)
+        record = _TrueRecord(read_run(log), run.truth, run.heard, block_s)
     truth = run.truth
     after = truth.t_s > from_s
     fastest_mps = _fastest(np.abs(truth.drive_mps), round(_MEMORY_S / block_s))

@@ -1,5 +1,6 @@
 """A run in simulated time with the true motion of its rig, block by block."""
 
+import contextlib
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -7,7 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from bridge.faults import Fault
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.inbox import Received
+from bridge.wire.payloads import parsed
 from bridge.wire.topics import Outgoing
+from cockpit.expect.events import word_of
 from cockpit.run.scenario import Scenario
 from cockpit.run.simulated.run import SimulatedRun
 from plant.records import TRUTH
@@ -63,6 +69,15 @@ class TruthRun(SimulatedRun):
         SimulatedRun.__init__(self, scenario)
         self.scenario = scenario
         self._truths: list[tuple[float, ...]] = []
+        self.heard: dict[str, list[float]] = {}  # times of arrival of each word of an event [s]
+        self.listen(self._hear)
+
+    def _hear(self, received: Received) -> None:
+        if received.topic.message is wire.Event:
+            with contextlib.suppress(Fault):  # a fault of the bus corrupts messages
+                event = parsed(wire.Event, received.payload, received.topic.name)
+                for word in {event.code, word_of(event)}:
+                    self.heard.setdefault(word, []).append(received.arrival_ns * 1e-9)
 
     def plant_node(self, **settings: Any) -> PlantNode:
         """The rig, which appends the truth of each block."""

@@ -56,7 +56,7 @@ class RunLog:
         self._next: dict[str, int] = {}  # next expected number by topic
         self._events = 0
         self._holding: dict[str, str] = {}  # texts of events that are valid for the whole log, by code
-        self._due_s = time.monotonic() + FLUSH_PERIOD_S
+        self._due_s = self._now_s() + FLUSH_PERIOD_S
         self._scope = ScopeMaker()
         self.tables: dict[str, dict[str, str]] = {}  # metadata, repeated in every file
         self._channels: dict[str, int] = {}
@@ -148,11 +148,15 @@ class RunLog:
 
     def flush_when_due(self) -> None:
         """End the open chunk when it is old enough. Raises Fault LOG_WRITE."""
-        if time.monotonic() > self._due_s or (
+        if self._now_s() > self._due_s or (
             (writer := self._files.writer) is not None and writer.open_chunk.size > LARGEST_CHUNK_BYTES
         ):
-            self._due_s = time.monotonic() + FLUSH_PERIOD_S
+            self._due_s = self._now_s() + FLUSH_PERIOD_S
             self.flush()
+
+    def _now_s(self) -> float:
+        """The time by which chunks end: in lockstep the simulated one, so that the same run gives the same bytes."""
+        return self.t_ns * 1e-9 if self._lockstep else time.monotonic()
 
     def add_event(self, code: str, text: str, t_ns: int | None = None, holds: bool = False) -> wire.Event:
         """Write an event of the recorder, and return it; its time is `t_ns`, or the time of the latest message.

@@ -41,6 +41,10 @@ def run_tests(
         Path, typer.Option(metavar="FOLDER", help="Folder for the logs of tests that did not pass.")
     ] = Path("runs/tests"),
     report: Annotated[Path | None, typer.Option("--junit", metavar="FILE.xml", help="Write JUnit XML.")] = None,
+    page: Annotated[
+        Path | None,
+        typer.Option("--html", metavar="FILE.html", help="Write one offline page with a picture of each test."),
+    ] = None,
     as_json: Json = None,
 ) -> int:
     """Run scenarios and judge their expectations; exit status 0: passed, 1: failed, 2: could not run, 14: not tested."""
@@ -61,6 +65,8 @@ def run_tests(
     end_like_ctrl_c()
     if report is not None:
         check_output("--junit", report, (".xml",))
+    if page is not None:
+        check_output("--html", page, (".html",))
     check_output_folder("--logs", logs)
     if log is not None and mutants:
         raise Fault("CONFIG", "--mutants: needs runs with defects, which --log does not have; leave one of them out")
@@ -78,5 +84,11 @@ def run_tests(
     if report is not None:
         with writing(report):
             write_whole(report, junit(suite))
+    if page is not None:
+        from cockpit.testing.page import page as page_of
+
+        with writing(page):
+            write_whole(page, page_of(suite))
+    suite = suite._replace(tests=[test._replace(picture="") for test in tests])  # JSON without pictures
     print_result(as_json, suite, suite.in_words(), indent=1)
     return suite.exit_status

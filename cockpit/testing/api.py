@@ -17,6 +17,7 @@ from cockpit.figures.signals import SIGNALS
 from cockpit.run.device_run import DeviceRun
 from cockpit.run.scenario import Scenario
 from cockpit.run.scenario_file import in_toml, read_scenario
+from cockpit.testing.picture import picture
 from cockpit.testing.target import Target, load
 
 
@@ -55,6 +56,7 @@ class Run:
         self.log, self.tables = log, tables
         self._record = Record(read_run(log), tables.duration_s)
         self.results: list[Expected] = []  # of all judged expectations
+        self._tables: list[ExpectTable] = []
 
     @property
     def checksum(self) -> str:
@@ -87,6 +89,10 @@ class Run:
             raise Fault("CONFIG", f"{signal}: is not in the log of this run; choose another signal")
         return samples
 
+    def picture(self) -> str:
+        """The judged expectation that decides, on its signal, as SVG; empty without one."""
+        return picture(self._record, self._tables, self.results)
+
     def expect(self, **keys: Unpack[Expectation]) -> None:
         """Judge an expectation; without keys all of the scenario. Raises AssertionError where one is FAILED or UNTESTED."""
         __tracebackhide__ = True
@@ -100,6 +106,7 @@ class Run:
             raise Fault("CONFIG", "the scenario has no [[expect]]; give a signal, event, state, slips or surges")
         results = judge(self._record, tables)
         self.results += results
+        self._tables += tables
         wrong = [result.in_words() for result in results if result.result != PASSED]
         assert not wrong, "\n".join(wrong)  # noqa: S101
 

@@ -3,6 +3,7 @@
 The system frees the lock of a dead owner. The mark in its file stays, and shows that the rig was not brought to rest.
 """
 
+import contextlib
 import fcntl
 import getpass
 import json
@@ -26,9 +27,19 @@ def _path(rig: str) -> Path:
 def _mark(text: str) -> dict[str, Any]:
     try:
         mark = json.loads(text)
-        return {"by": str(mark["by"]), "since": str(mark["since"])}
+        return {"by": str(mark["by"]), "since": str(mark["since"]), "pid": int(mark["pid"])}
     except (ValueError, TypeError, KeyError):
-        return {"by": "an unknown process", "since": "an unknown time"}
+        return {"by": "an unknown process", "since": "an unknown time", "pid": 0}
+
+
+def _children_of(pid: int) -> list[int]:
+    """The living processes of a run that a process started; each is in another session and may outlive it."""
+    living: list[int] = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        with contextlib.suppress(OSError):  # it ended just now
+            if path.read_bytes().endswith(f"\0--child\0{pid}\0".encode()):
+                living.append(int(path.parent.name))
+    return living
 
 
 class RigLock:
@@ -65,7 +76,7 @@ class RigLock:
             self._file.close()
             raise
         who = f"process {os.getpid()} of {getpass.getuser()}"
-        self._write(json.dumps({"by": who, "since": time.strftime("%Y-%m-%d %H:%M:%S")}))
+        self._write(json.dumps({"by": who, "since": time.strftime("%Y-%m-%d %H:%M:%S"), "pid": os.getpid()}))
         return self
 
     def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
@@ -96,7 +107,10 @@ class RigLock:
 
 
 def release(rig: str) -> str:
-    """End the quarantine of a rig; who left it, or empty. Raises Fault CONFIG for a rig that is being tested."""
+    """End the quarantine of a rig; who left it, or empty.
+
+    Raises Fault CONFIG for a rig that is being tested, or whose processes still run.
+    """
     path = _path(rig)
     if not path.exists():
         return ""
@@ -107,5 +121,8 @@ def release(rig: str) -> str:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise Fault("CONFIG", f"{rig}: {_mark(text)['by']} tests this rig now; wait for its end") from None
+        if living := _children_of(_mark(text)["pid"]):
+            line = f"{rig}: process {', '.join(map(str, living))} of that test still runs: must have ended"
+            raise Fault("CONFIG", f"{line}; end it, then release the rig")
         file.truncate(0)
     return _mark(text)["by"] if text else ""

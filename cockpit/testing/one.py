@@ -14,6 +14,7 @@ from bridge.units import counted
 from cockpit.expect.judge import FAILED, PASSED, UNTESTED, Expected, judge
 from cockpit.expect.record import Record
 from cockpit.run.run_tables import RunTables
+from cockpit.testing.picture import picture
 from cockpit.testing.target import NO_TARGET, Loaded, Target, load
 
 ERROR: Final = "ERROR"
@@ -44,12 +45,15 @@ class Tested(NamedTuple):
     log: str = ""  # kept log; empty for a log that was deleted
     checksum: str = ""  # SHA-256 of the log
     untested: bool = False  # the error is that this rig cannot run it
-    JSON_OPTIONAL = "defect", "error", "log", "checksum", "untested"
+    picture: str = ""  # SVG of the expectation that decides
+    JSON_OPTIONAL = "defect", "error", "log", "checksum", "untested", "picture"
 
     def judged(self, log: Path, run: RunTables) -> "Tested":
-        """The test with the results of its expectations on a log. Raises Fault BAD_LOG."""
+        """The test with the results of its expectations on a log, and their picture. Raises Fault BAD_LOG."""
         record = Record(read_run(log), run.duration_s or None)
-        return self._replace(expectations=judge(record, run.expect), checksum=record.run.checksums.sha256)
+        results = judge(record, run.expect)
+        drawn = picture(record, run.expect, results)
+        return self._replace(expectations=results, checksum=record.run.checksums.sha256, picture=drawn)
 
     def without_result(self, fault: Fault) -> "Tested":
         """The test that could not be run or judged."""

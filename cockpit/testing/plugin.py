@@ -63,7 +63,11 @@ def pytest_runtest_makereport(
         marked = [str(name) for mark in item.iter_markers("requirement") for name in mark.args]
         item.user_properties += session.properties(marked)
     report = yield
+    fault = call.excinfo.value if call.excinfo is not None else None
+    if session is not None and getattr(getattr(fault, "kind", None), "code", "") == "QUARANTINED":
+        report.longrepr = str(fault)  # the line names the remedy; a traceback would hide it
     if session is not None and report.when == "call" and report.failed:
-        lines = session.keep(Path(str(item.config.getoption("--stickslip-logs"))), item.nodeid)
+        logs, lines = session.keep(Path(str(item.config.getoption("--stickslip-logs"))), item.nodeid)
+        item.user_properties += [("log", str(log)) for log in logs]
         report.sections.append(("stickslip", "\n".join(lines)))
     return report

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from bridge.faults import Fault
 from bridge.log.logfile import read_run
+from bridge.plain import print_line
 from bridge.processes import pid_here
 from bridge.rig.faults.kinds import PROCESS
 from bridge.wire import realtime
@@ -55,6 +56,7 @@ def run_in_real_time(run: DeviceRun, name: str, settings: list[str], log: Path, 
     changed += ["arm=false", f'bus.endpoint="{bus.endpoint}"']
     arguments = ["--scenario", name, *(part for setting in changed for part in ("--set", setting))]
     conductor = _Conductor(run, bus, arm)
+    print_line(f"starting {name} on rig {run.rig.name}, for {run.duration_s:g} s{' once it is armed' if arm else ''}")
     try:
         run_processes(arguments, bus.endpoint, log, False, conductor.conduct, _START_S, conductor.processes)
     finally:

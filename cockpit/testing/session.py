@@ -7,6 +7,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, Self
 
 from bridge.faults import Fault
+from bridge.files import write_whole
 from cockpit.run.scenario_file import as_settings
 from cockpit.testing.api import Rig, Run
 from cockpit.testing.junit import properties_of
@@ -47,22 +48,25 @@ class Session:
             rows += properties_of(run.tables.rig.name, run.tables.seed, run.checksum, run.results)
         return [*dict.fromkeys(rows)]
 
-    def keep(self, folder: Path, test: str) -> list[str]:
-        """Move the logs into a folder and draw each; lines with the picture, the command that replays it, and its result."""
-        from cockpit.figures.run_figure import draw_logs
+    def keep(self, folder: Path, test: str) -> tuple[list[Path], list[str]]:
+        """Move the logs into a folder; their paths, and lines with the picture, the command that replays it, and its result."""
         from cockpit.run.replay import replay_log
 
+        logs: list[Path] = []
         lines: list[str] = []
         name = re.sub(r"[^\w.-]+", "-", test.rpartition("/")[2]).strip("-")
-        for number, log in enumerate(run.log for run in self._runs):
+        for number, run in enumerate(self._runs):
             kept = folder / f"{name}{f'-{number + 1}' if number else ''}.mcap"
             folder.mkdir(parents=True, exist_ok=True)
-            shutil.move(log, kept)
+            shutil.move(run.log, kept)
+            logs.append(kept)
             try:
-                draw_logs([kept], kept.with_suffix(".png"))
                 replayed = replay_log(kept, 0.0, [])
                 word = "replays bit for bit" if replayed.identical else "; ".join(replayed.in_words())
             except Fault as fault:
                 word = f"{fault.kind.code}: {fault.line}"
-            lines += [f"replay   stickslip replay {kept}: {word}", f"picture  {kept.with_suffix('.png')}"]
-        return lines
+            lines.append(f"replay   stickslip replay {kept}: {word}")
+            if drawn := run.picture():
+                write_whole(kept.with_suffix(".svg"), drawn)
+                lines.append(f"picture  {kept.with_suffix('.svg')}")
+        return logs, lines

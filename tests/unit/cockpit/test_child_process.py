@@ -26,6 +26,9 @@ def test_a_signal_within_the_wait_for_it_does_not_block_the_process():
 
 def test_a_missing_extra_is_installed_from_the_source_tree_in_a_checkout(monkeypatch: pytest.MonkeyPatch) -> None:
     root = Path(__file__).parents[3]
+    monkeypatch.setattr(faults, "find_spec", lambda name: name)
     assert faults.install("all") == f"pip install -e '{root}[all]'"
     monkeypatch.setattr(faults, "__file__", "/usr/lib/python3/site-packages/bridge/faults.py")
     assert faults.install("all") == "pip install 'stickslip[all]'"
+    monkeypatch.setattr(faults, "find_spec", lambda _name: None)
+    assert faults.install("all") == "uv pip install 'stickslip[all]'"

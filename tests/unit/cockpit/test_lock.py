@@ -40,6 +40,20 @@ def test_a_rig_that_is_not_at_rest_is_refused_until_its_release() -> None:
 
 
 @pytest.mark.slow
+def test_a_rig_is_not_released_while_a_process_of_its_test_runs() -> None:
+    with pytest.raises(Fault, match="QUARANTINED"), RigLock("axis"):
+        raise Fault("QUARANTINED", "axis: vibrates")
+    words = [sys.executable, "-c", "print(flush=True); input()", "--child", str(os.getpid())]
+    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
+        assert child.stdout is not None
+        child.stdout.readline()
+        with pytest.raises(Fault, match=f"process {child.pid} of that test still runs"):
+            release("axis")
+        child.communicate(b"\n", PATIENCE_S)
+    assert f"process {os.getpid()}" in release("axis")
+
+
+@pytest.mark.slow
 def test_a_dead_owner_frees_the_lock_and_leaves_the_quarantine(capsys: pytest.CaptureFixture[str]) -> None:
     owner = subprocess.Popen([sys.executable, "-c", HOLDS], stdout=subprocess.PIPE, text=True)
     assert owner.stdout is not None

@@ -66,13 +66,34 @@ def test_a_failed_test_keeps_its_log_and_names_the_replay(tmp_path: Path, monkey
     assert pytest.main([*words, "-o", "junit_logging=all", "test_mine.py"]) == 1
     log = Path("runs/tests/test_mine.py-test_fails.mcap")
     assert log.is_file()
-    assert log.with_suffix(".png").is_file()
+    svg = log.with_suffix(".svg").read_text()
+    assert len(svg) < 10_000
+    assert 'stroke-dasharray="6 3"/><path d="M' in svg  # the limit, then the instant
+    assert "amplitude_m at most 1 nm: FAILED at 0.2" in svg
     case = Xml.parse("r.xml").getroot().find(".//testcase")  # noqa: S314
     assert case is not None
     properties = [(row.get("name"), row.get("value")) for row in case.iterfind("properties/*")]
     assert [value for name, value in properties if name == "requirement"] == ["R-2", "R-1"]
+    assert dict(properties)["log"] == str(log)
     assert dict(properties)["rig"] == "paper-c45-c45"
     assert len(dict(properties)["checksum"] or "") == 64
+
+
+@pytest.mark.slow
+def test_a_quarantined_rig_is_reported_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "test_axis.py").write_text(
+        "from bridge.faults import Fault\ndef test_quarantined(rig):\n    raise Fault('QUARANTINED', 'axis: look at it')\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    assert (
+        pytest.main(["-q", "-p", "no:cacheprovider", "--rootdir", str(tmp_path), "-c", "/dev/null", "test_axis.py"])
+        == 1
+    )
+    out = capsys.readouterr().out
+    assert "QUARANTINED: axis: look at it" in out
+    assert "raise Fault" not in out
 
 
 def test_the_keys_of_an_expectation_are_those_of_its_table() -> None:

@@ -76,7 +76,7 @@ def test_a_shipped_file_names_its_schema_and_fits_it(path: Path) -> None:
     word, _, place = path.read_text().partition("\n")[0].partition(" ")
     assert word == "#:schema"
     schema = json.loads((path.parent / place).read_text())
-    folder = {"tests": "scenario"}.get(path.parent.name, path.parent.name)
+    folder = {"tests": "scenario", "faults": "scenario"}.get(path.parent.name, path.parent.name)
     assert schema["title"] in {folder, folder.removesuffix("s")}
     jsonschema.validate(tomllib.loads(path.read_text()), schema, jsonschema.Draft202012Validator)
 

@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from bridge.log.logfile import read_run
+from bridge.pages import STYLE
 from cockpit.cli import app
 from cockpit.commands.as_json.schemas import FORMATS
 from cockpit.expect.judge import FAILED, UNTESTED
@@ -43,7 +44,7 @@ def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_results_exit_status_and_logs(tmp_path: Path) -> None:
     folder = folder_of(tmp_path, good=GOOD, bad=GOOD + BAD, doubtful=GOOD + DOUBTFUL, other="", broken="[[expect]]\n")
-    status, text = call(folder, "--junit", "r.xml", "--json", "r.json")
+    status, text = call(folder, "--junit", "r.xml", "--json", "r.json", "--html", "r.html")
     assert status == 1
     assert "PASSED   good: 1 expectation" in text
     assert "FAILED   bad: 1 FAILED, 1 PASSED" in text
@@ -58,6 +59,12 @@ def test_results_exit_status_and_logs(tmp_path: Path) -> None:
     assert suite["counts"] == {"PASSED": 1, "FAILED": 1, "UNTESTED": 1, "ERROR": 1}
     root = Xml.parse("r.xml").getroot()  # noqa: S314
     assert (root.get("tests"), root.get("failures"), root.get("errors")) == ("4", "1", "2")
+    html = Path("r.html").read_text()
+    assert html.index('class="verdict bad"') < html.index("ERROR broken") < html.index("PASSED good")
+    assert html.count("<svg") == 2  # time_to_slip_s has no sample
+    assert "http" not in html.replace("http://www.w3.org/2000/svg", "")
+    assert (len(html) - len(STYLE.read_text())) / 4 < 10_000
+    assert all("picture" not in test for test in suite["tests"])
     properties = {row.get("name"): row.get("value") for row in root.iterfind("testcase[@name='good']/properties/*")}
     assert properties["requirement"] == "R-7"
     assert properties["rig"] == "paper-c45-c45"

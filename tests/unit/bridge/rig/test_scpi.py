@@ -185,7 +185,7 @@ def test_a_rig_file_in_metres_and_a_missing_driver_are_one_line(monkeypatch: pyt
     with pytest.raises(Fault, match=r"exciter\.stroke_m_per_V: missing"):
         Adapter(SETUP._replace(settings=settings, in_volts=False))
     monkeypatch.setattr(scpi.importlib.util, "find_spec", lambda _name: None)
-    with pytest.raises(Fault, match=r"needs the package pyvisa-py; pip install 'stickslip\[visa\]'"):
+    with pytest.raises(Fault, match=r"needs the package pyvisa-py; (uv )?pip install 'stickslip\[visa\]'"):
         Adapter(SETUP._replace(settings=settings | {"address": "TCPIP::10.0.0.5::INSTR"}))
 
 
