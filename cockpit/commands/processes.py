@@ -79,8 +79,8 @@ def serve_rig(shared: SharedOptions, rig: str | None, wait_for: str, as_json: Js
     kept = None if shared.lockstep else latch
     with step_reports(quiet=bool(shared.child)) as report:
         stop = stop_event(shared.child)
-        described, rig = _described(made, folder, shared.lockstep)
-        blocks = serve(rig, made.duration_s, made.bus, described, roles, shared.lockstep, stop, kept, report)
+        described, to_serve = _described(made, folder, shared.lockstep)
+        blocks = serve(to_serve, made.duration_s, made.bus, described, roles, shared.lockstep, stop, kept, report)
     done = Served("plant", made.bus.endpoint, shared.lockstep, blocks)
     print_result(as_json, done, [done.in_words()])
 
