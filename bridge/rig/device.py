@@ -2,8 +2,8 @@
 file.
 
 Calls come from one thread, in this order: `open`, then `write` and `read` in turn, at last `safe` and `close`. The guard decides
-in front of the device; the device's own watchdog ends the vibration when this process is gone. Any other exception counts as a
-DeviceError, so that the errors of sockets and drivers need no `try`.
+in front of the device; the device's own watchdog ends the vibration when this process is gone. Any exception counts as a
+DeviceError: an adapter need not catch errors of sockets and drivers.
 """
 
 import traceback

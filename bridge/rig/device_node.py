@@ -127,10 +127,8 @@ class DeviceNode(GuardedNode):
         self._write()
         self._answer_s = time.monotonic() - ordered_s + self._device.answer_s
         if self._accepted:
-            since = (
-                self.block - int(self._memory["command_block"][0]) + self._block.waiting - 1
-            )  # blocks completed since
-            self._took_s = ordered_s - self._heard_s + since * self._device.block_s + self._answer_s
+            blocks = self.block - int(self._memory["command_block"][0]) + self._block.waiting - 1  # completed since
+            self._took_s = ordered_s - self._heard_s + blocks * self._device.block_s + self._answer_s
         self._is_begun = True
 
     def _write(self) -> None:
@@ -246,10 +244,8 @@ class DeviceNode(GuardedNode):
             late_ns = block.waiting * self.block_ns
             round_trip_ns = round(self._took_s * 1e9) if accepted else 0
             commands_late = accepted if round_trip_ns > LATE_NS else 0
-            self._applied["answer_ns"], self._applied["sample_rate_Hz"] = (
-                round(self._answer_s * 1e9),
-                self._clock.rate_Hz,
-            )
+            self._applied["answer_ns"] = round(self._answer_s * 1e9)
+            self._applied["sample_rate_Hz"] = self._clock.rate_Hz
         end(
             self._guard_params, self._guard_state, self._memory, block.frequency_Hz, block.amplitude * self._stroke_m,
             accepted, commands_late, round_trip_ns, late_ns, self._sensors, self._applied,

@@ -1,11 +1,12 @@
 """A rig behind its guard: commands in, sensor blocks and the applied vibration out, block by block."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 from bridge.arrays import Records
 from bridge.guard.check import gain_report
+from bridge.guard.config import GuardConfig
 from bridge.guard.states import apply_order
 from bridge.kernel_cache import compile_once
 from bridge.rig.faults.schedule import Faults
@@ -154,3 +155,12 @@ class GuardedNode(ABC):
     def is_stopped(self) -> bool:
         """Whether the guard is in FAULT because of an operator's stop."""
         return self._guard_state["state"][0] == FAULT and self._guard_state["cause"][0] in (STOP_BY_PERSON, STOP_KEPT)
+
+
+class Served(NamedTuple):
+    """A rig that `bridge.rig.process.serve` serves."""
+
+    name: str
+    guard: GuardConfig
+    notes: list[tuple[str, str]]  # codes and texts of events at the start: wide limits, lost protection
+    make: Callable[[int, bool], GuardedNode]  # makes the node of a run number; whether it may start ARMED

@@ -6,10 +6,8 @@ import secrets
 import threading
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import NamedTuple
 
 from bridge.faults import Fault
-from bridge.guard.config import GuardConfig
 from bridge.guard.events import GuardEvents
 from bridge.guard.keeper import Keeper
 from bridge.guard.kept import KeptGain, KeptHeat, StateFile, StopLatch
@@ -18,7 +16,7 @@ from bridge.guard.states import HOLD, RESET, STOP
 from bridge.guard.stop_file import RigFile
 from bridge.plain import StepReport, no_report
 from bridge.rig.faults.line import Message
-from bridge.rig.node import LATE_NS, GuardedNode
+from bridge.rig.node import LATE_NS, GuardedNode, Served
 from bridge.wire import realtime, refusals
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.clock import time
@@ -41,15 +39,6 @@ _ANSWER_SHARE = 0.5
 _HEAT_STEP = 0.05
 _REMIND_NS = 86_400_000_000_000  # interval of the events about certificates that expire: a day
 _PAUSE_NS = 250_000_000  # delay of a due block from which this process counts as stalled
-
-
-class Served(NamedTuple):
-    """A rig to be served."""
-
-    name: str
-    guard: GuardConfig
-    notes: list[tuple[str, str]]  # codes and texts of events at the start: wide limits, lost protection
-    make: Callable[[int, bool], GuardedNode]  # makes the node of a run number; whether it may start ARMED
 
 
 def serve(
@@ -221,7 +210,8 @@ class GuardedRig:
         if messages:
             sensors, applied = messages
             faults = self._node.faults
-            self._announce()
+            for message in self._node.announcements:
+                self._send_announce(message.payload)
             if faults.on_the_bus:
                 for message in faults.on_the_way("blocks", [Message(sensors.payload)], self._node.block - 1):
                     self._send_sensors(message.payload)
@@ -242,10 +232,6 @@ class GuardedRig:
         taken = [Message(received.payload, received) for received in taken]
         for message in self._node.faults.on_the_way("commands", taken, self._node.block - 1):
             self._commands.push(message.of._replace(payload=message.payload))
-
-    def _announce(self) -> None:
-        for message in self._node.announcements:
-            self._send_announce(message.payload)
 
     def _apply_orders(self) -> None:
         """Apply the operators' orders since the last block; report and ignore unreadable ones.

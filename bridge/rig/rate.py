@@ -36,9 +36,7 @@ class RateWatch:
 
     def _report(self) -> tuple[str, str]:
         ratio = self.rate_Hz / self._stated_Hz
-        text = (
-            f"{self.rate_Hz:.1f} samples a second by the computer's clock, {ratio:.5f} times the rate of the rig file"
-        )
+        text = f"{self.rate_Hz:.1f} samples a second by the computer's clock, {ratio:.5f} times the rig file's rate"
         if abs(ratio - 1.0) < _FAR:
             return "DEVICE_CLOCK", text
         return "DEVICE_RATE", f"{text}: v_d and every frequency are wrong by this factor"

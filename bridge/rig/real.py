@@ -16,7 +16,7 @@ from bridge.rig.faults.schedule import Faults
 from bridge.rig.faults.table import FaultTable
 from bridge.rig.file import DeviceRig
 from bridge.rig.load import device_of
-from bridge.rig.process import Served
+from bridge.rig.node import Served
 from bridge.rig.step import device_memory
 from bridge.wire.channels import CHANNELS, SENSOR_CHANNELS
 from bridge.wire.clock import time

@@ -16,9 +16,8 @@ _FAR = 0.015  # error of the rate found in two windows; a smaller one is measure
 # lines. Larger: a vibration that is too strong lasts longer.
 _ANSWER_S = 0.1
 _MARGIN = 0.1  # share of the ordered amplitude by which the executed one may differ
-_TOO_STRONG_S = (
-    0.05  # time above the ordered amplitudes until the connection ends; with `_ANSWER_S` and the ramp below 0.2 s
-)
+# Time above the ordered amplitudes until the connection ends; with `_ANSWER_S` and the ramp below 0.2 s.
+_TOO_STRONG_S = 0.05
 _TOO_WEAK_S = 0.3  # time below them until a report
 
 

@@ -1,7 +1,5 @@
 """`stickslip run`: plant, controller and recorder to the end of a scenario; `plant`, `controller`, `record`: one of them."""
 
-import threading
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -14,7 +12,8 @@ from cockpit.run.child_process import step_reports, stop_event, stopped_once, wa
 from cockpit.run.writable import LOG, check_output
 
 if TYPE_CHECKING:
-    from bridge.guard.kept import StopLatch
+    from bridge.rig.node import Served as RigToServe
+    from bridge.wire import stickslip_pb2 as wire
 
 Rig = Annotated[
     str | None,
@@ -64,6 +63,7 @@ def plant(
 def serve_rig(shared: SharedOptions, rig: str | None, wait_for: str, as_json: Json) -> None:
     """Serve a rig on the bus until its end. Raises Fault."""
     from bridge.guard.kept import StopLatch
+    from bridge.rig.process import serve
 
     made, folder = _loaded(shared, rig)
     roles = [role for role in wait_for.split(",") if role]
@@ -79,53 +79,29 @@ def serve_rig(shared: SharedOptions, rig: str | None, wait_for: str, as_json: Js
     kept = None if shared.lockstep else latch
     with step_reports(quiet=bool(shared.child)) as report:
         stop = stop_event(shared.child)
-        if folder is None:
-            blocks = _simulated(made, roles, shared.lockstep, stop, kept, report)
-        else:
-            from bridge.rig.process import serve
-            from bridge.rig.real import served
-            from cockpit.run.device_run import device_header
-            from cockpit.run.run_tables import refuse_for_processes
-
-            described = device_header(made, "plant", shared.lockstep)
-            refuse_for_processes(made, shared.lockstep)
-            real = served(made.rig, folder, made.fault, made.seed)
-            blocks = serve(real, made.duration_s, made.bus, described, roles, shared.lockstep, stop, kept, report)
+        described, to_serve = _described(made, folder, shared.lockstep)
+        blocks = serve(to_serve, made.duration_s, made.bus, described, roles, shared.lockstep, stop, kept, report)
     done = Served("plant", made.bus.endpoint, shared.lockstep, blocks)
     print_result(as_json, done, [done.in_words()])
 
 
-def _simulated(
-    made: Any,
-    roles: list[str],
-    lockstep: bool,
-    stop: threading.Event,
-    latch: "StopLatch | None",
-    report: Callable[[str, str], None],
-) -> int:
-    """Serve a simulated rig; returns the number of blocks. Raises Fault."""
+def _described(made: Any, folder: Path | None, lockstep: bool) -> "tuple[wire.Header, RigToServe]":
+    """Header and rig of a run, by the folder of a real rig's file; None: simulated. Raises Fault CONFIG."""
     from cockpit.run.run_tables import refuse_for_processes
+
+    if folder is not None:
+        from bridge.rig.real import served as real
+        from cockpit.run.device_run import device_header
+
+        refuse_for_processes(made, lockstep)
+        return device_header(made, "plant", lockstep), real(made.rig, folder, made.fault, made.seed)
     from cockpit.run.scenario import header, refuse_short_blocks
-    from plant.rig.app import run as simulate
+    from plant.rig.node import served as simulated
 
     if not lockstep:
         refuse_short_blocks(made)
     refuse_for_processes(made, lockstep)
-    described = header(made, "plant", lockstep)
-    return simulate(
-        made.rig,
-        made.seed,
-        made.duration_s,
-        made.bus,
-        described,
-        roles,
-        lockstep,
-        stop,
-        made.arm,
-        latch,
-        made.fault,
-        report,
-    )
+    return header(made, "plant", lockstep), simulated(made.rig, made.seed, made.arm, made.fault)
 
 
 def _loaded(shared: SharedOptions, rig: str | None) -> "tuple[Any, Path | None]":

@@ -11,7 +11,7 @@ from bridge.guard.core import NO_COMMAND
 from bridge.guard.states import LEAVE, apply_order
 from bridge.rig.faults.schedule import Faults
 from bridge.rig.faults.table import FaultTable
-from bridge.rig.node import GuardedNode
+from bridge.rig.node import GuardedNode, Served
 from bridge.wire.channels import CHANNELS
 from bridge.wire.messages import APPLIED as APPLIED_LAYOUT
 from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
@@ -20,7 +20,7 @@ from bridge.wire.topics import ANNOUNCE, Outgoing
 from plant.config import RigConfig
 from plant.inputs import RigInputs
 from plant.piezo import base_velocity_mps
-from plant.records import TRUTH, build, guard_records, set_load
+from plant.records import TRUTH, build, guard_records, notes, set_load
 from plant.rig.exciter_faults import ExciterFaults
 from plant.step import act, report
 
@@ -115,6 +115,15 @@ class PlantNode(GuardedNode):
 
     def close(self) -> None:
         """A simulated rig has no connection to end."""
+
+
+def served(config: RigConfig, seed: int, arm: bool, faults: Sequence[FaultTable] = ()) -> Served:
+    """The simulated rig for `bridge.rig.process.serve`; it starts ARMED if `arm` and no stop is kept."""
+
+    def make(run: int, may_arm: bool) -> PlantNode:
+        return PlantNode(config, seed, run, arm and may_arm, faults)
+
+    return Served(config.name, config.guard, notes(config), make)
 
 
 def no_number(config: RigConfig, block: int) -> Fault:

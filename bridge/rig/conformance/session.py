@@ -15,7 +15,7 @@ import numpy as np
 from bridge.guard.absent import absent
 from bridge.guard.config import VibrationLimits, merged_bands_Hz
 from bridge.rig.conformance.heard import Block, Stage
-from bridge.rig.device import Device, DeviceBlock, DeviceError, reason_of
+from bridge.rig.device import Device, DeviceBlock, DeviceError, reason_of, wrong_shape
 from bridge.rig.file import DeviceRig
 from bridge.wire.channels import CHANNELS
 
@@ -243,18 +243,13 @@ class DeviceSession:
     def _keep(self, stage: Stage, block: DeviceBlock) -> None:
         """Add a block to a stage, with a copy of its samples, as an adapter may use its array again."""
         session, rig = self.session, self._rig
-        samples = cast("object", block.samples)  # an adapter may return anything
-        due = f"{rig.sources} channels or more x {session.facts.samples} samples of float64"
-        if not isinstance(samples, np.ndarray) or samples.dtype != np.float64 or samples.ndim != 2:
-            kind = (
-                f"{samples.dtype} of shape {samples.shape}"
-                if isinstance(samples, np.ndarray)
-                else type(samples).__name__
-            )
-            session.bad_block = f"{kind} in place of {due}"
-        elif len(samples) < rig.sources or samples.shape[1] != session.facts.samples:
-            session.bad_block = f"shape {samples.shape} in place of {due}"
-        if session.bad_block:
+        kind = getattr(
+            cast("object", block.samples), "dtype", type(block.samples).__name__
+        )  # an adapter may return anything
+        if wrong := wrong_shape(block.samples, self._device.setup) or (
+            "" if kind == np.float64 else f"samples of {kind}"
+        ):
+            session.bad_block = f"{wrong}, in place of an array of float64"
             raise _Ended
         if block.lost < 0 or block.waiting < 0:
             session.bad_count = f"lost = {block.lost}, waiting = {block.waiting}: must not be negative"

@@ -12,15 +12,14 @@ from bridge.guard.keeper import Keeper
 from bridge.guard.kept import StopLatch
 from bridge.guard.states import HOLD
 from bridge.guard.stop_file import RigFile, confirmed, order
-from bridge.rig.process import GuardedRig
+from bridge.rig.process import GuardedRig, serve
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.bus_config import BusConfig
 from bridge.wire.inbox import Received
 from bridge.wire.messages import APPLIED
 from bridge.wire.topics import OPERATOR, Outgoing
 from cockpit.run.scenario import load_rig
-from plant.rig.app import run
-from plant.rig.node import PlantNode
+from plant.rig.node import PlantNode, served
 from tests.unit.plant.test_fade import Commanded, Wire
 
 HERE = "tcp/127.0.0.1:7447"
@@ -116,4 +115,4 @@ def test_a_second_rig_of_a_name_is_refused(kept: Keeper) -> None:
     with pytest.raises(
         Fault, match=rf"'lathe': a rig of this name runs at {HERE}: .*another name \(--set rig.name=WORD\)"
     ):
-        run(config, 1, 1.0, other, wire.Header(), [], False, unused, True, kept.latch)
+        serve(served(config, 1, arm=True), 1.0, other, wire.Header(), [], False, unused, kept.latch)
