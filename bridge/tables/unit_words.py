@@ -44,11 +44,13 @@ _BEHIND = re.compile(
 )
 
 # units that after an underscore or a blank are words or symbols: `x_t`, `F_min`, `pos_in`, `force_p`, `axis_C`
-_NOT_BEHIND = {"t", "h", "U", "C", "K", "p", "in", "min", "mil", "rev", "1", "-"}
-# A and V after an underscore may number a channel: `force_A`; they are units in names of the quantity
-_ELECTRIC = {
+_NOT_BEHIND = {"t", "U", "C", "K", "p", "in", "mil", "rev", "1", "-"}
+# after an underscore these may number a channel or be a word: `force_A`, `F_min`; they are units in names of the quantity
+_OF_QUANTITY = {
+    "min": re.compile(r"time|zeit|elapsed|dauer", re.IGNORECASE),
+    "h": re.compile(r"time|zeit|elapsed|dauer", re.IGNORECASE),
     "A": re.compile(r"current|strom|amp|(^|[^a-z])i[a-z]?([^a-z]|$)", re.IGNORECASE),
-    "V": re.compile(r"volt|spannung|signal|(^|[^a-z])(u|v|out|in)([^a-z]|$)", re.IGNORECASE),
+    "V": re.compile(r"volt|spannung|signal|sensor|cell|zelle|bridge|(^|[^a-z])(u|v|out|in)([^a-z]|$)", re.IGNORECASE),
 }
 # units that are symbols of quantities too: distance, time, height, mass, voltage
 _ALSO_SYMBOLS = {"s", "t", "h", "m", "U"}
@@ -124,7 +126,8 @@ def unit_in_name(name: str) -> str:
     match = None if _INDEX.fullmatch(name) else _BEHIND.match(name)
     if match is None:
         word = name.strip().removeprefix("in ")  # Rohde & Schwarz writes `in s`
-        is_time = len(name.strip()) > 1 and word not in _NOT_BEHIND and (known_unit(word) or ("",))[0] == "time"
+        is_word = word in _NOT_BEHIND or word in _OF_QUANTITY
+        is_time = len(name.strip()) > 1 and not is_word and (known_unit(word) or ("",))[0] == "time"
         return word if is_time else ""
     unit = next((text for key in "abcdefgh" if (text := match[key]) is not None), "").strip()
     if (match["f"] or match["h"]) is not None and (unit in _NOT_BEHIND or not _fits(match["name"], unit)):
@@ -135,7 +138,7 @@ def unit_in_name(name: str) -> str:
 
 
 def _fits(name: str, unit: str) -> bool:
-    return unit not in _ELECTRIC or _ELECTRIC[unit].search(name) is not None
+    return unit not in _OF_QUANTITY or _OF_QUANTITY[unit].search(name) is not None
 
 
 def in_brackets(name: str) -> str:

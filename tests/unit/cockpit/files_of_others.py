@@ -44,6 +44,8 @@ KINDS = [
     Kind("labels.txt", "".join(f"t={1e3 * t:.0f} ms  F={f:.3f} N\n" for t, f in zip(T_S, FORCE_N, strict=True))),
     Kind("words.log", "Sampling period is 2000000 ns\n" + "".join(f"hm2.force {f:+.9f} pos-fb {x:+.9f}\n" for f, x in zip(FORCE_N, PLACE_MM, strict=True)), ("--force", "hm2.force")),
     Kind("millis.csv", "millis,force_N\n" + "".join(f"{2 * i},{f:.4f}\n" for i, f in enumerate(FORCE_N))),
+    Kind("minutes.csv", "time_min,force_N\n" + "".join(f"{t / 60:.9f},{f:.4f}\n" for t, f in zip(T_S, FORCE_N, strict=True))),
+    Kind("load-cell.csv", "t [s],loadcell_V\n" + rows(T_S, FORCE_N / 10), (), TOP_N / 10, "V"),
     Kind("overflow.csv", "micros,force_N\n" + "".join(f"{(2**32 - 2_000_000 + 2000 * i) % 2**32},{f:.4f}\n" for i, f in enumerate(FORCE_N))),
     Kind("percent.csv", "time_s,torque_percent,position_mm\n" + rows(T_S, 2 * FORCE_N, PLACE_MM), ("--force", "torque_percent"), 2 * TOP_N, "%"),
     Kind("ampere.csv", "time_s,motor_current_A,position_mm\n" + rows(T_S, FORCE_N / 7, PLACE_MM), (), TOP_N / 7, "A"),
