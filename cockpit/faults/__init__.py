@@ -1,6 +1,6 @@
 """Catalogue of faults: possible failures of a rig, and the required reactions.
 
-catalogue  the checked entries of deploy/faults
+catalogue  each case of the scenarios in deploy/faults
 injection  injects a fault into a running loop
 
 `python -m bench faults` judges each entry by the simulated truth of its run.
