@@ -20,13 +20,16 @@ class Progress:
     def __init__(self) -> None:
         self._on_terminal = sys.stderr is not None and sys.stderr.isatty()  # pyright: ignore[reportUnnecessaryComparison]
         self._step = -1  # the step shown last; -1 before the first line and after the last line
+        self._left = (
+            0  # kernels left then; a module that loads others adds to them, and a rising count would look like a fault
+        )
 
     def show(self, left: int, total: int) -> None:
         """Show how many kernels are left; 0 ends the line."""
         step = (total if self._on_terminal else _LINES) * (total - left) // max(total, 1)
-        if step == self._step or (not left and self._step < 0):
+        if step == self._step or (left > self._left if self._step >= 0 else not left):
             return
-        self._step = step if left else -1
+        self._step, self._left = step if left else -1, left
         words = f"{PROGRESS}{left} of {total} left"
         if self._on_terminal:
             bar = "#" * (_BAR * (total - left) // max(total, 1))

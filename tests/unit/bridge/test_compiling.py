@@ -26,6 +26,14 @@ def test_lines_elsewhere_are_few_and_read_by_the_parent(capsys: pytest.CaptureFi
     assert left_in("stickslip: loaded") is None
 
 
+def test_the_count_never_rises_though_more_kernels_are_found(capsys: pytest.CaptureFixture[str]) -> None:
+    progress = Progress()
+    for left, total in ((8, 8), (4, 8), (10, 16), (3, 16), (0, 16)):
+        progress.show(left, total)
+    counts = [left_in(line) for line in capsys.readouterr().err.splitlines()]
+    assert counts == [(8, 8), (4, 8), (3, 16), (0, 16)]
+
+
 def test_nothing_is_shown_where_nothing_is_to_be_compiled(capsys: pytest.CaptureFixture[str]) -> None:
     Progress().show(0, 0)
     with compiling.compiling():
