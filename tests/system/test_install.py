@@ -138,7 +138,7 @@ def test_the_missing_extra_as_json(tmp_path: Path, plain: Path) -> None:
     output = call(tmp_path, "reproduce", "--json", status=kind.exit_status, search=plain)
     assert json.loads(output) == {
         "fault": kind.code,
-        "line": f"this command needs jinja2, which is not installed; pip install -e '{ROOT}[all]'",
+        "line": f"this command needs jinja2, which is not installed; {install('all')}",
         "exit_status": kind.exit_status,
     }
 

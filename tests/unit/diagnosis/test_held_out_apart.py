@@ -25,7 +25,7 @@ def test_nothing_leaks_from_the_held_out_run(monkeypatch: pytest.MonkeyPatch) ->
     fit = SimpleNamespace(chi2=1.0)
     for name, stand_in in {
         "excerpt": lambda whole: whole,
-        "Problem": lambda _rig, kept: SimpleNamespace(runs=kept, until_s=0.0),
+        "Problem": lambda _rig, kept, _jobs: SimpleNamespace(runs=kept, until_s=0.0),
         "cannot_show": lambda *_: (),
         "ruled_out": lambda *_: set(),
         "trials": lambda _: [],
