@@ -12,6 +12,8 @@ from typing import Any, Never
 GRACE_S = 2.0
 # Predictions of all fitted runs that a diagnosis takes: counted on 9 made rigs (docs/method/diagnosis.md); for an estimate
 _FEW, _MANY = 600, 1500
+# Share of a prediction that a single thread computes at a time: its features. The simulation, 0.5 of it, runs in all threads.
+_ONE_AT_A_TIME = 0.5
 # Computing time of a simulated second on an idle core before it is measured [s/s]: four rigs of 30 s, 46 s of CPU
 _USUAL_PACE = 1e-3
 
@@ -26,7 +28,8 @@ class EndedError(OutOfTimeError):
 
 def forecast(fitted_s: float, jobs: int, pace: float = _USUAL_PACE) -> str:
     """The time that the simulated fits take, in words, for runs of `fitted_s` in total."""
-    return f"{_FEW * pace * fitted_s / jobs:.0f} to {_MANY * pace * fitted_s / jobs:.0f} s"
+    prediction_s = pace * fitted_s * (_ONE_AT_A_TIME + (1.0 - _ONE_AT_A_TIME) / jobs)
+    return f"{_FEW * prediction_s:.0f} to {_MANY * prediction_s:.0f} s"
 
 
 @contextmanager
