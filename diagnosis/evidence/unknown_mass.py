@@ -1,7 +1,6 @@
 """Estimate of the mass from the runs, for an owner who cannot weigh it."""
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from bridge.arrays import Floats
 from diagnosis.evidence.manifest import RigTable, RunTable
@@ -29,6 +28,8 @@ def shown_mass_kg(rig: RigTable, table: RunTable, columns: Columns) -> float | N
 
 def _accelerated(force_N: Floats, columns: Columns) -> float | None:
     """Mass from force over acceleration, fitted together with Coulomb friction, viscous friction and a constant force."""
+    from scipy.signal import savgol_filter  # noqa: PLC0415  0.7 s of CPU, which `look` alone would pay
+
     step_s = float(np.median(np.diff(columns["t_s"])))
     window = max(2 * round(0.5 * _WINDOW_S / step_s) + 1, 5)
     position_m, accel = columns.get("mass_position_m"), columns.get("mass_accel_mps2")
