@@ -128,7 +128,8 @@ def _why_no_mass(seen: LookResult) -> str:
         return "no mass: the force falls slower than a free mass swings, by friction or damping; weigh the slide"
     slip_s = seen.numbers["slip_s"].value
     least_Hz = _SAMPLES_OF_SLIP / slip_s
-    return f"no mass: a slip has {slip_s * seen.rate_Hz:.0f} samples; record at {least_Hz:.2g} Hz or more"
+    samples = counted(round(slip_s * seen.rate_Hz), "sample")
+    return f"no mass: a slip has {samples}; record at {least_Hz:.2g} Hz or more"
 
 
 def _why_no_slip(seen: LookResult) -> str:

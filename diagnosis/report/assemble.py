@@ -185,8 +185,8 @@ def _candidates(judged: Judged, search: Search | None, named: Fit | None) -> tup
 
 
 def _alike(judged: Judged, effects: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
-    """The named effect with its rivals; empty without any, and for two effects."""
-    if len(effects) != 1:
+    """The named effect with its rivals; empty without any, for two effects, and for a wrong number that does not lead them."""
+    if len(effects) != 1 or effects[0] not in judged.names:
         return ()
     least = _RIVAL * judged.effects[effects[0]]
     rivals = (name for name, value in judged.effects.items() if name not in (*effects, NONE) and value >= least > 0.0)

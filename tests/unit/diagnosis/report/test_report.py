@@ -11,6 +11,8 @@ from bridge.log.finding import Finding
 from bridge.results import strict_json
 from cockpit.commands import diagnose_output
 from diagnosis.evidence.foreign_vibration import DISTORTED, PICK_UP
+from diagnosis.judge.judge import Judged
+from diagnosis.report import assemble
 from diagnosis.report import words as in_words
 from diagnosis.report.page import report_page, rig_row, where_map, write_report
 from diagnosis.report.summary import summary
@@ -250,6 +252,16 @@ def test_a_number_that_no_effect_stands_for_has_no_rival_candidates():
     assert by_label(made._replace(candidates=level))["sure"].startswith(
         "static-level 90 %; 98 % that nothing else acts; other"
     )
+
+
+def test_a_wrong_number_that_no_candidate_names_has_no_group():
+    """Its probability is that of an idle effect, so one case of the sealed set had a group of 26."""
+    chances = {"none": 0.8, "frictional-lag": 0.1, "stribeck-velocity": 0.1}
+    judged = Judged(chances, {frozenset(): 0.8, frozenset({"frictional-lag"}): 0.1}, 0.9)
+    assert assemble._alike(judged, ("stribeck-velocity",)) == ()
+    assert assemble._alike(
+        judged._replace(explanations={frozenset({"stribeck-velocity"}): 0.1}), ("stribeck-velocity",)
+    ) == (("stribeck-velocity", "frictional-lag"),)
 
 
 def test_without_a_fit_no_number_was_refitted():
