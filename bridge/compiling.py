@@ -20,9 +20,8 @@ class Progress:
     def __init__(self) -> None:
         self._on_terminal = sys.stderr is not None and sys.stderr.isatty()  # pyright: ignore[reportUnnecessaryComparison]
         self._step = -1  # the step shown last; -1 before the first line and after the last line
-        self._left = (
-            0  # kernels left then; a module that loads others adds to them, and a rising count would look like a fault
-        )
+        # kernels left then; a module that loads others adds to them, and a rising count would look like a fault
+        self._left = 0
 
     def show(self, left: int, total: int) -> None:
         """Show how many kernels are left; 0 ends the line."""

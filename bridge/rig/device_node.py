@@ -133,10 +133,8 @@ class DeviceNode(GuardedNode):
 
     def _write(self) -> None:
         """Order the vibration that the guard allows; after a refusal it begins again from rest."""
-        device, g = (
-            self._device,
-            self._guard_state,
-        )  # a field of an array: an attribute of its record takes 2.5 us longer
+        # a field of an array: an attribute of its record takes 2.5 us longer
+        device, g = self._device, self._guard_state
         is_on = bool(g["enable"][0])
         try:
             if has_line := device.setup.has_enable_line:

@@ -332,9 +332,8 @@ class GuardedRig:
                     late_commands += round_trip_ns > LATE_NS
             messages = node.advance(commands, late_commands, round_trip_ns, late_ns)
             sent_ns[(node.block - 1) % _ROUND_TRIPS_KEPT] = time.perf_counter_ns()
-            while (
-                self._answers.get() is not None
-            ):  # a late answer would end the wait for the next one, so that each is late
+            # a late answer would end the wait for the next one, so that each is late
+            while self._answers.get() is not None:
                 pass
             self._send(messages)
             late_ns = int(node.applied["late_ns"])

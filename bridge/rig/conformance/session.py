@@ -243,9 +243,8 @@ class DeviceSession:
     def _keep(self, stage: Stage, block: DeviceBlock) -> None:
         """Add a block to a stage, with a copy of its samples, as an adapter may use its array again."""
         session, rig = self.session, self._rig
-        kind = getattr(
-            cast("object", block.samples), "dtype", type(block.samples).__name__
-        )  # an adapter may return anything
+        # an adapter may return anything
+        kind = getattr(cast("object", block.samples), "dtype", type(block.samples).__name__)
         if wrong := wrong_shape(block.samples, self._device.setup) or (
             "" if kind == np.float64 else f"samples of {kind}"
         ):

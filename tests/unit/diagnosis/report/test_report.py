@@ -255,7 +255,7 @@ def test_a_number_that_no_effect_stands_for_has_no_rival_candidates():
 
 
 def test_a_wrong_number_that_no_candidate_names_has_no_group():
-    """Its probability is that of an idle effect, so one case of the sealed set had a group of 26."""
+    """Its probability is that of an idle effect, so all idle effects would be its rivals."""
     chances = {"none": 0.8, "frictional-lag": 0.1, "stribeck-velocity": 0.1}
     judged = Judged(chances, {frozenset(): 0.8, frozenset({"frictional-lag"}): 0.1}, 0.9)
     assert assemble._alike(judged, ("stribeck-velocity",)) == ()
