@@ -5,6 +5,7 @@ outputs are arrays of its samples, or a step for each part of it. The experiment
 """
 
 import json
+import math
 import os
 import select
 import subprocess
@@ -14,7 +15,7 @@ from contextlib import suppress
 from typing import IO, Annotated
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from bridge.config import Strict, validate
 from bridge.rig.adapters._fmu_process import ORDER, READY
@@ -35,6 +36,11 @@ class FmuSettings(Strict):
         description="Outputs that make the device's channels 0, 1 and so on."
     )
     set: dict[str, float] = Field({}, description="Start values of inputs and parameters, by name.")
+    speed: str = Field(
+        "", description="Input of the drive's speed, with a start value in `set`: a `[[step]]` changes it."
+    )
+    units_per_mps: float = Field(1.0, description="Value of this input for 1 m/s.")
+    load: str = Field("", description="Input of the normal load, with a start value in `set`: a `[[step]]` changes it.")
     noise: dict[str, float] = Field({}, description="Standard deviation of the noise of an output, in its unit.")
     resolution: dict[str, float] = Field({}, description="Step of an output's values, in its unit.")
     seed: Annotated[int, Field(ge=0)] = 1
@@ -42,6 +48,13 @@ class FmuSettings(Strict):
         1.5, description="Time for a block after which the model is ended, as MODEL_SLOW."
     )
     memory_MB: Annotated[float, Field(gt=0)] = Field(2000.0, description="Largest memory of its process.")
+
+    @model_validator(mode="after")
+    def _has_start_values(self) -> "FmuSettings":
+        for name in ("speed", "load"):
+            if (variable := getattr(self, name)) and variable not in self.set:
+                raise ValueError(f"{name} = {variable!r}: must have its start value in set; add it")
+        return self
 
 
 class Adapter(Device):
@@ -56,6 +69,8 @@ class Adapter(Device):
         self._process: subprocess.Popen[bytes] | None = None
         self._errors: IO[bytes] | None = None
         self._order, self._is_on = (0.0, 0.0), not setup.has_enable_line
+        self.settable = frozenset(name for name in ("speed", "load") if getattr(settings, name))
+        self._machine = self._start()
 
     def open(self) -> None:
         """Start the process, and the model from its beginning."""
@@ -64,6 +79,7 @@ class Adapter(Device):
             "block_s": self.block_s,
             "samples": self.setup.samples_per_block,
         }
+        self._machine = self._start()
         self._random = np.random.Generator(np.random.PCG64(self._settings.seed))
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115  # closed by `close`
         self._process = subprocess.Popen(
@@ -84,7 +100,7 @@ class Adapter(Device):
         if self._process is None or self._process.stdin is None:
             raise self._died()
         try:
-            os.write(self._process.stdin.fileno(), ORDER.pack(*self._order))
+            os.write(self._process.stdin.fileno(), ORDER.pack(*self._order, *self._machine.values()))
         except OSError:
             raise self._died() from None
         rows = np.frombuffer(self._answer(8 * self._shape[0] * self._shape[1], self._settings.slowest_s)).reshape(
@@ -133,6 +149,21 @@ class Adapter(Device):
     def write(self, frequency_Hz: float, amplitude: float) -> None:
         """Set the order of the next block."""
         self._order = frequency_Hz, amplitude if self._is_on else 0.0
+
+    def _start(self) -> dict[str, float]:
+        """Start values of speed and load, in the model's units; NaN: the model has no such input."""
+        settings = self._settings
+        return {name: settings.set.get(getattr(settings, name), math.nan) for name in ("speed", "load")}
+
+    @property
+    def speed_mps(self) -> float:
+        """Velocity of the drive [m/s]."""
+        return self._machine["speed"] / self._settings.units_per_mps
+
+    def set(self, name: str, value: float) -> None:
+        """Set speed or load for the coming blocks."""
+        factor = self._settings.units_per_mps if name == "speed" else self._start()[name]
+        self._machine[name] = factor * value
 
     def enable(self, on: bool, toggle: int) -> None:  # noqa: ARG002
         """Set the enable line, without which the model rests."""
