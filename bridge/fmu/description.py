@@ -42,7 +42,7 @@ def description(model: Model, fmi: int, library: str, token: str) -> str:
 
 
 def _words(variables: list[Variable]) -> Iterator[tuple[Variable, dict[str, str], dict[str, str]]]:
-    """Each variable with the attributes of any variable, and those of its number."""
+    """Each variable with the attributes of any variable, and the attributes of a number."""
     kinds = {"independent": "continuous", "parameter": "tunable"}
     for reference, v in enumerate(variables):
         common = {"name": v.name, "valueReference": str(reference), "causality": v.causality}

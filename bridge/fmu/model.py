@@ -1,4 +1,4 @@
-"""What an FMU contains: the records of a kernel, which are its memory, and the variables in them."""
+"""The content of an FMU: the records of a kernel, which are its memory, and the variables in them."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple

@@ -14,7 +14,7 @@ NAME = "stickslip_kernel"
 
 
 def make(module: str, variant: str, samples: int, out: Path) -> None:
-    """Write the object file of `int NAME(record, ...)`, which returns whether the state is no number any more."""
+    """Write the object file of `int NAME(record, ...)`, which returns whether the state has become NaN."""
     os.environ["NUMBA_CPU_NAME"], os.environ["NUMBA_CPU_FEATURES"] = "generic", ""
     import numba
     from llvmlite import binding

@@ -120,7 +120,7 @@ class Part(ABC):
 class Device(Part):
     """A converter and an exciter."""
 
-    settable: frozenset[str] = frozenset()  # what `set` can change: "speed" and "load", of a model
+    settable: frozenset[str] = frozenset()  # quantities that `set` can change: "speed" and "load" of a model
     # whose clock makes a block: the device's, if `read` waits until a block is complete; the computer's, whose loop reads one
     # each block length; or none, as a simulated device makes a block for each `write`
     pace: Pace = "device"

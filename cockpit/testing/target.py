@@ -24,6 +24,7 @@ class Target(NamedTuple):
 
 
 NO_TARGET = Target()
+_ENDS = {"sensors.force_lowest_N": "lowest", "sensors.force_range_N": "highest"}  # of the force channel
 
 
 class Loaded(NamedTuple):
@@ -81,9 +82,17 @@ def load(name: str, settings: list[str], target: Target) -> Loaded:
 
 def _of_a_model(changes: dict[str, Any]) -> tuple[list[str], list[str]]:
     """The settings by which a scenario's changes of a simulated rig hold for a model, and the keys that a model does not have."""
-    tables = {key: value for key, value in changes.items() if key in {"channels", "guard"}}
-    piezo = changes.get("piezo", {})
-    if set(piezo) <= set(ExciterConfig.model_fields):
-        tables |= {"exciter": piezo} if piezo else {}
-        changes = {key: value for key, value in changes.items() if key != "piezo"}
-    return as_settings({"rig": tables}), [key for key in changes if key not in tables]
+    settings: list[str] = []
+    unknown: list[str] = []
+    for setting in as_settings(changes):
+        key, _, value = setting.partition("=")
+        table, _, name = key.partition(".")
+        if table in {"channels", "guard"}:
+            settings.append(f"rig.{setting}")
+        elif table == "piezo" and name in ExciterConfig.model_fields:
+            settings.append(f"rig.exciter.{name}={value}")
+        elif key in _ENDS:
+            settings.append(f"rig.channels.drive_force_N.{_ENDS[key]}={value}")
+        else:
+            unknown.append(key)
+    return settings, unknown

@@ -1,4 +1,4 @@
-"""`python -m bridge.rig.adapters._fmu_process SETTINGS`: a model in a separate process, with numpy and FMPy alone.
+"""`python -m bridge.rig.adapters._fmu_process SETTINGS FOLDER`: a model in a separate process, with numpy and FMPy alone.
 
 For each order, four float64 (frequency, amplitude, speed, load; NaN: no such input), it answers with the float64 samples of the
 block, [outputs][samples]. It ends with a line on stderr that gives the reason.
@@ -12,7 +12,6 @@ import re
 import resource
 import struct
 import sys
-import tempfile
 import zipfile
 from typing import Any
 
@@ -34,7 +33,7 @@ class _Absent:
 
 
 class _Library:
-    """The library of a model. FMPy asks for every function of FMI; one that is absent fails once it is called."""
+    """The library of a model. FMPy asks for every function of FMI; an absent function fails once it is called."""
 
     def __init__(self, library: Any) -> None:
         self._library = library
@@ -126,26 +125,31 @@ class Model:
         return self._block.tobytes()
 
 
-def _serve(settings: dict[str, Any]) -> None:
-    """Answer orders until stdin ends."""
+def _serve(settings: dict[str, Any], folder: str) -> None:
+    """Answer orders until stdin ends; the model is unpacked into `folder`."""
     answers = os.dup(1)
     os.dup2(2, 1)  # the prints of a model must not mix with the samples
     most = round(settings["memory_MB"] * 1e6)
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
-    with tempfile.TemporaryDirectory(prefix="stickslip-fmu-") as folder:
-        try:
-            model = Model(settings, folder)
-        except ModuleNotFoundError as error:
-            raise SystemExit(f"needs the package {error.name}; pip install 'stickslip[fmi]'") from None
-        except Exception as error:  # any of FMPy, of the archive or of the model
-            raise SystemExit(f"{type(error).__name__}: {error}") from None
+    try:
+        model = Model(settings, folder)
         os.write(answers, READY)
         with open(0, "rb", buffering=0) as orders:
             while len(order := orders.read(ORDER.size)) == ORDER.size:
                 answer = memoryview(model.block(*ORDER.unpack(order)))
                 while answer:
                     answer = answer[os.write(answers, answer) :]
+    except Exception as error:  # any of FMPy, of the archive or of the model
+        needed = isinstance(error, ModuleNotFoundError)
+        why = (
+            f"needs the package {error.name}; pip install 'stickslip[fmi]'"
+            if needed
+            else f"{type(error).__name__}: {error}"
+        )
+        print(why, file=sys.stderr, flush=True)
+        os.close(answers)  # at once: the end of an interpreter takes longer
+        raise SystemExit(1) from None
 
 
 if __name__ == "__main__":
-    _serve(json.loads(sys.argv[1]))
+    _serve(json.loads(sys.argv[1]), sys.argv[2])

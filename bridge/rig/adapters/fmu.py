@@ -1,7 +1,7 @@
 """A model of another tool as a device: an FMU of FMI 2 or 3 for co-simulation, run by FMPy in a separate process.
 
-The process may crash, hang or grow: it is ended and reported, and the exciter rests. One block is one step of the model, whose
-outputs are arrays of its samples, or a step for each part of it. The experiment that the model proposes is ignored.
+The process may crash, hang or grow: it is ended and reported, and is not started again in this run. One block is one step of the
+model, whose outputs are arrays of its samples, or a step for each part of it. The experiment that the model proposes is ignored.
 """
 
 import json
@@ -68,12 +68,16 @@ class Adapter(Device):
         self._shape = len(settings.outputs), setup.samples_per_block
         self._process: subprocess.Popen[bytes] | None = None
         self._errors: IO[bytes] | None = None
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._end: DeviceError | None = None
         self._order, self._is_on = (0.0, 0.0), not setup.has_enable_line
         self.settable = frozenset(name for name in ("speed", "load") if getattr(settings, name))
         self._machine = self._start()
 
     def open(self) -> None:
-        """Start the process, and the model from its beginning."""
+        """Start the process, and the model from its beginning. Raises DeviceError once it has died."""
+        if self._end is not None:
+            raise DeviceError(f"{self._end}, and is not started again", self._end.code)
         settings = self._settings.model_dump() | {
             "file": str(self.setup.folder / self._settings.file),
             "block_s": self.block_s,
@@ -82,8 +86,9 @@ class Adapter(Device):
         self._machine = self._start()
         self._random = np.random.Generator(np.random.PCG64(self._settings.seed))
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115  # closed by `close`
+        self._folder = tempfile.TemporaryDirectory(prefix="stickslip-fmu-")  # removed by `close`, also after a crash
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "bridge.rig.adapters._fmu_process", json.dumps(settings)],
+            [sys.executable, "-P", "-m", "bridge.rig.adapters._fmu_process", json.dumps(settings), self._folder.name],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
@@ -99,13 +104,14 @@ class Adapter(Device):
         """The block of the newest order."""
         if self._process is None or self._process.stdin is None:
             raise self._died()
+        size = 8 * self._shape[0] * self._shape[1]
         try:
-            os.write(self._process.stdin.fileno(), ORDER.pack(*self._order, *self._machine.values()))
-        except OSError:
-            raise self._died() from None
-        rows = np.frombuffer(self._answer(8 * self._shape[0] * self._shape[1], self._settings.slowest_s)).reshape(
-            self._shape
-        )
+            with suppress(BrokenPipeError):  # it has ended, as the answer shows
+                os.write(self._process.stdin.fileno(), ORDER.pack(*self._order, *self._machine.values()))
+            rows = np.frombuffer(self._answer(size, self._settings.slowest_s)).reshape(self._shape)
+        except DeviceError as error:
+            self._end = error
+            raise
         return DeviceBlock(self._measured(rows), *self._order)
 
     def _measured(self, rows: np.ndarray) -> np.ndarray:
@@ -184,4 +190,6 @@ class Adapter(Device):
             self._process.wait()
         if self._errors is not None:
             self._errors.close()
+        if self._folder is not None:
+            self._folder.cleanup()
         self._process = None

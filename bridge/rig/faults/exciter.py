@@ -40,7 +40,7 @@ def spoiled(healthy: Mapping[str, float], faults: list[tuple[FaultTable, float]]
 
 
 class SpoiledExciter:
-    """What an exciter with faults executes and delivers of the ordered amplitudes.
+    """The amplitudes that an exciter with faults executes and delivers for its orders.
 
     Args:
         block_s: time from an order to the next.
