@@ -14,6 +14,7 @@ from bridge.rig.faults.table import FaultTable
 from bridge.rig.load import device_of
 from bridge.rig.node import GuardedNode
 from bridge.rig.process import GuardedRig
+from bridge.rig.real import notes as device_notes
 from bridge.rig.real import open_node
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.complaints import BAD_MESSAGE, Complaints
@@ -29,6 +30,7 @@ from controller.app import ControllerProcess
 from controller.config import ControllerConfig
 from controller.node import ControllerNode
 from plant.drive_config import DriveConfig
+from plant.records import notes
 from plant.rig.node import PlantNode
 
 _LINKED_S = 0.05  # time from the resumption of a frozen process to its new link
@@ -84,6 +86,10 @@ class SimulatedRun:
         """Create the rig's node. A subclass may override this, to record the simulated truth or for a device."""
         return PlantNode(**settings)
 
+    def notes(self) -> list[tuple[str, str]]:
+        """Codes and texts of the rig's events at its start. A subclass overrides this for a device."""
+        return [] if isinstance(self._scenario, DeviceRun) else notes(self._scenario.rig)
+
     def controller_node(self) -> ControllerNode:
         """Create the controller. A subclass may override this to run a rule in its place."""
         return ControllerNode(self._config)
@@ -130,6 +136,8 @@ class SimulatedRun:
 
         def work() -> None:
             process.event("START", _GRANTED)
+            for code, text in self.notes():
+                process.event(code, text)
             process.realtime(max(left, 0), self._stop)
             process.end()
 
@@ -191,6 +199,10 @@ class DevicesRun(SimulatedRun):
         self.close()
         run, arm = self._run, self._arm and settings["run"] == 1
         return open_node(run.rig, self._folder, settings["run"], settings["faults"], run.seed, arm)
+
+    def notes(self) -> list[tuple[str, str]]:
+        """The protection that the rig lacks."""
+        return device_notes(self._run.rig)
 
     def _load(self, ratio: float) -> None:
         self._set("load", ratio)
