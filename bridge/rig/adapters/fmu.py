@@ -71,6 +71,7 @@ class Adapter(Device):
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._end: DeviceError | None = None
         self._order, self._is_on = (0.0, 0.0), not setup.has_enable_line
+        self.watchdog_s = self.block_s  # it makes no block without an order
         self.settable = frozenset(name for name in ("speed", "load") if getattr(settings, name))
         self._machine = self._start()
 

@@ -202,7 +202,7 @@ class DevicesRun(SimulatedRun):
 
     def notes(self) -> list[tuple[str, str]]:
         """The protection that the rig lacks."""
-        return device_notes(self._run.rig)
+        return device_notes(self._run.rig, device_of(self._run.rig, self._folder).watchdog_s)
 
     def _load(self, ratio: float) -> None:
         self._set("load", ratio)
