@@ -73,7 +73,7 @@ def variables_of(
         base, shape = kind.subdtype or (kind, ())
         first = part[field].reshape(-1)[0].item()
         start = None if causality == "output" else repr(first) if base.kind == "f" else str(first)
-        unit = unit_of(name.rpartition(".")[2])
+        unit = unit_of(name.rpartition(".")[2]) if base.kind == "f" else "1"  # FMI has no units of integers
         yield Variable(
             name, causality, at + offset, TYPES[base.str[1:]], int(np.prod(shape)), start, unit if unit != "1" else "",
             any_number=any_number,

@@ -31,3 +31,11 @@ NEVER(NRT_Free) NEVER(NRT_MemInfo_call_dtor) NEVER(PyBytes_FromStringAndSize) NE
 NEVER(PyErr_SetString) NEVER(PyErr_WriteUnraisable) NEVER(PyUnicode_FromString) NEVER(Py_DecRef) NEVER(numba_do_raise)
 NEVER(numba_gil_ensure) NEVER(numba_gil_release) NEVER(numba_runtime_build_excinfo_struct) NEVER(numba_unpickle)
 void *PyExc_RuntimeError, *PyExc_StopIteration, *PyExc_SystemError;
+
+/* Strides of an array of another shape with the same elements, as for the minimum of an array; no array here has gaps. */
+int numba_attempt_nocopy_reshape(long dimensions, const long *lengths, const long *strides, long new_dimensions,
+        const long *new_lengths, long *new_strides, long size, int is_fortran) {
+    (void)dimensions, (void)lengths, (void)strides, (void)is_fortran;
+    for (long k = new_dimensions; k-- > 0; size *= new_lengths[k]) new_strides[k] = size;
+    return 1;
+}
