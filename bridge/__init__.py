@@ -4,6 +4,7 @@ wire/     messages on the bus, for every language: stickslip.proto, PROTOCOL.md,
 log/      run logs (MCAP): written, recorded, read whole or cut, checked
 rig/      a rig of any kind behind its guard, as a process: the contract of a device, injected faults
 guard/    limits on the exciter of a rig that hold for every command of a controller
+fmu/      kernels as FMUs for other tools
 tables/   CSV, Parquet, MATLAB and TDMS, in and out
 config    strict TOML                              faults   codes, exit statuses and help (faults.toml)
 files     checks before reading, atomic writing    units    units in names, numbers in words

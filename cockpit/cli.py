@@ -116,7 +116,8 @@ _PANELS: dict[str, dict[str, tuple[str, ...]]] = {
         "fmu": (
             "fmu.fmu",
             "stickslip fmu paper-c45-c45 --out rig.fmu",
-            "stickslip fmu belt-axis --set slide.mass_kg=2.0 --out heavy.fmu",
+            "stickslip fmu belt-axis --set slide.mass_kg=2.0 --fmi 2 --out heavy.fmu",
+            "stickslip fmu paper-c45-c45 --controller --out controller.fmu",
         ),
         "fault": (
             "proof.fault",

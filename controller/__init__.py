@@ -15,6 +15,7 @@ telemetry      the state for plots and the memory for replay
 node, app      the controller as a participant of the bus; the process
 freshness      whether blocks come in time, and their age; stalls of the controller itself
 replay         the controller on the frames of a log, compared with the log
+fmu            the controller as an FMU for other tools
 rig_header     whether the controller can control the rig
 
 `docs/explain/the-controller.md` has its rules on a page.

@@ -28,7 +28,7 @@ simulate      a run without bus and sensors
 stability     the slider linearised around steady sliding
 inputs        velocity of the drive, its announcements, noise and delays, block by block, drawn ahead by a thread
 rig/          the plant behind its guard on the bus, and as a device for the guard of every rig
-fmu/          a rig as an FMU for other tools
+fmu           a rig as an FMU for other tools
 effects/      effects of a real rig that the nominal rig lacks
 four_rigs, four_rigs_step  the same for four or eight rigs side by side, in vector registers; one step of them
 """

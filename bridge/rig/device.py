@@ -120,6 +120,7 @@ class Part(ABC):
 class Device(Part):
     """A converter and an exciter."""
 
+    settable: frozenset[str] = frozenset()  # quantities that `set` can change: "speed" and "load" of a model
     # whose clock makes a block: the device's, if `read` waits until a block is complete; the computer's, whose loop reads one
     # each block length; or none, as a simulated device makes a block for each `write`
     pace: Pace = "device"
@@ -140,6 +141,15 @@ class Device(Part):
     def announcements(self) -> Records:
         """Coming velocities of the drive, records of `Announce` before the next samples; by default none."""
         return _NONE
+
+    @property
+    def speed_mps(self) -> float:
+        """Velocity of the drive [m/s], where `set` can change it."""
+        return 0.0
+
+    def set(self, name: str, value: float) -> None:
+        """Set one of `settable` for the coming blocks: the drive's speed [m/s], or the load in multiples of its start value."""
+        raise DeviceError(f"{name} = {value:g}: is set by the machine")
 
 
 class Exciter(Part):

@@ -10,6 +10,7 @@ from bridge.arrays import Floats, Records
 from bridge.guard.core import NO_COMMAND
 from bridge.guard.states import LEAVE, apply_order
 from bridge.rig.device import Device, DeviceBlock, DeviceError, reason_of, wrong_shape
+from bridge.rig.faults.exciter import SpoiledExciter
 from bridge.rig.faults.schedule import Faults
 from bridge.rig.node import LATE_NS, GuardedNode
 from bridge.rig.rate import RateWatch
@@ -41,6 +42,7 @@ class DeviceNode(GuardedNode):
         memory: calibration of its channels, a record of `bridge.rig.step.DEVICE`; None: SI units in the order of CHANNELS.
         stroke_m: stroke of the exciter for one unit of its amplitude.
         derive: adds rows of derived channels to the samples of a block; None: none.
+        exciter: the faults of its exciter; None: a real exciter, which has none.
 
     """
 
@@ -54,9 +56,10 @@ class DeviceNode(GuardedNode):
         memory: Records | None = None,
         stroke_m: float = 1.0,
         derive: Callable[[Floats], Floats] | None = None,
+        exciter: SpoiledExciter | None = None,
     ) -> None:
         super().__init__(guard, round(device.block_s * 1e9), device.setup.samples_per_block, faults)
-        self._device, self._stroke_m, self._derive = device, stroke_m, derive
+        self._device, self._stroke_m, self._derive, self._exciter = device, stroke_m, derive, exciter
         self._memory = device_memory() if memory is None else memory
         self._block = DeviceBlock(np.zeros((1, 1)), 0.0, 0.0)
         self._is_begun = False  # whether the vibration of the block under way is set
@@ -110,8 +113,10 @@ class DeviceNode(GuardedNode):
         block = self._read()
         if block is None:
             return None
-        self._block, self._is_begun = block, False
         self._note_block(block)
+        if self._exciter is not None and (executed_m := self._exciter.executed_m) is not None:
+            block = block._replace(amplitude=executed_m / self._stroke_m)
+        self._block, self._is_begun = block, False
         samples = self._derive(block.samples) if self._derive is not None else block.samples
         fill(self._guard_state, self._memory, self.block_ns, block.lost, samples, self._sensors)
         if self.block % self._look_blocks == 0 and (names := clipped(self._memory, self._look_blocks * self._samples)):
@@ -134,13 +139,16 @@ class DeviceNode(GuardedNode):
     def _write(self) -> None:
         """Order the vibration that the guard allows; after a refusal it begins again from rest."""
         # a field of an array: an attribute of its record takes 2.5 us longer
-        device, g = self._device, self._guard_state
-        is_on = bool(g["enable"][0])
+        device, g, exciter = self._device, self._guard_state, self._exciter
+        is_on = bool(g["enable"][0]) or (exciter is not None and exciter.is_always_on)
         try:
             if has_line := device.setup.has_enable_line:
                 device.enable(is_on, int(g["toggle"][0]))
-            amplitude = float(g["amplitude_m"][0]) / self._stroke_m if is_on or has_line else 0.0
-            device.write(float(g["frequency_Hz"][0]), amplitude)
+            frequency_Hz = float(g["frequency_Hz"][0])
+            amplitude_m = float(g["amplitude_m"][0]) if is_on or has_line else 0.0
+            amplitude_m = exciter.delivered_m(frequency_Hz, amplitude_m) if exciter is not None else amplitude_m
+            amplitude = amplitude_m / self._stroke_m
+            device.write(frequency_Hz, amplitude)
             if is_on or not has_line:  # while the line is off, the loop check watches the amplifier
                 self._watch.order(amplitude)
         except Exception as error:
@@ -249,6 +257,10 @@ class DeviceNode(GuardedNode):
             self._guard_params, self._guard_state, self._memory, block.frequency_Hz, block.amplitude * self._stroke_m,
             accepted, commands_late, round_trip_ns, late_ns, self._sensors, self._applied,
         )  # fmt: skip
+
+    def set(self, name: str, value: float) -> None:
+        """Set the speed or the load of a model from the next block on."""
+        self._device.set(name, value)
 
     def let_go(self) -> None:
         """Drop the command in force and enter DISARMED: the vibration fades to zero at the exciter's rate."""

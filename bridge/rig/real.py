@@ -12,6 +12,7 @@ from bridge.guard.wide import protection
 from bridge.rig.derived import Derived
 from bridge.rig.device import Device, reason_of
 from bridge.rig.device_node import DeviceNode
+from bridge.rig.faults.exciter import SpoiledExciter
 from bridge.rig.faults.schedule import Faults
 from bridge.rig.faults.table import FaultTable
 from bridge.rig.file import DeviceRig
@@ -44,8 +45,11 @@ def open_node(
     """
     device = device_of(rig, folder)
     guard = build(rig.guard, _exciter(rig), run, arm, absent=absent(rig.channels), derived=rig.derived)
-    injected = Faults(faults, seed, rig.converter.block_s, rig.converter.samples_per_block)
-    node = DeviceNode(device, guard, injected, calibration(rig), rig.exciter.stroke_m_per_V or 1.0, Derived(rig))
+    # nothing real moves behind a device that makes a block for each command
+    exciter = SpoiledExciter(device.block_s) if device.pace == "caller" else None
+    block_s, samples, stroke_m = rig.converter.block_s, rig.converter.samples_per_block, rig.exciter.stroke_m_per_V
+    injected = Faults(faults, seed, block_s, samples, exciter.set if exciter is not None else None)
+    node = DeviceNode(device, guard, injected, calibration(rig), stroke_m or 1.0, Derived(rig), exciter)
     node.warm_up()  # before a device samples: its buffers overflow while kernels compile
     try:  # an adapter may be foreign code
         device.open()

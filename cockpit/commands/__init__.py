@@ -4,7 +4,7 @@ processes                   run: plant, controller and recorder together; plant,
 operator_commands           arm, disarm, stop, reset, status
 live                        serve, watch
 proof                       fault, soak, schema
-testing, fmu                test: scenarios with expectations; fmu: a simulated rig as a model for other tools
+testing, fmu                test: scenarios with expectations; fmu: a rig or a controller as a model for other tools
 replay                      a log through this version's controller, simulated again, or published on the bus
 pictures                    plot, review, map, reproduce
 look                        estimates from a measured file

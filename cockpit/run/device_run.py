@@ -1,6 +1,6 @@
 """A run of a real rig: its rig file, and the scenario's controller, duration, bus and log. Nothing here imports the plant."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -50,11 +50,22 @@ class DeviceRun(RunTables):
     @property
     def simulated_only(self) -> str:
         """The first of its tables that only a simulated rig carries out."""
+        return self.refused_by(is_model=False)
+
+    def refused_by(self, is_model: bool, settable: Collection[str] = ()) -> str:
+        """The first of its tables that its device does not carry out, as text; empty if it can run.
+
+        Args:
+            is_model: the device is a model, so that its exciter may have faults.
+            settable: as of `bridge.rig.device.Device`.
+
+        """
         for number, fault in enumerate(self.fault):
-            if fault.group == EXCITER:
+            if fault.group == EXCITER and not is_model:
                 return f"fault.{number}.target = {fault.target}: must be a sensor, clock or bus: this rig is real"
         for number, step in enumerate(self.step):
-            if step.speed_mps is not None or step.load is not None:
+            needed = {"speed": step.speed_mps, "load": step.load}
+            if any(value is not None and name not in settable for name, value in needed.items()):
                 return (
                     f"step.{number}: speed and load of a real rig are set by its machine: must be command or settings"
                 )

@@ -132,7 +132,7 @@ def in_toml(value: Any) -> str:
 
 def merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
     """A copy of `below` with the keys of `above` in place of its keys, table by table."""
-    result = dict(below)
+    result = {} if above.get("absent") is True else dict(below)  # a channel that is absent has no source
     for key, value in above.items():
         inner = result.get(key)
         result[key] = merged(inner, value) if isinstance(inner, dict) and isinstance(value, dict) else value

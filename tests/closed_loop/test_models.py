@@ -9,27 +9,20 @@ import numpy as np
 import pytest
 
 from bridge.faults import Fault
+from bridge.fmu.export import export
 from bridge.rig.real import open_node
 from cockpit.run.scenario import load_rig
 from cockpit.run.scenario_file import deploy_folder
-from cockpit.testing.suite import cases_of, run_tests
+from cockpit.testing.suite import cases_of, mutants_of, run_tests
 from cockpit.testing.target import Target
-from plant.fmu import export as exporting
+from plant.fmu import model
+from tests.closed_loop.foreign import foreign_fmu, rig_of
 from tests.unit.bridge.rig.boxes import rig_file, table, toml
 
 pytest.importorskip("fmpy", reason="make nightly installs the extra")
 CHANNELS = ["drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m"]
-NOISE = dict(zip(CHANNELS, (0.01, 0.2, 0.2, 5e-7, 5e-7), strict=True))
-STEP = "void stickslip_block(void *p, void *s, double v, double f, double a, double *analogue, double *truth) "
-BODIES = {  # a model's step, and the event or its text
-    "crash": ("{ *(volatile int *)0 = 1; }", "MODEL_DIED", "ended by signal 11"),
-    "hang": ('{ for (;;) { __asm__(""); } }', "MODEL_SLOW", "no block within 0.5 s"),
-    "grows": (
-        "{ for (;;) { char *m = malloc(1 << 20); if (!m) abort(); m[0] = 1; } }",
-        "MODEL_DIED",
-        "ended by signal 6",
-    ),
-}
+NOISE = dict(zip(CHANNELS, (0.02, 0.0015, 0.0015, 5e-7, 5e-7), strict=True))  # as of the paper's rig
+SCENARIO = 'duration_s = {duration_s}\narm = true\n\n[rig]\nfile = "{rig}"\n'
 
 
 def device(file: str, **more: Any) -> dict[str, Any]:
@@ -39,51 +32,90 @@ def device(file: str, **more: Any) -> dict[str, Any]:
         "amplitude": "amplitude_m",
         "outputs": CHANNELS,
         "noise": NOISE,
+        "speed": "drive_velocity_mps",
+        "load": "load",
+        "set": {"drive_velocity_mps": 5e-4, "load": 1.0},
     }
-    return table(adapter="fmu", device=settings | {"set": {"drive_velocity_mps": 5e-4}} | more)
-
-
-def written(folder: Path, **more: Any) -> Path:
-    path = folder / "model.toml"
-    path.write_text(toml(device("rig.fmu", **more)))
-    return path
+    return table(adapter="fmu", device=settings | more)
 
 
 @pytest.fixture(scope="module")
 def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("fmu") / "rig.fmu"
-    exporting.export(load_rig("paper-c45-c45", []), path)
+    export(model(load_rig("paper-c45-c45", [])), path)
+    path.with_suffix(".toml").write_text(toml(device("rig.fmu")))
     return path
+
+
+def results(paths: list[Path], rig: Path | None, folder: Path, mutants: bool = False) -> dict[str, str]:
+    """Result of each test, with its lines if it did not pass."""
+    cases, _ = cases_of(paths, [], Target(str(rig or ""), arm=True))
+    cases = mutants_of(cases)[0] if mutants else cases
+    tests = run_tests(cases, 1, folder, lambda _share: None)
+    return {
+        f"{test.name} {test.defect}": test.result if mutants or test.result == "PASSED" else str(test.in_words())
+        for test in tests
+    }
 
 
 @pytest.mark.slow
 def test_the_same_tests_run_on_a_model(fmu: Path, tmp_path: Path) -> None:
-    """Two of them; the tests of a box run all that a device can run."""
-    rig = written(fmu.parent)
-    paths = [deploy_folder() / "tests" / f"{name}.toml" for name in ("stop", "kill")]
-    cases, _ = cases_of(paths, [], Target(str(rig), arm=True))
-    tests = run_tests(cases, 1, tmp_path, lambda _share: None)
-    assert [test.result for test in tests] == ["PASSED"] * 2, [test.in_words() for test in tests]
+    """Three of them; `make nightly` has all."""
+    paths = [deploy_folder() / "tests" / f"{name}.toml" for name in ("stop", "kill", "speed-step")]
+    assert set(results(paths, fmu.with_suffix(".toml"), tmp_path).values()) == {"PASSED"}
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(("mutants", "result"), [(False, "PASSED"), (True, "FAILED")])
+def test_all_tests_run_on_a_model(mutants: bool, result: str, fmu: Path, tmp_path: Path) -> None:
+    """Covered by the three above."""
+    found = results([deploy_folder() / "tests"], fmu.with_suffix(".toml"), tmp_path, mutants)
+    assert len(found) >= 20
+    assert {name: text for name, text in found.items() if text != result} == {}
+
+
+def scenario(folder: Path, rig: Path, duration_s: float, expectations: str) -> Path:
+    path = folder / f"{rig.stem}.toml"
+    path.write_text(SCENARIO.format(duration_s=duration_s, rig=rig) + expectations)
+    return path
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", BODIES)
-def test_a_model_that_fails_is_named_and_the_exciter_rests(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    body, code, text = BODIES[name]
-    step = tmp_path / "step.c"
-    step.write_text(f"#include <stdlib.h>\n{STEP}{body}\n")
-    monkeypatch.setattr(exporting, "_object_file", lambda *_: step)
-    exporting.export(load_rig("paper-c45-c45", []), tmp_path / "rig.fmu")
-    more = {"slowest_s": 0.5, "memory_MB": 1500.0}
-    node = open_node(rig_file(**device("rig.fmu", **more)), tmp_path, 1)
-    try:
-        assert node.advance([]) == ()
-        assert [(problem[0], text in problem[1]) for problem in node.problems()] == [(code, True)]
-        assert node.applied.amplitude_m == 0.0
-    finally:
-        node.close()
+def test_a_model_of_another_author_is_controlled(tmp_path: Path) -> None:
+    """Millimetres, g, steps of half a block, and names with spaces: one rig file."""
+    rig = rig_of(foreign_fmu(tmp_path / "foreign.fmu"))
+    (tmp_path / "test").mkdir()
+    test = scenario(
+        tmp_path / "test", rig, 6.0,
+        "[[expect]]\nslips = 0\nfrom_s = 2.0\n\n"
+        '[[expect]]\nsignal = "velocity_ratio"\nwithin = [1.1, 1.6]\nfrom_s = 2.0\n\n'
+        '[[must_fail]]\nsettings = ["controller.policy.enabled_from_s=6.0"]\n',
+    )  # fmt: skip
+    assert results([test], rig, tmp_path) == {"foreign ": "PASSED"}
+    assert set(results([test], rig, tmp_path, mutants=True).values()) == {"FAILED"}
+
+
+@pytest.mark.slow
+def test_models_that_fail_are_named_and_nothing_vibrates(tmp_path: Path) -> None:
+    """Each fails 1 s after its start, under a vibration; the run of the tests goes on."""
+    (tmp_path / "test").mkdir()
+    faults = {
+        "crash": (1, "MODEL_DIED"),
+        "hang": (2, "MODEL_SLOW"),
+        "grows": (3, "MODEL_DIED"),
+        "nan": (4, "NOT_FINITE"),
+        "error": (5, "MODEL_DIED"),
+    }
+    for name, (fault, event) in faults.items():
+        start = {"carriage speed": 0.5, "load": 1.0, "fault": fault}
+        slowest_s = 0.5 if name == "hang" else 20.0
+        rig = rig_of(foreign_fmu(tmp_path / f"{name}.fmu"), set=start, slowest_s=slowest_s, memory_MB=1500.0)
+        amplitude = '[[expect]]\nsignal = "amplitude_m"\n'
+        expectations = f'[[expect]]\nevent = "{event}"\nfrom_s = 0.9\nwithin_s = 0.3\n\n'
+        expectations += f'{amplitude}at_least = "5 nm"\nfrom_s = 0.5\nto_s = 0.9\n\n'
+        expectations += f'{amplitude}at_most = "0.01 nm"\nfrom_s = 1.3\n' if name == "nan" else ""
+        scenario(tmp_path / "test", rig, 2.4, expectations)
+    assert set(results([tmp_path / "test"], None, tmp_path).values()) == {"PASSED"}
 
 
 def _edited(old: str, new: str) -> Callable[[dict[str, bytes]], dict[str, bytes]]:

@@ -27,12 +27,16 @@ def test_the_same_tests_run_on_a_device(tmp_path: Path) -> None:
         assert (status, text.count("PASSED   ")) == (0, 2), text
         status, text = call(TESTS / "limits.toml", "--rig", rig, "--logs", tmp_path, "--set", "duration_s=1.1")
         assert "FAILED" in text  # without --arm it never vibrates
-        status, text = call(TESTS / "load-step.toml", TESTS / "clip.toml", TESTS / "reverse.toml", "--rig", rig)
+        status, text = call(TESTS / "load-step.toml", "--set", "rig.drive.damping_Ns_per_m=1.0", "--rig", rig)
         assert status == 14
         assert "UNTESTED load-step: NOT_JUDGED" in text
-        assert "speed and load of a real rig are set by its machine" in text
-        assert "must be a sensor, clock or bus: this rig is real" in text
-        assert "rig.sensors: changes the simulated rig" in text
+        assert "rig.drive.damping_Ns_per_m: changes the simulated rig" in text
+        assert "speed and load of a real rig are set by its machine" in call(TESTS / "load-step.toml", "--rig", rig)[1]
+    rig = written(tmp_path, port, device={"address": f"127.0.0.1:{port}"})
+    status, text = call(TESTS / "clip.toml", TESTS / "reverse.toml", "--rig", rig)
+    assert status == 14
+    assert "must be a sensor, clock or bus: this rig is real" in text
+    assert "rig.sensors: changes the simulated rig" in text
 
 
 @pytest.mark.nightly

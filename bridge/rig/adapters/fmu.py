@@ -1,10 +1,11 @@
 """A model of another tool as a device: an FMU of FMI 2 or 3 for co-simulation, run by FMPy in a separate process.
 
-The process may crash, hang or grow: it is ended and reported, and the exciter rests. One block is one step of the model, whose
-outputs are arrays of its samples, or a step for each part of it. The experiment that the model proposes is ignored.
+The process may crash, hang or grow: it is ended and reported, and is not started again in this run. One block is one step of the
+model, whose outputs are arrays of its samples, or a step for each part of it. The experiment that the model proposes is ignored.
 """
 
 import json
+import math
 import os
 import select
 import subprocess
@@ -14,7 +15,7 @@ from contextlib import suppress
 from typing import IO, Annotated
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from bridge.config import Strict, validate
 from bridge.rig.adapters._fmu_process import ORDER, READY
@@ -35,6 +36,11 @@ class FmuSettings(Strict):
         description="Outputs that make the device's channels 0, 1 and so on."
     )
     set: dict[str, float] = Field({}, description="Start values of inputs and parameters, by name.")
+    speed: str = Field(
+        "", description="Input of the drive's speed, with a start value in `set`: a `[[step]]` changes it."
+    )
+    units_per_mps: float = Field(1.0, description="Value of this input for 1 m/s.")
+    load: str = Field("", description="Input of the normal load, with a start value in `set`: a `[[step]]` changes it.")
     noise: dict[str, float] = Field({}, description="Standard deviation of the noise of an output, in its unit.")
     resolution: dict[str, float] = Field({}, description="Step of an output's values, in its unit.")
     seed: Annotated[int, Field(ge=0)] = 1
@@ -42,6 +48,13 @@ class FmuSettings(Strict):
         1.5, description="Time for a block after which the model is ended, as MODEL_SLOW."
     )
     memory_MB: Annotated[float, Field(gt=0)] = Field(2000.0, description="Largest memory of its process.")
+
+    @model_validator(mode="after")
+    def _has_start_values(self) -> "FmuSettings":
+        for name in ("speed", "load"):
+            if (variable := getattr(self, name)) and variable not in self.set:
+                raise ValueError(f"{name} = {variable!r}: must have its start value in set; add it")
+        return self
 
 
 class Adapter(Device):
@@ -55,19 +68,28 @@ class Adapter(Device):
         self._shape = len(settings.outputs), setup.samples_per_block
         self._process: subprocess.Popen[bytes] | None = None
         self._errors: IO[bytes] | None = None
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._end: DeviceError | None = None
         self._order, self._is_on = (0.0, 0.0), not setup.has_enable_line
+        self.watchdog_s = self.block_s  # it makes no block without an order
+        self.settable = frozenset(name for name in ("speed", "load") if getattr(settings, name))
+        self._machine = self._start()
 
     def open(self) -> None:
-        """Start the process, and the model from its beginning."""
+        """Start the process, and the model from its beginning. Raises DeviceError once it has died."""
+        if self._end is not None:
+            raise DeviceError(f"{self._end}, and is not started again", self._end.code)
         settings = self._settings.model_dump() | {
             "file": str(self.setup.folder / self._settings.file),
             "block_s": self.block_s,
             "samples": self.setup.samples_per_block,
         }
+        self._machine = self._start()
         self._random = np.random.Generator(np.random.PCG64(self._settings.seed))
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115  # closed by `close`
+        self._folder = tempfile.TemporaryDirectory(prefix="stickslip-fmu-")  # removed by `close`, also after a crash
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "bridge.rig.adapters._fmu_process", json.dumps(settings)],
+            [sys.executable, "-P", "-m", "bridge.rig.adapters._fmu_process", json.dumps(settings), self._folder.name],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
@@ -83,13 +105,14 @@ class Adapter(Device):
         """The block of the newest order."""
         if self._process is None or self._process.stdin is None:
             raise self._died()
+        size = 8 * self._shape[0] * self._shape[1]
         try:
-            os.write(self._process.stdin.fileno(), ORDER.pack(*self._order))
-        except OSError:
-            raise self._died() from None
-        rows = np.frombuffer(self._answer(8 * self._shape[0] * self._shape[1], self._settings.slowest_s)).reshape(
-            self._shape
-        )
+            with suppress(BrokenPipeError):  # it has ended, as the answer shows
+                os.write(self._process.stdin.fileno(), ORDER.pack(*self._order, *self._machine.values()))
+            rows = np.frombuffer(self._answer(size, self._settings.slowest_s)).reshape(self._shape)
+        except DeviceError as error:
+            self._end = error
+            raise
         return DeviceBlock(self._measured(rows), *self._order)
 
     def _measured(self, rows: np.ndarray) -> np.ndarray:
@@ -134,6 +157,21 @@ class Adapter(Device):
         """Set the order of the next block."""
         self._order = frequency_Hz, amplitude if self._is_on else 0.0
 
+    def _start(self) -> dict[str, float]:
+        """Start values of speed and load, in the model's units; NaN: the model has no such input."""
+        settings = self._settings
+        return {name: settings.set.get(getattr(settings, name), math.nan) for name in ("speed", "load")}
+
+    @property
+    def speed_mps(self) -> float:
+        """Velocity of the drive [m/s]."""
+        return self._machine["speed"] / self._settings.units_per_mps
+
+    def set(self, name: str, value: float) -> None:
+        """Set speed or load for the coming blocks."""
+        factor = self._settings.units_per_mps if name == "speed" else self._start()[name]
+        self._machine[name] = factor * value
+
     def enable(self, on: bool, toggle: int) -> None:  # noqa: ARG002
         """Set the enable line, without which the model rests."""
         self._is_on = on
@@ -153,4 +191,6 @@ class Adapter(Device):
             self._process.wait()
         if self._errors is not None:
             self._errors.close()
+        if self._folder is not None:
+            self._folder.cleanup()
         self._process = None

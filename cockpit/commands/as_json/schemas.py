@@ -166,7 +166,7 @@ _RESULTS = {
     "rig release": "cockpit.commands.rig:Released",
     "status": "cockpit.live.status:Status",
     "fault": "cockpit.faults.injection:Injected",
-    "fmu": "plant.fmu.export:Exported",
+    "fmu": "bridge.fmu.export:Exported",
     "test": "cockpit.testing.suite:Suite",
     "soak": "cockpit.run.soak:Soaked",
     "certs": "cockpit.run.authority:Made",

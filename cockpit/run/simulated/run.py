@@ -5,11 +5,16 @@ from collections.abc import Callable, Generator, Iterable
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
+
 from bridge.faults import Fault
+from bridge.rig.device_node import DeviceNode
 from bridge.rig.faults.kinds import PROCESS
 from bridge.rig.faults.table import FaultTable
+from bridge.rig.load import device_of
 from bridge.rig.node import GuardedNode
 from bridge.rig.process import GuardedRig
+from bridge.rig.real import notes as device_notes
 from bridge.rig.real import open_node
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.clock import Wait
@@ -21,10 +26,12 @@ from cockpit.run.device_run import DeviceRun
 from cockpit.run.in_process import TimedAction, actions_of, log_of, run_onboard
 from cockpit.run.scenario import Scenario
 from cockpit.run.simulated.stage import Hub, Player, Receive, Session, Stage
-from cockpit.run.step import configurations
+from cockpit.run.step import configurations, with_speeds
 from controller.app import ControllerProcess
 from controller.config import ControllerConfig
 from controller.node import ControllerNode
+from plant.drive_config import DriveConfig
+from plant.records import notes
 from plant.rig.node import PlantNode
 
 _LINKED_S = 0.05  # time from the resumption of a frozen process to its new link
@@ -80,6 +87,10 @@ class SimulatedRun:
         """Create the rig's node. A subclass may override this, to record the simulated truth or for a device."""
         return PlantNode(**settings)
 
+    def notes(self) -> list[tuple[str, str]]:
+        """Codes and texts of the rig's events at its start. A subclass overrides this for a device."""
+        return [] if isinstance(self._scenario, DeviceRun) else notes(self._scenario.rig)
+
     def controller_node(self) -> ControllerNode:
         """Create the controller. A subclass may override this to run a rule in its place."""
         return ControllerNode(self._config)
@@ -126,6 +137,8 @@ class SimulatedRun:
 
         def loop() -> Generator[Wait]:
             process.event("START", _GRANTED)
+            for code, text in self.notes():
+                process.event(code, text)
             yield from process.loop(max(left, 0), self._stop)
             process.end()
 
@@ -172,12 +185,38 @@ class DevicesRun(SimulatedRun):
     def __init__(self, run: DeviceRun, folder: Path, arm: bool) -> None:
         super().__init__(run)
         self._run, self._folder, self._arm = run, folder, arm
+        speeds = [step for step in run.step if step.speed_mps is not None]
+        if speeds:
+            start = DriveConfig(profile=[(0.0, device_of(run.rig, folder).speed_mps)])
+            profile = np.array(with_speeds(start, speeds).profile)
+            for step in speeds:
+                until_s = step.at_s + step.ramp_s
+                self._stage.cue(step.t_ns, lambda until_s=until_s: self._speed(profile, until_s))
 
     def plant_node(self, **settings: Any) -> GuardedNode:
         """Open the device; a rig that is started again opens it again."""
         self.close()
         run, arm = self._run, self._arm and settings["run"] == 1
         return open_node(run.rig, self._folder, settings["run"], settings["faults"], run.seed, arm)
+
+    def notes(self) -> list[tuple[str, str]]:
+        """The protection that the rig lacks."""
+        return device_notes(self._run.rig, device_of(self._run.rig, self._folder).watchdog_s)
+
+    def _load(self, ratio: float) -> None:
+        self._set("load", ratio)
+
+    def _set(self, name: str, value: float) -> None:
+        if isinstance(self._rig_node, DeviceNode):
+            self._rig_node.set(name, value)
+
+    def _speed(self, profile: np.ndarray, until_s: float) -> None:
+        """Set the drive's speed for the next block, and so on until a time."""
+        t_s = self._stage.now_ns * 1e-9
+        self._set("speed", float(np.interp(t_s, profile[:, 0], profile[:, 1])))
+        if t_s < until_s:
+            block_ns = round(self._run.rig.solver.block_s * 1e9)
+            self._stage.cue(self._stage.now_ns + block_ns, lambda: self._speed(profile, until_s))
 
     def close(self) -> None:
         """Disconnect from the device."""

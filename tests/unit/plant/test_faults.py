@@ -10,6 +10,7 @@ import pytest
 
 from bridge.config import validate
 from bridge.faults import Fault
+from bridge.rig.faults.exciter import FIELDS
 from bridge.rig.faults.kinds import KINDS, SENSORS, group_of
 from bridge.rig.faults.line import Message
 from bridge.rig.faults.schedule import BEGAN, ENDED, Faults
@@ -19,7 +20,7 @@ from bridge.wire.channels import CHANNELS
 from bridge.wire.messages import sensor_block
 from plant.config import RigConfig
 from plant.records import build
-from plant.rig.exciter_faults import FIELDS, ExciterFaults
+from plant.rig.exciter_faults import ExciterFaults
 
 SAMPLES, BLOCK_S = 20, 1e-3
 RAMP = np.arange(SAMPLES) + 1.0

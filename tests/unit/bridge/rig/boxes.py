@@ -33,10 +33,10 @@ def toml(values: dict[str, Any]) -> str:
 
     def text(value: Any) -> str:
         if isinstance(value, dict):
-            return "{ " + ", ".join(f"{key} = {text(inner)}" for key, inner in value.items()) + " }"
+            return "{ " + ", ".join(f"{json.dumps(key)} = {text(inner)}" for key, inner in value.items()) + " }"
         return json.dumps(value)
 
-    return "".join(f"{key} = {text(value)}\n" for key, value in values.items())
+    return "".join(f"{json.dumps(key)} = {text(value)}\n" for key, value in values.items())
 
 
 @contextmanager
