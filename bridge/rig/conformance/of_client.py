@@ -98,7 +98,7 @@ class _Client:
         if problem:
             self.session.failures["header"] = problem
         self._lockstep = lockstep
-        self._blocks: queue.Queue[Received] = queue.Queue()  # a `SimpleQueue` may wait for ever (`bridge.wire.inbox`)
+        self._blocks: queue.Queue[Received] = queue.Queue()
         self._applied: dict[int, wire.Applied] = {}
         self._send = link.publisher(COMMAND)
         self._newest = facts.tones_Hz[0], 0.0
