@@ -178,7 +178,7 @@ def _one_pass(
 ) -> tuple[int, int, list[Change] | None, Replay | None]:
     """Replay a log while it is read, in constant memory, with the configuration before its first step.
 
-    Returns the number of steps, the time of the last step, the configurations, and the result; the result is None if messages
+    Returns the number of steps, the time of the last step, the configurations, and the result; result None if messages
     are out of order, or if the configuration is late.
     """
     steps = end_ns = 0

@@ -144,8 +144,8 @@ def unsteady(cycles: list[Cycle], unit: str) -> list[str]:
         return drifts
     return [
         *drifts,
-        f"no single speed: sticks climb by {climbs[0]:.3g} to {climbs[1]:.3g} a second, so there is no single period, "
-        "stiffness or mass; give the drive's position, or look at a part with one speed",
+        f"no single speed: sticks climb by {climbs[0]:.3g} to {climbs[1]:.3g} a second, so period, "
+        "stiffness and mass would be mixtures; give the drive's position, or look at a part with one speed",
     ]
 
 
