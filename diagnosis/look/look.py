@@ -184,12 +184,12 @@ def look(
 
 def _mean_N(parts: list[OneWayPart], slips_of_parts: list[RecordSlips]) -> float:
     """Mean force while the slide slides or slips: over whole periods, else from the first time the force reaches its median."""
-    tops = {id(slips.part): slips.tops for slips in slips_of_parts}
-    moving = []
+    tops_of = {id(slips.part): slips.tops for slips in slips_of_parts}
+    moving: list[Floats] = []
     for part in parts:
-        force_N, own = part.force_N, tops.get(id(part), ())
-        first = int(np.argmax(force_N >= np.median(force_N)))
-        moving.append(force_N[own[0] : own[-1]] if len(own) > 1 else force_N[first:])
+        tops = tops_of.get(id(part), ())
+        first = tops[0] if len(tops) > 1 else np.argmax(part.force_N >= np.median(part.force_N))
+        moving.append(part.force_N[first : tops[-1] if len(tops) > 1 else None])
     return float(np.concatenate(moving).mean())
 
 
