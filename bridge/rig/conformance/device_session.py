@@ -223,7 +223,7 @@ class DeviceSession:
         self._call("close", self._device.close)
         self._is_open = False
         time.sleep(for_s)
-        self._call("close", self._device.open)  # what `close` did not release
+        self._call("close", self._device.open)  # resources that `close` did not release
         self._is_open = True
         if self._device.pace == "device":
             self._newest(stage)
