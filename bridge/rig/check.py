@@ -215,7 +215,8 @@ def _of_channel(rig: DeviceRig, row: ChannelCheck, raw: Floats) -> list[Problem]
         if limit is not None and (end <= limit if limit == channel.lowest else end >= limit):
             add(f"it reaches the end of its range, {limit:g}", "use a larger range, or correct scale and offset")
     values = raw[rig.rows[row.name]]
-    if np.unique(values[np.isfinite(values)]).size > _FEW_STEPS:
+    # the lowest position is often the one from which the slide moves, where it rested
+    if known.sensor != "position" and np.unique(values[np.isfinite(values)]).size > _FEW_STEPS:
         share = max(float(np.mean(values == np.nanmin(values))), float(np.mean(values == np.nanmax(values))))
         if share > _AT_END:
             add(f"{100.0 * share:.3g} % of its samples are at one end", "the converter clips: use a larger range")
