@@ -158,7 +158,7 @@ def values(session: Session) -> Measured:
     for first, second in itertools.combinations(measured, 2):
         steps = np.diff(everything[[first, second]])
         steps = steps[:, np.isfinite(steps).all(axis=0)]
-        if steps.size and steps.std(axis=1).all() and abs(np.corrcoef(steps)[0, 1]) > _SAME:
+        if steps.size and steps.std(axis=1).all() and abs(np.corrcoef(steps[0], steps[1])[0, 1]) > _SAME:
             return Measured(False, f"{CHANNELS[first]} and {CHANNELS[second]} are one signal", "each its own source")
     return Measured(True, "every channel changes", "changes, in SI units")
 
