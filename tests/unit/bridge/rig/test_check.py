@@ -135,6 +135,10 @@ def test_an_encoder_at_rest_repeats_its_number(values: Any, checked: Callable[..
     assert checked(set_row(4, values)).ok
 
 
+def test_a_slip_is_no_hum(checked: Callable[..., RigCheck]) -> None:
+    assert checked(set_row(1, lambda x, t: x + 5.0 * np.exp(-(((t - 1.0) / 2e-3) ** 2)))).ok
+
+
 @pytest.mark.parametrize(
     ("row", "values", "text", "remedy"),
     [
