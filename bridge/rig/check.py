@@ -23,6 +23,10 @@ _FEW_STEPS = 8  # different values up to which a channel is coarse, and its ends
 # controller reads as motion passes.
 _HUM = 1.0
 _MAINS_HZ = (50.0, 60.0)
+_MAINS_DRIFT_HZ = 0.2  # of a public grid
+_AROUND_HZ = (
+    3.0  # distance from the mains that shows other tones; smaller: slips that follow each other faster count as hum
+)
 _JITTER_BLOCKS = 20.0  # longest gap between two blocks, in block lengths; the controller's STALE is 20 ms
 
 
@@ -43,7 +47,7 @@ class ChannelCheck(NamedTuple):
     mean: float
     highest: float
     noise: float  # rms of the differences of neighbouring samples, over sqrt(2)
-    hum: float  # amplitude of 50 or 60 Hz, the larger one
+    hum: float  # amplitude of 50 or 60 Hz above the frequencies around it, the larger one
     missing: float  # share of samples that are NaN
 
 
@@ -183,13 +187,22 @@ def _channel(rig: DeviceRig, name: str, raw: Floats) -> ChannelCheck:
     if finite.size < 2:
         return ChannelCheck(name, False, nan, nan, nan, nan, nan, missing)
     noise = float(np.sqrt(np.mean(np.diff(finite) ** 2) / 2.0))
-    t_s = np.arange(finite.size) / rig.converter.sample_rate_Hz
-    waves = [np.exp(-2j * math.pi * mains_Hz * t_s) for mains_Hz in _MAINS_HZ]
-    flat = (finite - np.polyval(np.polyfit(t_s, finite, 1), t_s)) * np.hanning(finite.size)
-    hum = max(float(4.0 * abs(np.mean(flat * wave))) for wave in waves)
+    count = np.arange(finite.size)
+    flat = (finite - np.polyval(np.polyfit(count, finite, 1), count)) * np.hanning(finite.size)
+    spectrum = 4.0 * np.abs(np.fft.rfft(flat)) / finite.size
+    bin_Hz = rig.converter.sample_rate_Hz / finite.size
+    hum = max(_line(spectrum, bin_Hz, mains_Hz) for mains_Hz in _MAINS_HZ)
     return ChannelCheck(
         name, False, float(finite.min()), float(finite.mean()), float(finite.max()), noise, hum, missing
     )
+
+
+def _line(spectrum: Floats, bin_Hz: float, tone_Hz: float) -> float:
+    """Amplitude of a tone above the spectrum around it: slips have many frequencies, hum only its own."""
+    off_Hz = np.abs(bin_Hz * np.arange(len(spectrum)) - tone_Hz)
+    near = spectrum[off_Hz <= max(_MAINS_DRIFT_HZ, bin_Hz)].max(initial=0.0)
+    around = (off_Hz >= max(2.0 * _MAINS_DRIFT_HZ, 3.0 * bin_Hz)) & (off_Hz <= max(_AROUND_HZ, 8.0 * bin_Hz))
+    return max(float(near - spectrum[around].max(initial=0.0)), 0.0)
 
 
 def _of_channel(rig: DeviceRig, row: ChannelCheck, raw: Floats) -> list[Problem]:
@@ -215,7 +228,8 @@ def _of_channel(rig: DeviceRig, row: ChannelCheck, raw: Floats) -> list[Problem]
         if limit is not None and (end <= limit if limit == channel.lowest else end >= limit):
             add(f"it reaches the end of its range, {limit:g}", "use a larger range, or correct scale and offset")
     values = raw[rig.rows[row.name]]
-    if np.unique(values[np.isfinite(values)]).size > _FEW_STEPS:
+    # the lowest position is often the one from which the slide moves, where it rested
+    if known.sensor != "position" and np.unique(values[np.isfinite(values)]).size > _FEW_STEPS:
         share = max(float(np.mean(values == np.nanmin(values))), float(np.mean(values == np.nanmax(values))))
         if share > _AT_END:
             add(f"{100.0 * share:.3g} % of its samples are at one end", "the converter clips: use a larger range")

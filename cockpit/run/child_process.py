@@ -50,13 +50,7 @@ def stop_event(parent: int = 0) -> threading.Event:
     # `stop.set` in the handler would wait for ever if the signal came within `stop.wait` or within an earlier handler, which hold
     # its lock. A pipe may be written at any point, and a thread passes the signal on.
     read, write = os.pipe()
-    os.set_blocking(write, False)
-
-    def note(_number: int, _frame: Any) -> None:
-        with contextlib.suppress(BlockingIOError):  # full: the first signal was enough
-            os.write(write, b"!")
-
-    handle_endings(note)
+    handle_endings(lambda _number, _frame: os.write(write, b"!"))
 
     def watch() -> None:
         while not parent or os.getppid() == parent:

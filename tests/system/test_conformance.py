@@ -10,7 +10,7 @@ import pytest
 
 from tests.patience import PATIENCE_S
 from tests.system.ports import free_endpoint
-from tests.unit.bridge.rig.boxes import boxed
+from tests.unit.bridge.rig.boxes import boxed, table, toml
 
 STICKSLIP = [sys.executable, "-m", "cockpit"]
 
@@ -35,6 +35,16 @@ def test_a_box_with_the_rig_file_of_the_guide_passes_every_check_that_needs_no_c
     assert (status, failed(result), len(result["checks"])) == (0, [], 25)
     assert {row["name"] for row in result["checks"] if row["status"] == "skipped"} == {"rate", "watchdog", "close"}
     assert junit.read_text().startswith("<?xml")
+
+
+@pytest.mark.nightly
+def test_a_stiff_axis_whose_acceleration_repeats_samples_passes(tmp_path: Path) -> None:
+    rig = tmp_path / "mine.toml"
+    exciter = {"enable_line": True, "amplitude_max_m": 1e-6, "amplitude_slew_m_per_s": 1e-5}
+    with boxed(tmp_path, rig="ball-screw-axis") as port:
+        rig.write_text(toml(table(device={"address": f"127.0.0.1:{port}", "waits": True}, exciter=exciter)))
+        status, result = conformance(str(rig))
+    assert (status, failed(result)) == (0, [])
 
 
 @pytest.mark.parametrize(

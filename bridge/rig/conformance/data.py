@@ -27,6 +27,9 @@ _TOO_FAST = 1.5  # as for the guard's DRIVE_FAST
 # Correlation of the steps of two channels from which they are one signal. Smaller: two sensors with less noise than motion in
 # common. Larger: rounding to 32 bits hides it.
 _SAME = 0.9999
+# Steps of the converter that follow a sample that repeats the one before. Smaller: a smooth signal repeats samples too, as the
+# slide of a stiff axis. Larger: a held sample of a signal of few steps passes.
+_LEAP_STEPS = 8.0
 _HOLDS = 0.05  # share of equal neighbours up to which a channel has noise, so that a held sample shows
 
 
@@ -97,9 +100,10 @@ def filled(session: Session) -> Measured:
         zeros = _zeros(session, row)
         if zeros > 5 * int(counts.max(initial=1)) and zeros > most:
             most, text = zeros, f"{zeros} zeros in {CHANNELS[row]}"
-        equal = values[1:] == values[:-1]
-        if SENSOR_CHANNELS[CHANNELS[row]].sensor == "accel" and _FEW < np.count_nonzero(equal) < _HOLDS * values.size:
-            held = int(np.count_nonzero(equal))
+        steps = np.abs(np.diff(values))
+        if SENSOR_CHANNELS[CHANNELS[row]].sensor == "accel" and np.count_nonzero(steps == 0.0) < _HOLDS * values.size:
+            smallest = steps.min(initial=math.inf, where=steps > 0.0)
+            held = int(np.count_nonzero((steps[:-1] == 0.0) & (steps[1:] > _LEAP_STEPS * smallest)))
             if held > 5.0 * np.sum(counts / values.size * counts) and held > most:
                 most, text = held, f"{held} samples of {CHANNELS[row]} repeat the one before"
     return Measured(most <= _FEW, text, f"{_FEW}")
@@ -158,7 +162,7 @@ def values(session: Session) -> Measured:
     for first, second in itertools.combinations(measured, 2):
         steps = np.diff(everything[[first, second]])
         steps = steps[:, np.isfinite(steps).all(axis=0)]
-        if steps.size and steps.std(axis=1).all() and abs(np.corrcoef(steps)[0, 1]) > _SAME:
+        if steps.size and steps.std(axis=1).all() and abs(np.corrcoef(steps[0], steps[1])[0, 1]) > _SAME:
             return Measured(False, f"{CHANNELS[first]} and {CHANNELS[second]} are one signal", "each its own source")
     return Measured(True, "every channel changes", "changes, in SI units")
 

@@ -37,7 +37,7 @@ def facts_of(rig: DeviceRig, device: Device) -> Facts:
         0 if device.pace == "caller" else 1,
         device.slowest_answer_s,
         frozenset(rig.derived),
-        rig.exciter.watchdog_s,
+        rig.exciter.watchdog_s or device.watchdog_s,
         rig.exciter.enable_line,
     )
 

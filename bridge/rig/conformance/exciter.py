@@ -96,11 +96,12 @@ def reported(session: Session) -> Measured:
     facts, ordered_Hz = session.facts, session.facts.tones_Hz[0]
     stages = session.stages[f"tone {ordered_Hz:g}"] + _steps(session)
     blocks = max(round(facts.ramp_s / facts.block_s), 1)
+    answer_blocks = math.ceil(facts.answer_s / facts.block_s)  # in which a slow exciter acknowledges the order
     begins, steady, hertz = [], [], []
     for stage in stages:
         delivered = _delivered(session, stage)
         shown = np.array([block.amplitude_m for block in stage]) / facts.amplitude_m
-        first = int(np.argmax((delivered > _BEGUN) | (shown > _BEGUN)))
+        first = int(np.argmax((delivered > _BEGUN) | (shown > _BEGUN))) + answer_blocks
         off = np.abs(shown - delivered)
         begins.append(float(np.median(off[first : first + blocks])) if blocks > 2 else 0.0)
         steady.append(float(np.median(off[-10:])))

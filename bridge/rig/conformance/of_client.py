@@ -240,10 +240,12 @@ def _facts(header: wire.Header | None, lockstep: bool) -> tuple[Facts, str]:
         rig, block_s, samples, limits = {}, 1e-3, 20, _DEFAULT_LIMITS
     guard, channels = rig.get("guard") or {}, rig.get("channels") or {}
     timeout_s = float((rig.get("exciter") or rig.get("piezo") or {}).get("command_timeout_s", _TIMEOUT_S))
-    away = frozenset(name for name in CHANNELS if (channels.get(name) or {}).get("absent") is True)
+    tables = {name: channels.get(name) or {} for name in CHANNELS}
+    away = frozenset(name for name, table in tables.items() if table.get("absent") is True)
+    derived = frozenset(name for name, table in tables.items() if table.get("derive"))
     facts = Facts(
         samples / block_s, samples, limits, float(guard.get("check_share", 0.1)), float(guard.get("exciter_gain", 1.0)),
         float(guard.get("fastest_drive_mps") or math.inf), away, dict.fromkeys(CHANNELS, (None, None)),
-        1 if lockstep else 2, watchdog_s=timeout_s,
+        1 if lockstep else 2, derived=derived, watchdog_s=timeout_s,
     )  # fmt: skip
     return facts, problem

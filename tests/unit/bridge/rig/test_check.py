@@ -130,8 +130,13 @@ def test_a_sound_rig_has_no_problem(checked: Callable[..., RigCheck]) -> None:
     assert result.in_words()[-1] == "check    ok"
 
 
-def test_an_encoder_at_rest_repeats_its_number(checked: Callable[..., RigCheck]) -> None:
-    assert checked(set_row(4, 0.01)).ok
+@pytest.mark.parametrize("values", [0.01, lambda _x, t: np.round(500.0 * np.maximum(t - 0.5, 0.0)) * 1e-6])
+def test_an_encoder_at_rest_repeats_its_number(values: Any, checked: Callable[..., RigCheck]) -> None:
+    assert checked(set_row(4, values)).ok
+
+
+def test_a_slip_is_no_hum(checked: Callable[..., RigCheck]) -> None:
+    assert checked(set_row(1, lambda x, t: x + 5.0 * np.exp(-(((t - 1.0) / 2e-3) ** 2)))).ok
 
 
 @pytest.mark.parametrize(

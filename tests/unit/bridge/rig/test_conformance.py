@@ -335,22 +335,25 @@ class Called(Right):
 
 
 class Slow(Right):
-    """Its generator takes 30 ms for a line, and executes the newest."""
+    """Its generator acknowledges a line after 30 ms, and executes the newest; the adapter reports the acknowledged one."""
 
     slowest_answer_s = 0.06
 
     def open(self) -> None:
         super().open()
-        self.line: list[tuple[float, float, float]] = []
+        self.sent_s, self.acknowledged, self.sent = 0.0, (2000.0, 0.0), (2000.0, 0.0)
 
     def write(self, frequency_Hz: float, amplitude: float) -> None:
         self.device.ordered_s = self.device.now_s
-        if len(self.line) < 2:
-            self.line.append((self.device.now_s, frequency_Hz, amplitude))
-        else:
-            self.line[1] = (self.line[1][0], frequency_Hz, amplitude)
-        if self.device.now_s - self.line[0][0] >= 0.03:
-            self.device.frequency_Hz, self.device.ordered_m = self.line.pop(0)[1:]
+        if self.device.now_s - self.sent_s >= 0.03:
+            self.acknowledged, self.sent = self.sent, (frequency_Hz, amplitude)
+            self.sent_s = self.device.now_s
+            self.device.frequency_Hz, self.device.ordered_m = self.sent
+
+    def read(self) -> DeviceBlock | None:
+        block = super().read()
+        assert block is not None
+        return block._replace(frequency_Hz=self.acknowledged[0], amplitude=self.acknowledged[1])
 
 
 WIRED = {
