@@ -40,8 +40,8 @@ def test_the_loop_holds_behind_a_generator_that_takes_30_ms_a_line(tmp_path: Pat
                 command = controller.block(sensors.payload)
                 assert command is not None
                 commands = [command.payload]
-                states.append(int(node.applied.guard_state))
-                applied_m.append(float(node.applied.amplitude_m))
+                states.append(int(node.applied["guard_state"]))
+                applied_m.append(float(node.applied["amplitude_m"]))
             assert node.problems() == []
         finally:
             node.close()

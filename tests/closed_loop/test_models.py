@@ -81,7 +81,7 @@ def test_a_model_that_fails_is_named_and_the_exciter_rests(
     try:
         assert node.advance([]) == ()
         assert [(problem[0], text in problem[1]) for problem in node.problems()] == [(code, True)]
-        assert node.applied.amplitude_m == 0.0
+        assert node.applied["amplitude_m"] == 0.0
     finally:
         node.close()
 
