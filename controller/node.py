@@ -50,6 +50,7 @@ class ControllerNode:
         self._no_sensors = self._layout.blank()
         self._command = COMMAND_LAYOUT.blank()
         self._trace = TRACE_LAYOUT.blank()
+        self._traced = TRACE_LAYOUT.row(self._trace)
         self._numbers = BlockNumbers()
         self._seals = False  # whether the rig's blocks have a checksum
         self._lengths_ns: list[int] | None = []  # of the blocks so far; None once a length was right
@@ -62,12 +63,12 @@ class ControllerNode:
     @property
     def amplitude_m(self) -> float:
         """Amplitude of the last command [m]."""
-        return float(self._state[0]["allowed_m"])
+        return float(self._state["allowed_m"][0])
 
     @property
     def rig_reports(self) -> bool:
         """Whether the rig has a guard, which applies the operator's commands and reports them."""
-        return int(self._state[0]["guard_state"]) != wire.NO_GUARD
+        return int(self._state["guard_state"][0]) != wire.NO_GUARD
 
     @property
     def in_time(self) -> bool:
@@ -76,7 +77,7 @@ class ControllerNode:
 
     @property
     def _is_unreadable(self) -> bool:
-        return int(self._trace[0]["limit"]) == wire.NOT_FINITE
+        return int(self._traced["limit"]) == wire.NOT_FINITE
 
     def warm_up(self) -> None:
         """Compile or load the kernels on copies, so that the first answer is not late."""
@@ -208,11 +209,11 @@ class ControllerNode:
         if self._is_unreadable:
             text = f"block {self.last_block} holds a sample that is not a number: ramping to zero"
             self.note("NOT_FINITE", SENSORS.name, text)
-        if self._state[0]["slide_accel_unread"]:
+        if self._state["slide_accel_unread"][0]:
             text = "a sample is not a number; the controller continues without this channel"
             self.note("NOT_FINITE", f"{SENSORS.name} mass_accel_mps2", text)
         news, self._news = self._news, []
-        return news + self._trip_events.news(self._trace[0])
+        return news + self._trip_events.news(self._traced)
 
     def rest(self, lateness_ns: int) -> list[Outgoing]:
         """The messages after the command: the trace, and at lower rates the plotted state and a snapshot of the memory."""

@@ -14,7 +14,6 @@ _COPIED = (
     *("t_ns", "drive_force_N", "vibration_velocity_mps", "drive_velocity_mps", "force_rate"),
     *("mode", "state", "slips"),
 )
-_OLD_VIBRATION = (wire.STALE_INPUT, wire.NOT_FINITE)  # limits during which the trace repeats an old v_a
 
 
 def plotted(traces: Records, steps: int) -> Records:
@@ -24,7 +23,9 @@ def plotted(traces: Records, steps: int) -> Records:
     for name in _COPIED:
         states[name] = traces[name]
     drive_mps = np.abs(traces["drive_velocity_mps"])
-    shown = (traces["state"] > wire.STANDSTILL) & (drive_mps > 0.0) & ~np.isin(traces["limit"], _OLD_VIBRATION)
+    # under these limits the trace repeats an old v_a
+    is_new = (traces["limit"] != wire.STALE_INPUT) & (traces["limit"] != wire.NOT_FINITE)
+    shown = (traces["state"] > wire.STANDSTILL) & (drive_mps > 0.0) & is_new
     np.divide(traces["vibration_velocity_mps"], drive_mps, out=states["velocity_ratio"], where=shown)
     return states
 

@@ -55,7 +55,7 @@ class _TruthNode(PlantNode):
         drive_mps = (drive_m - self._drive_m) / (self.block_ns * 1e-9)
         self._drive_m = drive_m
         fastest_mps = float(speeds[np.abs(speeds).argmax()])
-        rad_per_s = 2.0 * math.pi * max(float(self.applied.frequency_Hz), 1.0)  # at rest it is 0
+        rad_per_s = 2.0 * math.pi * max(float(self.applied["frequency_Hz"]), 1.0)  # at rest it is 0
         amplitude_m = self.vibration_mps / rad_per_s
         self._truths.append((self._now_ns() * 1e-9, amplitude_m, self.vibration_mps, drive_mps, fastest_mps))
         self._observe(self)

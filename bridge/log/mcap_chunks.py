@@ -129,7 +129,7 @@ class ChunkWriter:
         chunk, length = self.open_chunk, FIELDS_BYTES + len(payload)
         head = _MESSAGE.pack(Opcode.MESSAGE, length, channel_id, sequence, log_time_ns, publish_time_ns)
         chunk.entries.setdefault(channel_id, []).append(_INDEX_ENTRY.pack(log_time_ns, chunk.size))
-        chunk.add((head, payload), len(head) + len(payload), log_time_ns, log_time_ns)
+        chunk.add((head + payload,), _MESSAGE.size + len(payload), log_time_ns, log_time_ns)
 
     def add_rows(self, rows: MessageRows) -> None:
         """Put the messages of many blocks into the open chunk."""

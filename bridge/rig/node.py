@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from bridge.arrays import Records
 from bridge.guard.check import gain_report
@@ -41,6 +41,7 @@ class GuardedNode(ABC):
         self._guard_params, self._guard_state = guard
         self._sensors = sensor_block(samples).blank()
         self._applied = APPLIED_LAYOUT.blank()
+        self.applied = APPLIED_LAYOUT.row(self._applied)  # the applied vibration of the last block
 
     def warm_up(self) -> None:
         """Compile or load the kernels on copies, so that the first block is not late."""
@@ -145,11 +146,6 @@ class GuardedNode(ABC):
     def gain_report(self) -> str:
         """The measured and the expected gain at each tone of the last loop check, as text."""
         return gain_report(self._guard_params[0], self._guard_state[0])
-
-    @property
-    def applied(self) -> Any:
-        """The applied vibration of the last block, a record of `Applied`."""
-        return self._applied[0]
 
     @property
     def is_stopped(self) -> bool:

@@ -201,7 +201,7 @@ class GuardedRig:
         """Publish END and withdraw the rig's liveliness token; the other processes end once they see both."""
         self._complaints.report_when_due(all_of_it=True)
         self._report_stall()
-        rate_Hz = float(self._node.applied.sample_rate_Hz)
+        rate_Hz = float(self._node.applied["sample_rate_Hz"])
         self.event("END", f"blocks={self._node.block}{f' sample_rate_Hz={rate_Hz:.1f}' if rate_Hz else ''}")
         self._bus.withdraw()
 

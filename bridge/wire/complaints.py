@@ -49,7 +49,7 @@ class Complaints:
 
     def __init__(self, publish: Callable[[str, str], object], clock: Callable[[], float] | None = None) -> None:
         self._publish = publish
-        self._clock = clock or time.monotonic
+        self._clock = clock
         self._kinds: dict[tuple[str, str], _Kind] = {}
 
     def note(self, code: str, where: str, text: str, times: int = 1) -> None:
@@ -82,7 +82,7 @@ class Complaints:
                 self._report(code, kind, all_of_it)
 
     def _report(self, code: str, kind: _Kind, at_once: bool = False) -> None:
-        now_s = self._clock()
+        now_s = (self._clock or time.monotonic)()  # the clock of now: a run may have begun simulated time since
         if not at_once and now_s - kind.reported_s < _EVERY_S:
             return
         counts = [f"{kind.pending} times"] if kind.pending > 1 else []

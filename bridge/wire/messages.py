@@ -83,6 +83,7 @@ class Layout:
         self.whole_sizes = frozenset(ends)  # lengths of the message in this version and in versions with fewer fields
         fields = np.dtype(cast(Any, {"names": names, "formats": formats, "offsets": offsets, "itemsize": self.size}))
         self.dtype: np.dtype[Any] = np.dtype((np.record, fields))
+        self._fields = fields
         self._template = bytes(template)
         self._tags = int.from_bytes(template, "little")
         self._mask = int.from_bytes(fixed, "little")
@@ -95,6 +96,10 @@ class Layout:
         messages = np.empty((count, self.size), np.uint8)
         messages[:] = np.frombuffer(self._template, np.uint8)
         return np.frombuffer(messages, self.dtype)
+
+    def row(self, messages: Records) -> Any:
+        """The first message, for reads by name in each block: a read takes 0.1 us, of a record 1 us."""
+        return messages.view(self._fields)[0]
 
     def is_canonical(self, payload: bytes) -> bool:
         """Whether every field is written, in the order of the field numbers."""

@@ -19,7 +19,7 @@ class TripEvents:
 
     def news(self, trace: Any) -> list[tuple[str, str]]:
         """Codes and texts of the trips that a record of `Trace` begins or ends; a trip counts until CLEARED."""
-        reason, limit, t_ns = int(trace.reason), int(trace.limit), int(trace.t_ns)
+        reason, limit, t_ns = int(trace["reason"]), int(trace["limit"]), int(trace["t_ns"])
         is_new, self._reason = reason != self._reason, reason
         if not is_new and not self._open:
             return []

@@ -201,6 +201,6 @@ def _judged(
         slips=int(np.count_nonzero(fast[1:] & ~fast[:-1])),
         reasons=reasons,
         limits={wire.Limit.Name(int(limit)) for limit in set(trace["limit"][first:].tolist())},
-        guard=wire.GuardState.Name(int(plant.applied.guard_state)),
+        guard=wire.GuardState.Name(int(plant.applied["guard_state"])),
         trace=trace,
     )

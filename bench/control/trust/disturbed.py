@@ -101,7 +101,7 @@ class _Run(TruthRun):
 
     def observe(self, node: PlantNode) -> None:
         """Judge the motion of the last block; the trace is empty, so announcements do not count."""
-        v_a_mps, frequency_Hz = np.array([node.vibration_mps]), np.array([float(node.applied.frequency_Hz)])
+        v_a_mps, frequency_Hz = np.array([node.vibration_mps]), np.array([float(node.applied["frequency_Hz"])])
         gain = np.ones(1)
         count = watch(*self._judge, node.truth[None], v_a_mps, frequency_Hz, gain, self._trace, self._room, self._row)
         self._events.append(self._room[:count].copy())

@@ -105,15 +105,12 @@ class Faults:
             if fault not in self._acting:
                 self._news.append((ENDED, fault.table.in_words()))
         self._planned = [fault for fault in self._planned if block < fault.end]
-        if self._exciter is not None:
+        if self._exciter is not None and any(fault.table.group == EXCITER for fault in (*before, *self._acting)):
             exciter = [fault for fault in self._acting if fault.table.group == EXCITER]
             self._exciter([(fault.table, self._since_s(fault, block)) for fault in exciter])
-        self.on_the_bus = any(fault.table.group == BUS for fault in self._acting) or not self._lines_empty
-        self.busy = bool(self._planned) or bool(self._acting) or not self._lines_empty
-
-    @property
-    def _lines_empty(self) -> bool:
-        return all(line.empty for line in self._lines.values())
+        on_the_way = not (self._lines["blocks"].empty and self._lines["commands"].empty)
+        self.on_the_bus = on_the_way or any(fault.table.group == BUS for fault in self._acting)
+        self.busy = on_the_way or bool(self._planned or self._acting)
 
     def _since_s(self, fault: _Planned, block: int) -> float:
         return (block - fault.begin) * self._block_s

@@ -47,7 +47,7 @@ class Player:
             self.hears = wait.hears
 
     def leave(self) -> None:
-        """End the loop at once, as a signal ends a process: its remaining steps wait for nothing."""
+        """End the loop at once, as a signal ends a process: its last calls wait for nothing."""
         while not self.over:
             try:
                 self._loop.throw(_Left)

@@ -1,5 +1,6 @@
 """A problem is reported at once, then once a second for each kind, with the count of all."""
 
+from bridge.wire.clock import time
 from bridge.wire.complaints import Complaints
 
 
@@ -52,3 +53,16 @@ def test_held_back_complaints_are_reported_without_another_of_their_kind() -> No
     made.report_when_due()
     made.report_when_due(all_of_it=True)
     assert reported[1:] == [("FLOOD", "operator: dropped (5 times, 6 in all)")]
+
+
+def test_simulated_time_that_begins_later_counts() -> None:
+    """Rig and controller are made before it: with the computer's seconds a log depended on the speed of its run."""
+    reported: list[str] = []
+    made, now_ns = Complaints(lambda _, text: reported.append(text)), 0
+    with time.simulated(lambda: now_ns, lambda _: None):
+        made.note("FOREIGN", "command", "x")
+        made.note("FOREIGN", "command", "x")
+        assert len(reported) == 1
+        now_ns = 1_000_000_000
+        made.report_when_due()
+    assert len(reported) == 2
