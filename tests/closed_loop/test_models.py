@@ -109,7 +109,7 @@ def test_models_that_fail_are_named_and_nothing_vibrates(tmp_path: Path) -> None
     for name, (fault, event) in faults.items():
         start = {"carriage speed": 0.5, "load": 1.0, "fault": fault}
         slowest_s = 0.5 if name == "hang" else 20.0
-        rig = rig_of(foreign_fmu(tmp_path / f"{name}.fmu"), set=start, slowest_s=slowest_s, memory_MB=1500.0)
+        rig = rig_of(foreign_fmu(tmp_path / f"{name}.fmu"), set=start, slowest_s=slowest_s)
         amplitude = '[[expect]]\nsignal = "amplitude_m"\n'
         expectations = f'[[expect]]\nevent = "{event}"\nfrom_s = 0.9\nwithin_s = 0.3\n\n'
         expectations += f'{amplitude}at_least = "5 nm"\nfrom_s = 0.5\nto_s = 0.9\n\n'

@@ -19,6 +19,7 @@ import numpy as np
 
 ORDER = struct.Struct("<4d")
 READY = b"ready\n"
+_LOOK_BLOCKS = 10  # blocks from a look at the memory to the next; it takes 15 us
 _ERROR = 3  # status of FMI
 _HEAD_BYTES = 1 << 16  # part of the description in which its version is
 
@@ -80,6 +81,7 @@ class Model:
                 self.dll: Any = _Library(self.dll)
                 super()._loadFunctions()
 
+        Lenient.__name__ = kinds[fmi].__name__  # by which FMPy knows the version
         model: Any = Lenient(
             guid=about.guid,
             unzipDirectory=folder,
@@ -125,18 +127,28 @@ class Model:
         return self._block.tobytes()
 
 
+def _memory_bytes() -> int:
+    with open("/proc/self/statm", "rb") as file:
+        return int(file.read().split()[0]) * resource.getpagesize()
+
+
 def _serve(settings: dict[str, Any], folder: str) -> None:
     """Answer orders until stdin ends; the model is unpacked into `folder`."""
     answers = os.dup(1)
     os.dup2(2, 1)  # the prints of a model must not mix with the samples
-    most = round(settings["memory_MB"] * 1e6)
-    resource.setrlimit(resource.RLIMIT_AS, (most, most))
     try:
         model = Model(settings, folder)
+        start, most = _memory_bytes(), round(settings["memory_MB"] * 1e6)
+        # within one step the system refuses more
+        resource.setrlimit(resource.RLIMIT_AS, (start + 2 * most, start + 2 * most))
         os.write(answers, READY)
+        blocks = 0
         with open(0, "rb", buffering=0) as orders:
             while len(order := orders.read(ORDER.size)) == ORDER.size:
                 answer = memoryview(model.block(*ORDER.unpack(order)))
+                blocks += 1
+                if blocks % _LOOK_BLOCKS == 0 and (grown := _memory_bytes() - start) > most:
+                    raise MemoryError(f"it grew by {grown / 1e6:.0f} MB: must be at most memory_MB = {most / 1e6:g}")
                 while answer:
                     answer = answer[os.write(answers, answer) :]
     except Exception as error:  # any of FMPy, of the archive or of the model
