@@ -100,7 +100,7 @@ class Model:
         # kept for all steps: FMPy's own `setFloat64` and `getFloat64` make new ones
         inputs = [*names[:2], *(settings[name] for name in ("speed", "load") if settings[name])]
         self._order = (ctypes.c_double * len(inputs))()
-        parts = (ctypes.c_double * (len(settings["outputs"]) * size))()
+        parts: Any = (ctypes.c_double * (len(settings["outputs"]) * size))()
         self._part = np.frombuffer(parts).reshape(-1, size)
         self._block = np.empty((len(settings["outputs"]), self._steps, size))
         lengths = [[len(values)] if fmi == "3.0" else [] for values in (self._order, parts)]
