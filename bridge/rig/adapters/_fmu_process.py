@@ -54,10 +54,15 @@ class Model:
         kinds: dict[str, Any] = {"2.0": FMU2Slave, "3.0": FMU3Slave}
         with zipfile.ZipFile(settings["file"]) as archive, archive.open("modelDescription.xml") as file:
             stated = re.search(rb'fmiVersion\s*=\s*"([^"]*)"', file.read(_HEAD_BYTES))
+            platforms = {name.split("/")[1] for name in archive.namelist() if name.startswith("binaries/")}
         fmi = stated[1].decode() if stated else "unknown"
         about = read_model_description(settings["file"], validate=False) if fmi in kinds else None
         if about is None or about.coSimulation is None:
             raise ValueError(f"FMI {fmi}: must be a model of FMI 2.0 or 3.0 for co-simulation")
+        if (platform := {"2.0": "linux64", "3.0": "x86_64-linux"}[fmi]) not in platforms:
+            raise ValueError(
+                f"binaries/{platform}: no binary for Linux on x86-64; has {', '.join(platforms) or 'none'}"
+            )
         extract(settings["file"], folder)
         variables = {variable.name: variable for variable in about.modelVariables}
         names = [settings["frequency"], settings["amplitude"], *settings["set"], *settings["outputs"]]
@@ -122,6 +127,7 @@ class Model:
         for step in range(self._steps):
             self._model.doStep(self._count * self._step_s, self._step_s)
             self._count += 1
+            self._part.fill(math.nan)  # a model that states more values than it has
             self._get()
             self._block[:, step] = self._part
         return self._block.tobytes()
