@@ -6,7 +6,6 @@ from xml.etree import ElementTree as Xml
 
 from bridge.fmu.model import Model, Variable
 
-_TIME = Variable("time", "independent", 0, "Float64", unit="s")
 _LONG_S = 10.0  # length of the experiment that the file proposes
 
 
@@ -31,7 +30,7 @@ def description(model: Model, fmi: int, library: str, token: str) -> str:
         can_serialize: "true",
     }
     Xml.SubElement(root, "CoSimulation", about | ({"fixedInternalStepSize": step} if fmi > 2 else {}))
-    variables = [_TIME, *model.variables]
+    variables = model.rows
     units = Xml.SubElement(root, "UnitDefinitions")
     for unit in sorted({variable.unit for variable in variables} - {""}):
         Xml.SubElement(units, "Unit", name=unit)
