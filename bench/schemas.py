@@ -14,23 +14,8 @@ def _bank() -> dict[str, Any]:
 
     schema, bank = scenario(), BankConfig.model_json_schema()
     schema["$defs"] |= bank.pop("$defs") | {"BankConfig": bank}
-    tables = {name: schema["properties"][name] for name in ("duration_s", "seed", "rig", "controller")}
-    tables |= {"bank": {"$ref": "#/$defs/BankConfig"}}
-    words = {name: {"type": "string"} for name in ("name", "description")}
-    entry = {"type": "object", "properties": words | tables, "required": [*words], "additionalProperties": False}
-    several = {
-        "type": "array",
-        "minItems": 1,
-        "items": entry,
-        "description": "Each entry starts from the tables above; its keys override them.",
-    }
-    return {
-        "$defs": schema["$defs"],
-        "type": "object",
-        "properties": {"description": words["description"]} | tables | {"scenario": several},
-        "required": ["description", "scenario"],
-        "additionalProperties": False,
-    }
+    schema["properties"] |= {"bank": {"$ref": "#/$defs/BankConfig"}}
+    return schema
 
 
 FORMATS = {

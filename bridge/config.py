@@ -178,16 +178,19 @@ def _without_misspelt(problems: Sequence[Any]) -> list[Any]:
     return [item for item in problems if item["type"] != "missing" or not misspelt(item["loc"][:-1], item["loc"][-1])]
 
 
+def unknown_key(name: str, known: Sequence[str]) -> str:
+    """The rule and the remedy for a key that is not one of `known`."""
+    near = get_close_matches(name, known, 1, _MISSPELT)
+    return f"unknown key; {f'perhaps {near[0]}; ' if near else ''}known here: {', '.join(known) or 'none'}"
+
+
 def _line(model: type[Strict], source: str, problem: Any) -> str:
     path = [str(part) for part in problem["loc"]]
     key = ".".join(path) or "(file)"
     kind: str = problem["type"]
     if kind == "extra_forbidden":
         known = sorted(_fields(_model_at(model, path[:-1])))
-        near = get_close_matches(path[-1], known, 1, _MISSPELT)
-        remedy = f"perhaps {near[0]}; " if near else ""
-        shown = in_short(problem["input"])
-        return f"{source}: {key} = {shown}: unknown key; {remedy}known here: {', '.join(known) or 'none'}"
+        return f"{source}: {key} = {in_short(problem['input'])}: {unknown_key(path[-1], known)}"
     if kind == "missing":
         return f"{source}: {key}: missing; add it"
     message: str = problem["msg"].removeprefix("Value error, ")

@@ -3,12 +3,13 @@
 import json
 import math
 import threading
+from collections.abc import Generator
 
 from bridge.faults import Fault
 from bridge.plain import StepReport, no_report
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.clock import time
+from bridge.wire.clock import Wait, carry_out, time
 from bridge.wire.complaints import BAD_MESSAGE, FLOOD, FOREIGN, Complaints
 from bridge.wire.event_codes import is_listed
 from bridge.wire.inbox import WAITING
@@ -79,7 +80,7 @@ def run(
         report("joined", f"the rig at {bus_config.endpoint}; waiting for its first block")
         if of_rig is not None and (text := other_rig(of_rig.rig, header.rig)):
             report("warning", text)
-        process.loop(stop, granted)
+        process.realtime(stop, granted)
     report("ended", "stopped" if stop.is_set() else "with the rig")
     return node.steps
 
@@ -109,7 +110,6 @@ class ControllerProcess:
         config, node: the controller.
         bus: the controller's session.
         lockstep: whether the rig waits for the command of each block.
-        inbox: queue of received messages; by default a new inbox.
         report: reports start, waiting and end of this process, and its important events, to the operator.
 
     """
@@ -120,7 +120,6 @@ class ControllerProcess:
         node: ControllerNode,
         bus: Bus,
         lockstep: bool,
-        inbox: Inbox | None = None,
         report: StepReport = no_report,
     ) -> None:
         self._report = report
@@ -128,7 +127,7 @@ class ControllerProcess:
         self._node = node
         self._bus = bus
         self._lockstep = lockstep
-        self._inbox = inbox or Inbox(WAITING)
+        self._inbox = Inbox(WAITING)
         self._events = 0
         self._waiting: list[bytes] = []  # events that are not sent yet
         self._events_from_s = 0.0  # time from which events are sent: during a cut of the link the log would miss them
@@ -158,15 +157,19 @@ class ControllerProcess:
         while self._waiting and time.monotonic() >= self._events_from_s:
             self._send[CONTROLLER_EVENT.name](self._waiting.pop(0))
 
-    def loop(self, stop: threading.Event, granted: str) -> None:
+    def realtime(self, stop: threading.Event, granted: str) -> None:
+        """Answer blocks by the computer's clock, as `loop` does."""
+        carry_out(self.loop(stop, granted))
+
+    def loop(self, stop: threading.Event, granted: str) -> Generator[Wait]:
         """Take blocks in order and answer each block; the plant applies the newest answer.
 
         `granted`: the priority of this process, published when the run begins.
         """
         try:
-            self._answer(stop, granted)
+            yield from self._answer(stop, granted)
         finally:
-            self._fade_out()
+            yield from self._fade_out()
             self._publish(self._blocks.paused())
             self._complaints.report_when_due(all_of_it=True)
         node = self._node
@@ -178,14 +181,14 @@ class ControllerProcess:
         """Whether the rig sent END and left the bus. END alone may be forged, so it is ignored while the rig stays."""
         return self._end_sent_s is not None and not self._bus.alive("plant")
 
-    def _answer(self, stop: threading.Event, granted: str) -> None:
+    def _answer(self, stop: threading.Event, granted: str) -> Generator[Wait]:
         self._rig_came = self._bus.came("plant")
         blocks = self._blocks
         blocks.heard(time.monotonic())
         started = False
         while not stop.is_set() and not self._ended:
             asked_s = time.monotonic()
-            received = self._inbox.get(max(blocks.due_s - asked_s, 0.0))
+            received = yield from self._inbox.next(max(blocks.due_s - asked_s, 0.0))
             waited_until_s = max(asked_s, blocks.due_s)
             if received is not None:
                 self._consume(received)
@@ -229,11 +232,11 @@ class ControllerProcess:
         self._send[COMMAND.name](self._node.stale(silent_blocks).payload)
         self._send_rest(0)
 
-    def _fade_out(self) -> None:
+    def _fade_out(self) -> Generator[Wait]:
         """Ramp to zero before this process ends for any reason, as not every rig ends its last command by itself."""
         while self._node.amplitude_m > 0.0 and not (self._lockstep or self._ended):
             self._ramp(1)
-            time.sleep(self._config.block_s)
+            yield from time.wait(self._config.block_s)
 
     def _consume(self, received: Received) -> None:
         """Take one message. Unreadable messages are dropped and reported."""

@@ -182,7 +182,9 @@ class LedgerRow(NamedTuple):
     interval_90: tuple[float, float] | None = None
     null_90: float | None = None  # share that chance alone reaches in 1 of 10
     agrees: bool | None = None  # whether the size is the same in all runs
-    left: float | None = None  # of fits and kept runs: logarithm of the remainder over that of a right explanation
+    left: float | None = (
+        None  # of fits and kept runs: logarithm of the remainder over the remainder of a right explanation
+    )
 
 
 class LeftOut(NamedTuple):

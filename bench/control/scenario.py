@@ -1,4 +1,4 @@
-"""The scenarios of the bank: families, each one file of bench/control/scenarios with a base and its variants."""
+"""The scenarios of the bank: families, each one scenario file of bench/control/scenarios with `[[sweep]]`, and a table `bank`."""
 
 import math
 from collections.abc import Sequence
@@ -7,10 +7,10 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import Field
 
-from bridge.config import Strict, read_toml, validate
+from bridge.config import Strict, read_toml, validate, with_overrides
 from bridge.faults import Fault
 from cockpit.run.scenario import Scenario
-from cockpit.run.scenario_file import merged, with_rig
+from cockpit.run.scenario_file import cases_of, merged, with_rig
 from plant.config import RigConfig
 
 NotNegative = Annotated[float, Field(ge=0)]
@@ -102,10 +102,10 @@ def chosen(bank: Sequence[BankScenario], only: Sequence[str], small: bool) -> li
 
 def _family(path: Path) -> list[BankScenario]:
     table = read_toml(path)
-    base = {key: value for key, value in table.items() if key not in {"scenario", "description"}}
-    if not table.get("scenario"):
-        raise Fault("CONFIG", f"{path}: has no scenario; write [[scenario]] above each, with a name and a description")
-    return [_scenario(path, merged(base, entry)) for entry in table["scenario"]]
+    cases = cases_of(path, table)
+    if not cases:
+        raise Fault("CONFIG", f"{path}: has no scenario; add [[sweep]] with a value and a description for each")
+    return [_scenario(path, with_overrides(table, settings)) for settings in cases.values()]
 
 
 def _scenario(path: Path, table: dict[str, Any]) -> BankScenario:

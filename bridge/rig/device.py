@@ -106,7 +106,7 @@ class Part(ABC):
 
     @abstractmethod
     def safe(self) -> None:
-        """Bring the exciter to rest now, without a ramp if need be; raises nothing."""
+        """Bring the exciter to rest until the next `write`, without a ramp if need be; raises nothing."""
 
     @abstractmethod
     def close(self) -> None:

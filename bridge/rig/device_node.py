@@ -238,7 +238,8 @@ class DeviceNode(GuardedNode):
     def _open_again(self) -> None:
         """Try to open a lost device, twice a second. Raises DeviceError."""
         if time.monotonic() < self._open_again_s:
-            time.sleep(self.block_ns * 1e-9)
+            if self.paced_by_rig:
+                time.sleep(self.block_ns * 1e-9)
             return
         self._device.open()
         self._device.safe()

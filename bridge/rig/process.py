@@ -4,7 +4,7 @@ import collections
 import contextlib
 import secrets
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from functools import partial
 
 from bridge.faults import Fault
@@ -19,7 +19,7 @@ from bridge.rig.faults.line import Message
 from bridge.rig.node import LATE_NS, GuardedNode, Served
 from bridge.wire import realtime, refusals
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.clock import time
+from bridge.wire.clock import Wait, carry_out, time
 from bridge.wire.complaints import BAD_MESSAGE, FOREIGN, Complaints
 from bridge.wire.event_codes import is_listed
 from bridge.wire.inbox import WAITING
@@ -288,22 +288,29 @@ class GuardedRig:
             self._complaints.note(FOREIGN, f"{COMMAND.name} of another run, or not newer than the last", text, refused)
 
     def realtime(self, blocks: int, stop: threading.Event) -> None:
+        """Advance one block per period by the computer's clock, as `loop` does."""
+        carry_out(self.loop(blocks, stop))
+
+    def loop(self, blocks: int, stop: threading.Event) -> Generator[Wait]:
         """Advance one block per period under the newest command; on every exit the vibration fades to zero first."""
         try:
-            self._advance_to(blocks, stop)
+            yield from self._advance_to(blocks, stop)
         finally:
-            self._fade_out(paced=True)
+            yield from self._fade_out(paced=True)
 
-    def _fade_out(self, paced: bool) -> None:
+    def _fade_out(self, paced: bool) -> Generator[Wait]:
         node, pacer = self._node, realtime.Pacer(self._node.block_ns)
         node.let_go()
         for tick in range(_LONGEST_FADE_BLOCKS):
             if node.at_rest:
                 return
-            late_ns = pacer.wait(tick) if paced and not node.paced_by_rig else 0
+            late_ns = 0
+            if paced and not node.paced_by_rig:
+                yield from pacer.wait(tick)
+                late_ns = pacer.late_ns
             self._send(node.advance([], 0, 0, late_ns))
 
-    def _advance_to(self, blocks: int, stop: threading.Event) -> None:
+    def _advance_to(self, blocks: int, stop: threading.Event) -> Generator[Wait]:
         node, pacer = self._node, realtime.Pacer(self._node.block_ns)
         sent_ns = [0] * _ROUND_TRIPS_KEPT
         tick = 0
@@ -312,7 +319,8 @@ class GuardedRig:
         while node.block < blocks and not stop.is_set():
             late_ns = 0
             if not node.paced_by_rig:
-                late_ns = pacer.wait(tick)
+                yield from pacer.wait(tick)
+                late_ns = pacer.late_ns
             elif not node.is_behind:  # a command after the newest block acts while the device makes the next one
                 self._answers.get(longest_wait_s)
             if tick % remind_ticks == 0 and (text := self._bus.expiring()):
@@ -365,7 +373,7 @@ class GuardedRig:
                 commands = [self._answer(node.block - 1, stop)]
         finally:
             if node.block < blocks:
-                self._fade_out(paced=False)
+                carry_out(self._fade_out(paced=False))
 
     def _answer(self, block: int, stop: threading.Event) -> bytes:
         until_s = time.monotonic() + _ANSWER_TIMEOUT_S

@@ -4,8 +4,10 @@ import collections
 import contextlib
 import threading
 import time
+from collections.abc import Generator
 from typing import NamedTuple
 
+from bridge.wire import clock
 from bridge.wire.topics import Topic
 
 # Blocks or commands that may wait during a stall of the loop: at least 1500, the blocks of 1 ms in one lease, as a longer stall
@@ -76,6 +78,14 @@ class Inbox:
             if self._arrived.locked():
                 with contextlib.suppress(RuntimeError):  # another thread released it
                     self._arrived.release()
+
+    def next(self, timeout_s: float) -> Generator[clock.Wait, None, Received | None]:
+        """The oldest message, or None, after a wait of at most `timeout_s` of a loop."""
+        if not clock.time.is_simulated:
+            return self.get(timeout_s)
+        if not self._waiting and timeout_s:
+            yield clock.Wait(timeout_s, hears=True)
+        return self.get()
 
     def get(self, timeout_s: float = 0.0) -> Received | None:
         """The oldest message; None if none waits or arrives within `timeout_s`."""

@@ -7,10 +7,10 @@ import gc
 import os
 import resource
 import threading
-from collections.abc import Generator
+from collections.abc import Generator, Iterable
 from pathlib import Path
 
-from bridge.wire.clock import time
+from bridge.wire.clock import Wait, time
 
 _PR_SET_TIMERSLACK = 29
 # `on fault` locks pages at their first use, so that thread stacks of 8 MB each are not filled
@@ -162,12 +162,15 @@ class Pacer:
 
     def __init__(self, period_ns: int) -> None:
         self._period_ns = period_ns
-        self._start_ns = time.perf_counter_ns()
+        self._start_ns = self._due_ns = time.perf_counter_ns()
 
-    def wait(self, tick: int) -> int:
-        """Sleep until the end of period `tick` (from 0) and return the lateness [ns]."""
-        due_ns = self._start_ns + (tick + 1) * self._period_ns
-        left_ns = due_ns - time.perf_counter_ns()
-        if left_ns > 0:
-            time.sleep(left_ns * 1e-9)
-        return time.perf_counter_ns() - due_ns
+    def wait(self, tick: int) -> Iterable[Wait]:
+        """Wait until the end of period `tick` (from 0)."""
+        self._due_ns = self._start_ns + (tick + 1) * self._period_ns
+        left_ns = self._due_ns - time.perf_counter_ns()
+        return time.wait(left_ns * 1e-9) if left_ns > 0 else ()
+
+    @property
+    def late_ns(self) -> int:
+        """Time since the end of the period of the last wait."""
+        return time.perf_counter_ns() - self._due_ns

@@ -182,11 +182,14 @@ def _diagnose_one(source: "EvidenceFolder", options: _Options) -> int:
     from diagnosis.deadline import forecast
     from diagnosis.evidence.folder import load_evidence
     from diagnosis.report.rig_file import NO_RIG, refuse_force_drive, write_rig
+    from diagnosis.report.words import to_correct
 
     evidence = load_evidence(source.folder)
     if options.apply is not None:
         refuse_force_drive(evidence)
     with watched() as progress:
+        for finding in to_correct(evidence.findings):
+            progress(f"correct first: {finding.where}: {finding.text}", 0.0)
         fitted_s = sum(float(run.t_s[-1] - run.t_s[0]) for run in evidence.runs if not run.holdout)
         limit = "" if options.budget_s is None else f", {options.budget_s:g} s at most"
         progress(f"the simulated fits of {fitted_s:.0f} s take about {forecast(fitted_s, options.jobs)}{limit}", 0.0)

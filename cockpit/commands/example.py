@@ -29,6 +29,7 @@ class Example(NamedTuple):
     runs: list[str]  # data files
     held_out: list[str]  # data files to which no number is fitted
     seed: int
+    effects: dict[str, dict[str, float | str]] | None  # effects with their numbers; None: hidden
 
 
 @command()
@@ -59,8 +60,13 @@ def example(
         folder.parent.mkdir(parents=True, exist_ok=True)
         Path(part, "made").rename(folder)
     runs = read_manifest(folder).run
-    made = Example(str(folder), [run.file for run in runs], [run.file for run in runs if run.holdout], seed)
+    held_out = [run.file for run in runs if run.holdout]
+    made = Example(
+        str(folder), [run.file for run in runs], held_out, seed, None if effect is None else _EFFECTS[effect]
+    )
     chosen = "a rig as described" if effect == "none" else f"a rig with {effect}"
+    if effect is not None:
+        chosen += "".join(f", {name} = {number}" for name, number in _EFFECTS[effect].get(effect, {}).items())
     rig = "a rig with a hidden fault" if effect is None else chosen
     print_result(
         as_json,

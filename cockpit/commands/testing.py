@@ -1,13 +1,14 @@
 """`stickslip test`: run scenarios with expectations, or judge them on an old log."""
 
+import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from bridge.faults import Fault
-from cockpit.commands.as_json.option import Json, print_result
-from cockpit.commands.options import SharedOptions, command
+from cockpit.commands.as_json.option import STDOUT, Json, print_result
+from cockpit.commands.options import SharedOptions, command, watched_share
 
 
 @command("settings", "seed")
@@ -19,7 +20,9 @@ def run_tests(
             metavar="[PATH]...", help=r"Scenarios with \[\[expect]], or folders; the shipped tests if not given."
         ),
     ] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes to use; all cores if not given.")] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Processes to use; not given: all cores, or 1 with --rig.")
+    ] = None,
     mutants: Annotated[
         bool,
         typer.Option("--mutants", help=r"Run with each defect of \[\[must_fail]], under which a test has to fail."),
@@ -48,16 +51,14 @@ def run_tests(
     as_json: Json = None,
 ) -> int:
     """Run scenarios and judge their expectations; exit status 0: passed, 1: failed, 2: could not run, 14: not tested."""
-    from joblib import cpu_count
-
     from bridge.files import write_whole
     from bridge.log.logfile import check_log_file
-    from cockpit.commands.diagnose_output import watched
     from cockpit.run.child_process import end_like_ctrl_c
     from cockpit.run.scenario_file import deploy_folder
     from cockpit.run.writable import check_output, check_output_folder, writing
     from cockpit.testing.junit import junit
     from cockpit.testing.one import judge_old
+    from cockpit.testing.page import page as page_of
     from cockpit.testing.suite import Suite, cases_of, mutants_of
     from cockpit.testing.suite import run_tests as run
     from cockpit.testing.target import Target
@@ -78,15 +79,14 @@ def run_tests(
     else:
         if mutants:
             cases, without = mutants_of(cases)
-        with watched() as progress:
-            tests = run(cases, jobs or cpu_count(), None if mutants else logs, lambda share: progress("", share))
+        jobs = jobs or (1 if rig else len(os.sched_getaffinity(0)))  # one test at a time uses a real rig
+        with watched_share("testing", quiet=as_json == STDOUT) as progress:
+            tests = run(cases, jobs, None if mutants else logs, progress)
     suite = Suite(tests, mutants, without, others)
     if report is not None:
         with writing(report):
             write_whole(report, junit(suite))
     if page is not None:
-        from cockpit.testing.page import page as page_of
-
         with writing(page):
             write_whole(page, page_of(suite))
     suite = suite._replace(tests=[test._replace(picture="") for test in tests])  # JSON without pictures

@@ -97,8 +97,9 @@ class _Judge:
             if share < IN_CHARGE_SHARE:
                 rule = f"the controller was in charge for {100 * share:.0f} % of the window"
                 return f"{rule}: must be {100 * IN_CHARGE_SHARE:.0f} %; in_charge = false judges without it"
-        elif record.charge_share(0.0, math.inf) == 0.0:
-            return "no controller was in charge in the whole run; in_charge = false judges without it"
+        elif record.charge_share(0.0, math.inf if samples is None else self._to_s) == 0.0:
+            until = f"until {self._to_s:g} s" if record.charge_share(0.0, math.inf) else "in the whole run"
+            return f"no controller was in charge {until}; {record.why_not_in_charge}, or in_charge = false judges without it"
         return ""
 
     def _gap(self, samples: Samples) -> str:
@@ -119,9 +120,12 @@ class _Judge:
         if samples is None:
             return self._made(UNTESTED, f"{name} is not in the log")
         limits, possible = table.limits, self._record.range_of(name)
-        if not table.never and limits.low <= possible.low and limits.high >= possible.high:
+        around = limits.low <= possible.low and limits.high >= possible.high
+        beyond = limits.low > possible.high or limits.high < possible.low
+        if beyond if table.never else around:
             shown = in_words(possible, unit_of(name))
-            return self._made(UNTESTED, f"{name} cannot leave its range, {shown}: {table.wanted} cannot fail")
+            wanted = f"{'never ' if table.never else ''}{table.wanted}"
+            return self._made(UNTESTED, f"{name} cannot leave its range, {shown}: {wanted} cannot fail")
         inside = (samples.t_s > self._from_s) & (samples.t_s <= self._to_s) & samples.known
         t_s, values = samples.t_s[inside], samples.values[inside]
         if not len(values):

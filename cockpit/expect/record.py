@@ -98,6 +98,13 @@ class Record:
         inside = (t_s > from_s) & (t_s <= to_s)
         return float(np.count_nonzero(charge & inside)) / max(int(np.count_nonzero(inside)), 1)
 
+    @property
+    def why_not_in_charge(self) -> str:
+        """The remedy of a run, or of its begin, without a controller in charge."""
+        if not np.isin(self.run.applied["guard_state"], _IN_CHARGE).any():
+            return "arm the rig: arm = true in the scenario, and --arm for a real rig"
+        return "controller.policy.enabled_from_s must be earlier, or the window later"
+
     def samples(self, name: str) -> Samples | None:
         """Samples of a signal; None if the log does not contain it."""
         if not holds(self.run, name):

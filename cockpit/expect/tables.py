@@ -100,6 +100,8 @@ class ExpectTable(Strict):
             known = [row.word for row in words() if row.column == STATES[self.state].column]
             for word in self.is_in or ():
                 refuse_word("is_in", word, known)
+            if set(self.is_in or ()) == set(known):
+                raise ValueError(f"is_in: names every word of {self.state}, so it cannot fail; leave some out")
         for name in ("slips", "surges"):
             counts = getattr(self, name)
             if counts is not None and not 0 <= counts[0] <= counts[1]:
@@ -205,6 +207,10 @@ class MutantTable(Strict):
         if not (self.settings or self.fault):
             raise ValueError("must_fail: changes nothing: must have settings or fault; add one of them")
         return self
+
+    def in_words(self) -> str:
+        """The defect in words."""
+        return self.about or ", ".join([*self.settings, *(table.in_words() for table in self.fault)])
 
 
 def in_words(limits: Limits, unit: str) -> str:

@@ -112,7 +112,10 @@ def hints(seen: LookResult, rig: Mapping[str, float]) -> list[Finding]:
         if 1.0 / _FAR < ratio < _FAR:
             continue
         unit = min(_UNITS[name], key=lambda wrong: abs(math.log(ratio / wrong[0])))
-        meant = f"; is it in {unit[1]}?" if abs(math.log(ratio / unit[0])) < math.log(_FAR) else ""
+        asked = [f"is it in {unit[1]}?"] if abs(math.log(ratio / unit[0])) < math.log(_FAR) else []
+        if seen.known.speed_mps is not None and name in ("mass_kg", "drive_stiffness_N_per_m"):
+            asked.append(f"is --speed {ratio:.2g} times the true speed?")  # both numbers are proportional to 1 / speed
+        meant = f"; {' Or '.join(asked)}" if asked else ""
         text = f"{value:g} is {ratio:.3g} times the {number.value:.4g} {number.unit} that the record shows{meant}"
         findings.append(Finding("units", name, text))
     return findings

@@ -104,7 +104,7 @@ def tare_of(force_N: Floats, position_m: Floats | None, where: str) -> tuple[flo
     if position_m is not None and not _is_still(position_m[known], still):
         return 0.0, []
     zero_N = float(values[still].mean())
-    text = f"{zero_N:.4g} in the first {leaves[0]} rows, in which the force is constant"
+    text = f"{zero_N:.4g} in the first {still.stop} rows, in which the force is constant"
     if abs(zero_N) > _LARGEST * float(np.median(np.abs(values[leaves[0] :]))):
         return 0.0, [Finding("tare", where, f"{text}: too large for a sensor's zero, so it is not subtracted")]
     if zero_N == 0.0:

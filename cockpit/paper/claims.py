@@ -43,7 +43,7 @@ REFERENCE: Final[dict[Key, tuple[float, float, float] | tuple[float]]] = {
 
 
 class PaperRow(NamedTuple):
-    """One line of the report. `deviation_percent` is None for a claim without a number."""
+    """One line of the report. `deviation_percent`: None for a claim without a number."""
 
     claim: str
     found: str

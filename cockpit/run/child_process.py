@@ -7,6 +7,7 @@ import io
 import json
 import os
 import queue
+import select
 import signal
 import sys
 import threading
@@ -47,14 +48,19 @@ def stop_event(parent: int = 0) -> threading.Event:
     """
     stop = threading.Event()
     # `stop.set` in the handler would wait for ever if the signal came within `stop.wait` or within an earlier handler, which hold
-    # its lock. `SimpleQueue.put` may be called at any point, and a thread passes the signal on.
-    signals: queue.SimpleQueue[int] = queue.SimpleQueue()
-    handle_endings(lambda number, _frame: signals.put(number))
+    # its lock. A pipe may be written at any point, and a thread passes the signal on.
+    read, write = os.pipe()
+    os.set_blocking(write, False)
+
+    def note(_number: int, _frame: Any) -> None:
+        with contextlib.suppress(BlockingIOError):  # full: the first signal was enough
+            os.write(write, b"!")
+
+    handle_endings(note)
 
     def watch() -> None:
         while not parent or os.getppid() == parent:
-            with contextlib.suppress(queue.Empty):
-                signals.get(timeout=_PARENT_CHECK_S if parent else None)
+            if select.select([read], [], [], _PARENT_CHECK_S if parent else None)[0]:
                 break
         stop.set()
 
@@ -274,7 +280,7 @@ def step_reports(quiet: bool) -> Generator[StepReport]:
     if quiet:
         yield no_report
         return
-    lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+    lines: queue.Queue[str | None] = queue.Queue()
 
     def print_lines() -> None:
         while (line := lines.get()) is not None:

@@ -26,7 +26,7 @@ from cockpit.run.closed_loop import ClosedLoop, Stretch
 from cockpit.run.device_run import DeviceRun, device_header
 from cockpit.run.run_tables import RunTables
 from cockpit.run.scenario import Scenario, header
-from cockpit.run.step import configurations, timed_settings
+from cockpit.run.step import configurations, loads_of, timed_settings
 from controller.node import operator_events
 from controller.replay import Change
 from controller.telemetry import SNAPSHOT_EVERY, STATE_EVERY, plotted, snapshot
@@ -84,7 +84,7 @@ def run_onboard(
     ahead = [*changes, *map(Change._make, configurations(scenario.controller, scenario.step))]
     ahead.sort(key=lambda change: change.t_ns)
     due = sorted([*words, *actions_of(scenario)], key=lambda action: action.t_ns)
-    loads = sorted((step.t_ns, step.load) for step in scenario.step if step.load is not None)
+    loads = [(round(at_s * 1e9), load) for at_s, load in loads_of(scenario.step)]
     try:
         # the log is compressed and written while the next stretch is computed
         with ThreadPoolExecutor(max_workers=1) as writer:

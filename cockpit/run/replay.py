@@ -178,7 +178,7 @@ def _one_pass(
 ) -> tuple[int, int, list[Change] | None, Replay | None]:
     """Replay a log while it is read, in constant memory, with the configuration before its first step.
 
-    Returns the number of steps, the time of the last step, the configurations, and the result; the result is None if messages
+    Returns the number of steps, the time of the last step, the configurations, and the result; result None if messages
     are out of order, or if the configuration is late.
     """
     steps = end_ns = 0
@@ -295,12 +295,18 @@ def closed_loop(path: Path, settings: list[str], log: Path) -> Compared:
         raise Fault("BAD_LOG", line)
     if is_real_rig(plant["rig"]):
         raise Fault("BAD_LOG", f"{path}: is the log of a real rig: must be of a simulated rig; choose another")
+    if "fault" in plant:
+        line = (
+            f"{path}: is the log of a run with faults, which are not repeated: must be of a run without; choose another"
+        )
+        raise Fault("BAD_LOG", line)
     if not len(run.sensors) or not len(run.trace):
         raise Fault(
             "BAD_LOG", f"{path}: holds no block with a trace of the controller to compare with; choose another log"
         )
     # the recorded duration, not the planned one: a run may have been interrupted, or have had no end
     table = {"rig": plant["rig"], "seed": plant["seed"], "duration_s": int(run.sensors["t_ns"][-1]) * 1e-9}
+    table["step"] = [{"at_s": at_s, "load": load} for at_s, load in plant.get("loads", [])]
     # a rig without a guard counts as armed
     table["arm"] = int(run.sensors["guard_state"][0]) in {wire.NO_GUARD, wire.ARMED, wire.ACTIVE}
     table["controller"] = changes[0].config.model_dump(mode="json")

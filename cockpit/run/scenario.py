@@ -12,7 +12,7 @@ from bridge.wire import stickslip_pb2 as wire
 from cockpit.run.run_tables import RunTables, header_of
 from cockpit.run.scenario_file import RIG_FILE, find, is_real_rig, read_scenario, rig_table, with_rig
 from cockpit.run.sensor_needs import refuse_blind_sensors, refuse_out_of_travel
-from cockpit.run.step import with_speeds
+from cockpit.run.step import loads_of, with_speeds
 from controller.config import seeing, within
 from plant.config import RigConfig
 from plant.config_limits import refuse_a_spring_of_another_rig, refuse_what_no_rig_does
@@ -92,6 +92,10 @@ def load_scenario(name: str, settings: list[str]) -> Scenario:
 
 def header(scenario: Scenario, role: str, lockstep: bool) -> wire.Header:
     """The header of a process of this scenario: role, configuration and versions."""
-    faults = {"fault": [table.model_dump(mode="json") for table in scenario.fault]} if scenario.fault else {}
+    more: dict[str, Any] = {}
+    if scenario.fault:
+        more["fault"] = [table.model_dump(mode="json") for table in scenario.fault]
+    if loads := loads_of(scenario.step):
+        more["loads"] = loads
     rig = scenario.rig
-    return header_of(scenario, rig.model_dump(mode="json"), rig.vibration_limits, rig.name, role, lockstep, faults)
+    return header_of(scenario, rig.model_dump(mode="json"), rig.vibration_limits, rig.name, role, lockstep, more)

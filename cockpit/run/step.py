@@ -75,6 +75,11 @@ def with_speeds(drive: "DriveConfig", steps: "Sequence[StepTable]") -> "DriveCon
     return drive.model_copy(update={"profile": points})
 
 
+def loads_of(steps: "Sequence[StepTable]") -> list[tuple[float, float]]:
+    """Time [s] and load of each step of the load, in order of time."""
+    return sorted((step.at_s, step.load) for step in steps if step.load is not None)
+
+
 def timed_settings(steps: "Sequence[StepTable]") -> list[str]:
     """The settings of the controller as `key=value@TIMEs`: the form in which a log records them for its replay."""
     return [

@@ -6,7 +6,7 @@ target     the rig of a test: a simulated rig, a model, or a device behind its g
 lock       the lock of a real rig, and its quarantine
 realtime   a test of a real rig: arm, change, end
 junit      the results as JUnit XML
-picture    one expectation on its signal as SVG        page  one offline page of many tests (template: page.html.j2)
+picture    one expectation on its signal as SVG        page  one offline page of many tests
 api        a rig, its runs and expectations in Python
 session    the rigs of one test in Python; the logs and pictures of a failed one
 plugin     the plug-in of pytest

@@ -1,5 +1,6 @@
 """One test: a scenario is run in simulated time, and its expectations are judged on the log."""
 
+import shlex
 import shutil
 from collections import Counter
 from pathlib import Path
@@ -13,6 +14,7 @@ from bridge.results import in_json
 from bridge.units import counted
 from cockpit.expect.judge import FAILED, PASSED, UNTESTED, Expected, judge
 from cockpit.expect.record import Record
+from cockpit.expect.tables import MutantTable
 from cockpit.run.run_tables import RunTables
 from cockpit.testing.picture import picture
 from cockpit.testing.target import NO_TARGET, Loaded, Target, load
@@ -29,7 +31,7 @@ class TestCase(NamedTuple):
     file: Path
     settings: list[str]
     target: Target = NO_TARGET
-    mutant: int | None = None  # index in `must_fail`; None: the scenario without a defect
+    mutant: MutantTable | None = None  # None: the scenario without a defect
 
 
 class Tested(NamedTuple):
@@ -81,26 +83,22 @@ class Tested(NamedTuple):
         """Lines: the result, each expectation that did not pass, the log and the line that replays it."""
         lines = [f"{self.result:<8} {self.name}{f' with {self.defect}' if self.defect else ''}: {self.why}"]
         lines += [f"  {row.in_words()}" for row in self.expectations if row.result != PASSED]
-        return [*lines, *([f"  replay   stickslip replay {self.log}"] if self.log else [])]
+        return [*lines, *([f"  replay   stickslip replay {shlex.quote(self.log)}"] if self.log else [])]
 
 
-def loaded(case: TestCase) -> tuple[Loaded, str]:
-    """The test, with its mutant's defect, and the defect in words. Raises Fault CONFIG, NOT_JUDGED."""
-    plain = load(str(case.file), case.settings, case.target)
-    if case.mutant is None:
-        return plain, ""
-    defect = plain.run.must_fail[case.mutant]
+def loaded(case: TestCase) -> Loaded:
+    """The test, with its mutant's defect. Raises Fault CONFIG, NOT_JUDGED."""
+    defect = case.mutant or MutantTable.model_construct()
     made = load(str(case.file), [*case.settings, *defect.settings], case.target)
-    about = defect.about or ", ".join([*defect.settings, *(table.in_words() for table in defect.fault)])
-    return made._replace(run=made.run.model_copy(update={"fault": [*made.run.fault, *defect.fault]})), about
+    return made._replace(run=made.run.model_copy(update={"fault": [*made.run.fault, *defect.fault]}))
 
 
 def run_test(case: TestCase, keep: Path | None) -> Tested:
     """Run one test; a log whose test did not pass is moved into the folder `keep`, None: deleted."""
-    tested = Tested(case.name, shown(case.file))
+    tested = Tested(case.name, shown(case.file), defect=case.mutant.in_words() if case.mutant else "")
     try:
-        test, defect = loaded(case)
-        tested = tested._replace(rig=test.run.rig.name, seed=test.run.seed, defect=defect)
+        test = loaded(case)
+        tested = tested._replace(rig=test.run.rig.name, seed=test.run.seed)
         with TemporaryDirectory() as folder:
             log = Path(folder) / f"{case.name}.mcap"
             test.make(str(case.file), log)
@@ -117,7 +115,7 @@ def judge_old(case: TestCase, log: Path) -> Tested:
     """Judge the expectations of a scenario on a log of any rig."""
     tested = Tested(case.name, shown(case.file))
     try:
-        run = loaded(case)[0].run
+        run = loaded(case).run
         return tested._replace(rig=run.rig.name, seed=run.seed, log=shown(log)).judged(log, run)
     except Fault as fault:
         return tested.without_result(fault)

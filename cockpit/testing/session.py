@@ -1,6 +1,7 @@
 """One test in Python: its rigs, and the log, picture and replay of each run once the test failed."""
 
 import re
+import shlex
 import shutil
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -65,7 +66,7 @@ class Session:
                 word = "replays bit for bit" if replayed.identical else "; ".join(replayed.in_words())
             except Fault as fault:
                 word = f"{fault.kind.code}: {fault.line}"
-            lines.append(f"replay   stickslip replay {kept}: {word}")
+            lines.append(f"replay   stickslip replay {shlex.quote(str(kept))}: {word}")
             if drawn := run.picture():
                 write_whole(kept.with_suffix(".svg"), drawn)
                 lines.append(f"picture  {kept.with_suffix('.svg')}")

@@ -1,12 +1,20 @@
 """Many tests: the scenarios of files and folders, in processes; the result does not depend on their number."""
 
+import multiprocessing
+import os
+import re
+import signal
+import tempfile
+import threading
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
-
-from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableType]
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
 
 from bridge.config import read_toml
 from bridge.faults import FAULTS, Fault
@@ -42,6 +50,13 @@ class Suite(NamedTuple):
             [f"{test.name} with {test.defect}" for test in self.tests if test.result != FAILED] if self.mutants else []
         )
 
+    @in_json
+    def unshown(self) -> list[str]:
+        """Expectations that no defect made fail, for a run with mutants: perhaps they cannot."""
+        rows = [(test.name, row) for test in self.tests for row in test.expectations] if self.mutants else []
+        fails = {(name, row.name) for name, row in rows if row.result == FAILED}
+        return [*dict.fromkeys(f"{name}: {row.name}" for name, row in rows if (name, row.name) not in fails)]
+
     @property
     def exit_status(self) -> int:
         """0: good; 1: a test failed, or a defect went unnoticed; 2: a test could not run; 14: something was not tested."""
@@ -53,7 +68,13 @@ class Suite(NamedTuple):
 
     def in_words(self) -> list[str]:
         """Lines for the operator: each test, then the counts."""
-        lines = [line for test in self.tests for line in test.in_words()]
+        lines: list[str] = []
+        alike = Counter(map(_error_of, self.tests))
+        for test in self.tests:
+            number = alike.pop(_error_of(test), 0)  # an error of all cases of a sweep is reported once
+            first, *others = test.in_words()
+            also = f" (as in {counted(number - 1, 'other case')})" if test.error and number > 1 else ""
+            lines += [f"{first}{also}", *others] if number or not test.error else []
         counts = ", ".join(f"{number} {result}" for result, number in self.counts.items() if number)
         if not self.mutants:
             lines.append(f"tests    {counted(len(self.tests), 'test')}: {counts}")
@@ -61,10 +82,16 @@ class Suite(NamedTuple):
             caught = len(self.tests) - len(self.survivors)
             lines.append(f"mutants  {caught} of {counted(len(self.tests), 'defect')} made a test fail")
             lines += [f"MISSED   {line}" for line in self.survivors]
+            lines += [f"unshown  {line}: no defect made it fail" for line in self.unshown]
             lines += [f"UNTESTED {name}: no [[must_fail]] is in the scenario" for name in self.without_mutants]
         if self.others:
             lines.append(f"skipped  {counted(self.others, '.toml file')} without [[expect]]")
         return lines
+
+
+def _error_of(test: Tested) -> tuple[str, str]:
+    """The file and the error of a test without the case and its value: `place = value: rule; remedy`."""
+    return test.file.partition(":")[0], re.sub(r" = .*?: ", ": ", test.error).replace(test.file, "")
 
 
 def cases_of(paths: Sequence[Path], settings: list[str], target: Target = NO_TARGET) -> tuple[list[TestCase], int]:
@@ -116,7 +143,7 @@ def mutants_of(cases: Sequence[TestCase]) -> tuple[list[TestCase], list[str]]:
     without: list[str] = []
     for case in cases:
         defects = load(str(case.file), case.settings, case.target).run.must_fail
-        mutants += [case._replace(mutant=number) for number in range(len(defects))]
+        mutants += [case._replace(mutant=defect) for defect in defects]
         without += [] if defects else [case.name]
     return mutants, without
 
@@ -146,5 +173,31 @@ def _each(cases: Sequence[TestCase], jobs: int, keep: Path | None) -> Iterator[T
     if jobs == 1:
         yield from (run_test(case, keep) for case in cases)
         return
-    parallel: Any = Parallel(n_jobs=jobs, return_as="generator")
-    yield from parallel(delayed(run_test)(case, keep) for case in cases)
+    with TemporaryDirectory(prefix="stickslip-") as folder:
+        context = multiprocessing.get_context("spawn")
+        pool = ProcessPoolExecutor(jobs, context, _prepare_worker, (folder,))
+        try:
+            yield from pool.map(partial(run_test, keep=keep), cases)
+        except BaseException as error:
+            for process in multiprocessing.active_children():  # a test that runs would else continue to its end
+                process.terminate()
+            if not isinstance(error, BrokenProcessPool):
+                raise
+            line = "a process of the tests was killed, perhaps as memory ran out"
+            raise Fault("PEER_DIED", f"{line}; find its test with --jobs 1") from None
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _prepare_worker(folder: str) -> None:
+    """Keep temporary files in a folder of the parent, leave Ctrl-C to the parent, and end after a SIGKILL of the parent."""
+    tempfile.tempdir = folder
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+
+    def follow() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=follow, daemon=True).start()

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,9 @@ from diagnosis.evidence.manifest_keys import FURTHER, STANDARD, VIBRATION, Colum
 
 Clipped = dict[str, tuple[float, float]]
 Note = Callable[[str, str, str], None]  # kind, column, text
+
+# Kinds of findings that a user has to correct before the answer is worth reading: the headline of a diagnosis names them.
+WRONG_UNIT, WRONG_SIGN = "wrong-unit", "sign"
 
 # Limits of this file: beyond a limit a finding is made or the run is refused. A stricter limit refuses good files; with a looser
 # limit a damaged file or a wrong unit counts as a gap of the rig.
@@ -102,7 +106,7 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
         if wrong and name in VIBRATION:
             raise Fault("BAD_EVIDENCE", f"{file}: {name}: {wrong}; set channels.{name}.scale")
         if wrong:
-            note("units", name, f"{wrong}; not used; else set channels.{name}.unit or scale")
+            note(WRONG_UNIT, name, f"{wrong}; not used; else set channels.{name}.unit or scale")
             del usable[name]
         elif seen.constant and not name.startswith("vibration") and name not in FURTHER:
             used = "; not used" if name in CHANNELS and name != "drive_position_m" else ""
@@ -125,7 +129,7 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
         and _pulls_back(usable, table, rig.drive_stiffness_N_per_m)
     ):
         text = "pulls against the drive's motion: a positive force pulls towards larger positions; not used; change the sign of"
-        note("sign", "drive_force_N", f"{text} channels.drive_force_N.scale")
+        note(WRONG_SIGN, "drive_force_N", f"{text} channels.drive_force_N.scale")
         del usable["drive_force_N"]
     _check_bending(usable, rig, note)
     return usable, clipped, findings
@@ -288,7 +292,7 @@ def _compare_velocity(columns: Columns, rig: RigTable, table: RunTable, note: No
     fastest_mps = moved_mps if stated_mps is None else abs(stated_mps)
     if fastest_mps > _FASTEST * rig.stribeck_velocity_mps:
         times = fastest_mps / rig.stribeck_velocity_mps
-        note("units", where, f"{fastest_mps:.3g} m/s, {times:.3g} times rig.stribeck_velocity_mps: is it in mm?")
+        note(WRONG_UNIT, where, f"{fastest_mps:.3g} m/s, {times:.3g} times rig.stribeck_velocity_mps: is it in mm?")
 
 
 def _way_m(t_s: Floats, position_m: Floats) -> float:
@@ -315,21 +319,32 @@ def _check_moves(columns: Columns, rig: RigTable, table: RunTable, note: Note) -
 
 
 def _check_bending(columns: Columns, rig: RigTable, note: Note) -> None:
-    """Delete a mass acceleration with the wrong sign; report a drive stiffness in another unit."""
+    """Delete a mass acceleration with the wrong sign; report a mass or a drive stiffness in another unit."""
     described = rig.drive_stiffness_N_per_m
-    apparent = apparent_stiffness_N_per_m(columns["t_s"], columns) if described else None
-    if not described or apparent is None:
+    even = _on_even_bins(columns["t_s"], columns) if described else None
+    if not described or even is None:
         return
-    if apparent < 0.0:
+    largest_N, largest_mps2 = (
+        float(np.abs(values[even.quiet]).max(initial=0.0)) for values in (even.force_N, even.accel_mps2)
+    )
+    apparent = _stiffness_N_per_m(even)
+    if apparent is not None and apparent < 0.0:
         text = "has the wrong sign: the mass seems to accelerate against the force; not used; change the sign of"
-        note("sign", "mass_accel_mps2", f"{text} channels.mass_accel_mps2.scale")
+        note(WRONG_SIGN, "mass_accel_mps2", f"{text} channels.mass_accel_mps2.scale")
         del columns["mass_accel_mps2"]
-    elif not 1.0 / _OTHER_UNIT_FACTOR < apparent / described < _OTHER_UNIT_FACTOR:
+    elif apparent is not None and not 1.0 / _OTHER_UNIT_FACTOR < apparent / described < _OTHER_UNIT_FACTOR:
         text = (
             f"with mass_accel_mps2 shows a drive stiffness of {apparent:.2g} N/m, "
             f"but rig.drive_stiffness_N_per_m = {described:g}: check the units of these three"
         )
-        note("units", "drive_force_N", text)
+        note(WRONG_UNIT, "drive_force_N", text)
+    elif rig.mass_kg * largest_mps2 > _OTHER_UNIT_FACTOR * largest_N > 0.0:
+        # Drive and friction together accelerate a mass by 2 F / m at most
+        text = (
+            f"= {rig.mass_kg:g} times the largest acceleration, {largest_mps2:.3g} m/s2, is "
+            f"{rig.mass_kg * largest_mps2:.3g} N, but the drive pulls with {largest_N:.3g} N at most: is the mass in g?"
+        )
+        note(WRONG_UNIT, "rig.mass_kg", text)
 
 
 def _pulls_back(columns: Columns, table: RunTable, stiffness_N_per_m: float) -> bool:
@@ -342,14 +357,16 @@ def _pulls_back(columns: Columns, table: RunTable, stiffness_N_per_m: float) -> 
     return work_J < -0.5 * float(np.abs(force_N).max()) ** 2 / stiffness_N_per_m
 
 
-def apparent_stiffness_N_per_m(t_s: Floats, columns: Mapping[str, Floats]) -> float | None:
-    """The drive's stiffness from force and mass acceleration; below 0 when one of the two has the wrong sign.
+class _EvenBins(NamedTuple):
+    """Force and mass acceleration, smoothed, in bins of `_BIN_S`, [bins]; `quiet` is true away from a vibration."""
 
-    A drive that moves evenly pulls with F = k (s - x). So F'' = -k x'' in every slip, for any friction and without a rig number.
+    force_N: Floats
+    accel_mps2: Floats
+    quiet: npt.NDArray[np.bool_]
 
-    None where the two do not correlate or one is missing. The stiffness neglects the motion of the drive, so it is good for a
-    sign and a unit only. `t_s` and every column are [samples].
-    """
+
+def _on_even_bins(t_s: Floats, columns: Mapping[str, Floats]) -> _EvenBins | None:
+    """None where a column is missing or the run is too short or slow for bins."""
     if not {"drive_force_N", "mass_accel_mps2"} <= columns.keys():
         return None
     number = np.floor((t_s - t_s[0]) / _BIN_S).astype(np.int64)
@@ -363,9 +380,18 @@ def apparent_stiffness_N_per_m(t_s: Floats, columns: Mapping[str, Floats]) -> fl
     vibrates = np.zeros(len(samples))
     if "vibration_amplitude_m" in columns:
         vibrates = np.bincount(number, np.abs(columns["vibration_amplitude_m"]) > 0.0)
-    quiet = maximum_filter1d(vibrates, _BESIDE_BINS)[1:-1] == 0.0
-    bent = np.diff(force_N, 2)[quiet] / _BIN_S**2
-    moved = accel_mps2[1:-1][quiet]
+    return _EvenBins(force_N, accel_mps2, maximum_filter1d(vibrates, _BESIDE_BINS) == 0.0)
+
+
+def _stiffness_N_per_m(even: _EvenBins) -> float | None:
+    """The drive's stiffness from force and mass acceleration; below 0 when one of the two has the wrong sign.
+
+    A drive that moves evenly pulls with F = k (s - x). So F'' = -k x'' in every slip, for any friction and without a rig number.
+    None where the two do not correlate. The stiffness neglects the motion of the drive, so it is good for a sign and a unit only.
+    """
+    quiet = even.quiet[1:-1]
+    bent = np.diff(even.force_N, 2)[quiet] / _BIN_S**2
+    moved = even.accel_mps2[1:-1][quiet]
     if len(moved) < _FEWEST_BINS or np.ptp(moved) == 0.0 or np.ptp(bent) == 0.0:
         return None
     if abs(float(np.corrcoef(bent, moved)[0, 1])) < _LEAST_CORRELATION:

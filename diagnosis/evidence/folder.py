@@ -17,7 +17,7 @@ from bridge.tables.readers import Table, read_table
 from bridge.units import counted
 from bridge.wire.channels import SENSOR_CHANNELS
 from diagnosis.evidence.assumed import WIDE
-from diagnosis.evidence.column_checks import checked
+from diagnosis.evidence.column_checks import WRONG_SIGN, checked
 from diagnosis.evidence.conversion import as_sliding, run_as_sliding, told, with_beside
 from diagnosis.evidence.foreign_vibration import foreign_vibrations
 from diagnosis.evidence.manifest import MANIFEST, Manifest, RigTable, RunTable, described
@@ -189,7 +189,7 @@ def _vibration(columns: Columns, t_s: Floats) -> Iterator[tuple[str, str, str]]:
     for name in given:
         if negative := int((columns[name] < 0.0).sum()):
             many = counted(negative, "sample is", "samples are")
-            yield "sign", name, f"{many} negative: must be positive, or 0 where the vibration is off; not used"
+            yield WRONG_SIGN, name, f"{many} negative: must be positive, or 0 where the vibration is off; not used"
     rate_Hz = (len(t_s) - 1) / float(t_s[-1] - t_s[0])
     if len(given) == 2 and columns["vibration_amplitude_m"].any() and rate_Hz < SHAKE_RATE_HZ:
         text = f"{rate_Hz:.4g} Hz, below {SHAKE_RATE_HZ:g} Hz: the strength of its vibration is not compared"

@@ -25,6 +25,7 @@ from bridge.units import counted, unit_of
 from bridge.wire.messages import sensor_block
 from bridge.wire.topics import SENSORS
 from diagnosis.evidence.assumed import with_assumed
+from diagnosis.evidence.column_checks import WRONG_SIGN
 from diagnosis.evidence.conversion import with_beside
 from diagnosis.evidence.folder import examine
 from diagnosis.evidence.manifest import MANIFEST, DriveVelocity, RigTable, RunTable, manifest_text, read_manifest
@@ -144,7 +145,9 @@ def _written(path: Path, columns: Columns, wanted: ImportMap, map_name: str, out
 
 def _with_sign(findings: list[Finding], file: str, columns: Columns, wanted: ImportMap) -> list[Finding]:
     """The findings, with a line to copy where the force has the wrong sign."""
-    kept = [finding for finding in findings if finding.kind != "sign" or not finding.where.endswith("drive_force_N")]
+    kept = [
+        finding for finding in findings if finding.kind != WRONG_SIGN or not finding.where.endswith("drive_force_N")
+    ]
     if len(kept) == len(findings) and not _pulls_back(columns):
         return findings
     channel = wanted.channels["drive_force_N"]
@@ -155,7 +158,7 @@ def _with_sign(findings: list[Finding], file: str, columns: Columns, wanted: Imp
         f"drive_force_N = {{ column = {json.dumps(channel.column, ensure_ascii=False)}, scale = {-scale!r}{offset} }}"
     )
     text = "pulls against the drive's motion: its sign is wrong, and a diagnosis leaves it out; under [channels] write"
-    return [*kept, Finding("sign", f"{file}: drive_force_N", f"{text} {line}")]
+    return [*kept, Finding(WRONG_SIGN, f"{file}: drive_force_N", f"{text} {line}")]
 
 
 def _pulls_back(columns: Columns) -> bool:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from bridge.arrays import Floats
-from bridge.config import Strict
+from bridge.config import Strict, unknown_key
 from bridge.formula import Formula
 from bridge.tables.kinds import Kind
 from bridge.tables.unit_words import known_unit
@@ -85,7 +85,7 @@ def check_channel_names(channels: dict[str, Any]) -> None:
     """Raise ValueError when a channel is not a standard column."""
     for name in channels:
         if name not in STANDARD:
-            raise ValueError(f"channels.{name}: unknown key; known here: {', '.join(STANDARD)}")
+            raise ValueError(f"channels.{name}: {unknown_key(name, list(STANDARD))}")
 
 
 def with_numbers(channels: Mapping[str, ChannelMap], numbers: Mapping[str, float]) -> dict[str, ChannelMap]:

@@ -14,7 +14,7 @@ from diagnosis.look.motion import StickSlip, best_way
 from diagnosis.look.numbers import Number, jackknifed, mean_of, median_of
 from diagnosis.look.slip_shape import Shape, falls_of, hidden_by_damping_N, shape_of
 from diagnosis.look.slips import OneWayPart, RecordSlips, find_slips, parts_of
-from diagnosis.look.speeds import AtSpeed, over_dwell, over_speed
+from diagnosis.look.speeds import AtSpeed, climbs_vary, over_dwell, over_speed
 from diagnosis.look.sticks import Cycle, climbs_of, cycles_of
 
 # name of a number of the force -> name of the number of a friction coefficient
@@ -27,6 +27,8 @@ _MU = {
     "dwell_N_per_decade": "mu_dwell_per_decade",
 }
 
+# numbers that belong to one speed of the drive; their mean over several speeds belongs to none
+_OF_ONE_SPEED = ("period_s", "frequency_Hz", "dwell_s", "slope_N_per_s", "mu_slope_per_s")
 _OF_SPRING = ("series_N_per_m", "stiffness_N_per_m", "mass_kg")  # numbers that only a force gives
 
 # unit of a linear rig -> unit of a rotary rig
@@ -141,7 +143,7 @@ def look(
             for name, key in (("s", "static"), ("k", "kinetic"))
             if f"{key}_force_N" in numbers
         }
-    mean_N = float(np.average([part.force_N.mean() for part in parts], weights=[len(part.t_s) for part in parts]))
+    mean_N = _mean_N(parts, slips_of_parts)
     if known.coefficient or known.unit:
         numbers = {
             (_MU.get(name, name) if known.coefficient else name): number._replace(
@@ -159,6 +161,10 @@ def look(
         numbers = {
             name: number._replace(unit=_TURNING.get(number.unit, number.unit)) for name, number in numbers.items()
         }
+    at_speeds = over_speed(parts, cycles if sticks else [], known.force_unit)
+    if at_speeds or climbs_vary(cycles):
+        gone = _OF_ONE_SPEED if at_speeds else (*_OF_ONE_SPEED, *_OF_SPRING)
+        numbers = {name: number for name, number in numbers.items() if name not in gone}
     if known.load_N:
         numbers["mu_mean"] = Number(mean_N / known.load_N, math.nan, math.nan, "1")
     return LookResult(
@@ -168,12 +174,23 @@ def look(
         cycles,
         sticks,
         numbers,
-        over_speed(parts, cycles if sticks else [], known.force_unit),
+        at_speeds,
         parts,
         known,
         mean_N,
         answer,
     )
+
+
+def _mean_N(parts: list[OneWayPart], slips_of_parts: list[RecordSlips]) -> float:
+    """Mean force while the slide slides or slips: over whole periods, else from the first time the force reaches its median."""
+    tops_of = {id(slips.part): slips.tops for slips in slips_of_parts}
+    moving: list[Floats] = []
+    for part in parts:
+        tops = tops_of.get(id(part), ())
+        first = tops[0] if len(tops) > 1 else np.argmax(part.force_N >= np.median(part.force_N))
+        moving.append(part.force_N[first : tops[-1] if len(tops) > 1 else None])
+    return float(np.concatenate(moving).mean())
 
 
 def _periods(slips_of_parts: list[RecordSlips]) -> Floats:

@@ -33,6 +33,7 @@ class AtSpeed(NamedTuple):
     times: int  # number of slips, or of windows without slips
     mean_N: Number
     breakaway_N: Number | None  # None: the slide moves evenly
+    period_s: Number | None  # time from breakaway to breakaway
     sliding: bool
     JSON_HIDDEN = ("sliding",)
 
@@ -41,13 +42,13 @@ def over_speed(parts: list[OneWayPart], cycles: list[Cycle], unit: str = "N") ->
     """Friction at each speed, lowest speed first; empty where the speed is not known or does not vary."""
     speeds = np.array([cycle.speed_mps for cycle in cycles])
     means = np.array([cycle.mean_force_N for cycle in cycles])
-    tops = np.array([cycle.breakaway_force_N for cycle in cycles])
+    tops = np.array([(cycle.breakaway_force_N, cycle.period_s) for cycle in cycles]).reshape(-1, 2)
     slipping = np.ones(len(cycles), np.bool_)
     for part in parts:
         in_part = [cycle for cycle in cycles if part.t_s[0] <= cycle.breakaway_t_s <= part.t_s[-1]]
         more_speed, more_mean = _windows(part, in_part)
         speeds, means = np.concatenate([speeds, more_speed]), np.concatenate([means, more_mean])
-        tops = np.concatenate([tops, np.full(len(more_speed), np.nan)])
+        tops = np.concatenate([tops, np.full((len(more_speed), 2), np.nan)])
         slipping = np.concatenate([slipping, np.zeros(len(more_speed), np.bool_)])
     good = np.isfinite(speeds) & np.isfinite(means) & (speeds > 0.0)
     speeds, means, tops, slipping = speeds[good], means[good], tops[good], slipping[good]
@@ -60,10 +61,10 @@ def over_speed(parts: list[OneWayPart], cycles: list[Cycle], unit: str = "N") ->
         mean = mean_of(means[own_bin], unit)
         if own_bin.sum() < _FEWEST_IN_BIN or mean is None:
             continue
-        top = mean_of(tops[own_bin & slipping], unit)
-        result.append(
-            AtSpeed(float(np.exp(np.log(speeds[own_bin]).mean())), int(own_bin.sum()), mean, top, top is None)
-        )
+        slips = tops[own_bin & slipping]
+        top, period = mean_of(slips[:, 0], unit), mean_of(slips[:, 1], "s")
+        speed_mps = float(np.exp(np.log(speeds[own_bin]).mean()))
+        result.append(AtSpeed(speed_mps, int(own_bin.sum()), mean, top, period, top is None))
     return result if len(result) > 1 else []
 
 
@@ -138,9 +139,14 @@ def unsteady(cycles: list[Cycle], unit: str) -> list[str]:
 
     """
     tops = [cycle for cycle in cycles if np.isfinite(cycle.restick_force_N)]
-    sticks = [cycle for cycle in cycles if np.isfinite(cycle.slope_N_per_s)]
     drifts = _drift(tops, "" if unit == "1" else unit) if len(tops) >= _FEWEST_FOR_DRIFT else []
-    return drifts + (_speeds(sticks) if len(sticks) >= _FEWEST_FOR_DRIFT else [])
+    if (climbs := climbs_vary(cycles)) is None:
+        return drifts
+    return [
+        *drifts,
+        f"no single speed: sticks climb by {climbs[0]:.3g} to {climbs[1]:.3g} a second, so period, "
+        "stiffness and mass would be mixtures; give the drive's position, or look at a part with one speed",
+    ]
 
 
 def _drift(tops: list[Cycle], unit: str) -> list[str]:
@@ -158,12 +164,12 @@ def _drift(tops: list[Cycle], unit: str) -> list[str]:
     ]
 
 
-def _speeds(sticks: list[Cycle]) -> list[str]:
+def climbs_vary(cycles: list[Cycle]) -> tuple[float, float] | None:
+    """Slowest and fastest climb of the sticks (of eight in ten) in a record of several speeds where at most one is known."""
+    sticks = [cycle for cycle in cycles if np.isfinite(cycle.slope_N_per_s)]
+    if len(sticks) < _FEWEST_FOR_DRIFT:
+        return None
     speeds = [cycle.speed_mps for cycle in sticks if np.isfinite(cycle.speed_mps)]
     low, high = np.quantile([cycle.slope_N_per_s for cycle in sticks], [0.1, 0.9])
-    if (speeds and max(speeds) > VARIES * min(speeds)) or not 0.0 < VARIES * low < high:
-        return []
-    return [
-        f"no single speed: sticks climb by {low:.3g} to {high:.3g} a second, so stiffness and mass hold for none of them; give "
-        "the drive's position, or look at a part with one speed"
-    ]
+    one_speed = (speeds and max(speeds) > VARIES * min(speeds)) or not 0.0 < VARIES * low < high
+    return None if one_speed else (float(low), float(high))

@@ -28,6 +28,7 @@ class Cycle(NamedTuple):
     breakaway_force_N: float
     restick_t_s: float = math.nan
     restick_force_N: float = math.nan
+    period_s: float = math.nan  # time since the breakaway before
     dwell_s: float = math.nan  # duration of the stick before the slip
     slope_N_per_s: float = math.nan  # slope of the force in that stick
     loading_N_per_s: float = math.nan  # largest slope in the last half of the stick, without halts of the drive
@@ -57,6 +58,7 @@ def cycles_of(slips: RecordSlips, speed_mps: float | None, limit: float = 1.0) -
         if i:
             began = bottoms[i - 1]
             known = _stick(part, began, top, limit * float(top_N[i]), speed_mps, slips.width)
+            known["period_s"] = float(part.t_s[top] - part.t_s[tops[i - 1]])
             known["dwell_s"] = float(part.t_s[top] - part.t_s[began])
             known["loading_N_per_s"] = _loading(part, began, top, slips.width)
         if i < len(bottoms):

@@ -18,7 +18,7 @@ TITLES = {
     "restick_force_N": ("F_min", "force at re-stick"),
     "mu_s": ("mu_s", "static friction coefficient"),
     "mu_k": ("mu_k", "kinetic friction coefficient"),
-    "mu_mean": ("mu", "mean friction coefficient of the record"),
+    "mu_mean": ("mu", "mean friction coefficient while the slide moves, slips included"),
     "mu_min": ("mu_min", "coefficient at re-stick"),
     "mu_swing": ("swing", "fall of the coefficient in a slip"),
     "mu_slope_per_s": ("climb", "rise of the coefficient in a stick"),
@@ -107,10 +107,14 @@ def sentences(seen: LookResult) -> list[str]:
     ]
     lines += [f"{'':<10} {text}" for text in limits_of_look(seen)]
     for at_speed in seen.at_speeds:
-        top = "" if at_speed.breakaway_N is None else f", breakaway {with_interval(at_speed.breakaway_N)}"
-        lines.append(
-            f"{'at ' + f'{1e3 * at_speed.speed_mps:.3g} m{seen.known.speed_unit}':<14} mean {with_interval(at_speed.mean_N)}{top}"
+        text = (
+            f"{f'at {1e3 * at_speed.speed_mps:.3g} m{seen.known.speed_unit}':<14} mean {with_interval(at_speed.mean_N)}"
         )
+        if at_speed.breakaway_N is not None and at_speed.period_s is not None:
+            text += (
+                f", breakaway {with_interval(at_speed.breakaway_N)}, a slip every {with_interval(at_speed.period_s)}"
+            )
+        lines.append(text)
     return lines
 
 

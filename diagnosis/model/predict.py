@@ -46,7 +46,7 @@ def predict(
         force_driven: whether a force drives the rig; the model then follows the measured motion of `commands`.
         commands: commands of the run.
         start: state at the first block.
-        entries: states at the start of the segments; with a force drive there are none.
+        entries: states at the start of the segments; a force drive has none.
 
     """
     (signals,) = predict_many([config], force_driven, commands, [start], [entries])

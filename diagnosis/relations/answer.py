@@ -1,4 +1,4 @@
-"""All relations of an evidence: what each leaves, which causes it has, what nothing explains."""
+"""All relations of an evidence: residual, causes and unexplained patterns of each."""
 
 import math
 from typing import NamedTuple
@@ -29,12 +29,12 @@ from diagnosis.relations.search import NOTHING, Found, Ranking, chosen_of, ranke
 from diagnosis.relations.shares import Shares, shares_of
 from diagnosis.relations.spring import spring_relation
 
-_FREE = 30.0  # spread of a pattern's coefficients, in rms of what is left: as good as free
-_SAME_SIZE = 0.1  # relative scatter of a size between runs that a formula a little beside the rig's makes
+_FREE = 30.0  # spread of a pattern's coefficients, in rms of the residual: as good as free
+_SAME_SIZE = 0.1  # relative scatter of a size between runs that a formula close to the rig's makes
 
 
 class Trace(NamedTuple):
-    """One run of a relation in time, for a picture: what is left without and with the chosen causes, [rows]."""
+    """One run of a relation in time, for a picture: the residual without and with the chosen causes, [rows]."""
 
     run: int
     t_s: Floats
@@ -57,7 +57,7 @@ class Answered(NamedTuple):
     tried: int  # columns of effects
     ranking: Ranking
     patterns: tuple[Pattern, ...]
-    bursts: float  # mean over median of the local variance of what is left
+    bursts: float  # mean over median of the local variance of the residual
     shares: Shares | None
     trace: Trace
 
@@ -100,7 +100,7 @@ def answered_of(relation: Relation, fitted: list[int]) -> Answered:
     chosen, noise = NOTHING, noise_of(products, fitted, *model_columns(products, ()))
     ranking, lost = Ranking((), ()), ()
     if relation.effects:
-        # the search has the noise of the freest model; what it chose is then judged by the noise that the choice leaves
+        # the search has the noise of the freest model; its choice is then judged by the noise that the choice leaves
         cost = math.log(len(relation.effects) + 1)
         chosen = chosen_of(ranked(reduced(products, fitted, free, relation.effects)), cost)
         noise = noise_of(products, fitted, *model_columns(products, chosen.terms))

@@ -1,4 +1,4 @@
-"""The base relation: a base that rests shows no acceleration when the slide breaks away and comes to rest."""
+"""The base relation: a base that rests shows no acceleration when the slide breaks away and stops."""
 
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.feature import scales_of

@@ -1,4 +1,4 @@
-"""What the relations decide: causes that they name, effects that no fit needs to try, and what the library does not explain."""
+"""Decision of the relations: causes that they name, effects that no fit needs to try, patterns outside the library."""
 
 import math
 from typing import NamedTuple
@@ -10,10 +10,10 @@ from diagnosis.relations.relation import OUTSIDE
 # Log evidence from which a relation names a cause or shows a pattern, and within which another cause is tried by a fit as well.
 # With 8 none of 138 cases with known answers shows a pattern more; a cause with less is named by the judge, from all rows.
 _SURE = 25.0
-# Size of a pattern, in noise and in the size of what the chosen causes take, from which it counts: a formula that is not quite
+# Size of a pattern, in noise and in the size of the part of the chosen causes, from which it counts: a formula that is not quite
 # the rig's leaves up to 0.11. Smaller: such formulas are outside. Larger: at 0.8 a yawing guide is not.
 _MUCH = 0.5
-_BURSTS = 3.0  # mean over median of the local variance from which what is left comes in bursts: 16.8 with drop-outs, 2.2 without
+_BURSTS = 3.0  # mean over median of the local variance from which the residual comes in bursts: 16.8 with drop-outs, 2.2 without
 _BURSTING = ("spring", "motion")  # relations whose rows are short enough for that
 _SAME_SIZE = 0.01  # chance below which sizes that differ between runs take a name back
 # Share of the static friction that an uneven drive must pull with: breakaways on the smoothest surfaces scatter twenty times as
@@ -21,13 +21,13 @@ _SAME_SIZE = 0.01  # chance below which sizes that differ between runs take a na
 _MATTERS = 1e-4
 _LEVELS = frozenset({"drive-stiffness"})  # numbers that the refitted rig follows, so that they close nothing further
 # Share of a large effect's size to which a relation must know the size of an effect that no fit tries. Larger: an effect that the
-# relation can hardly see is lost. Smaller: time.
+# relation barely shows is lost. Smaller: time.
 _KNOWN_SIZE = 0.1
 # Relations whose patterns do not count: any function of the drive's place is an uneven drive, and a base that shows slips in
 # another way than by a mode is an ordinary mount.
 _COARSE = frozenset({"drive", "base"})
-# Effects that act in one relation alone, and where it is finer than any fit. What an exciter delivers is known at a few
-# frequencies only, and a base shows slips without a mode of its own: their effects stay with the fits.
+# Effects that act in one relation alone, and where it is finer than any fit. The vibration of an exciter is known at a few
+# frequencies only, and a base without a mode shows slips: their effects stay with the fits.
 SHOWN_BY = {
     "drive-damping": "spring",
     "force-sensor-delay": "spring",
@@ -48,7 +48,7 @@ class Decided(NamedTuple):
 
 
 class Outside(NamedTuple):
-    """What a relation shows and nothing in the library explains."""
+    """A pattern of a relation that nothing in the library explains."""
 
     relation: str
     what: str
@@ -59,18 +59,18 @@ class Outside(NamedTuple):
 
 
 class Decision(NamedTuple):
-    """What all relations together say; the largest evidence first."""
+    """Findings of all relations together; the largest evidence first."""
 
     decided: tuple[Decided, ...]
     outside: tuple[Outside, ...]
 
 
 def decision_of(relations: Relations, rig: RigTable) -> Decision:
-    """The names and the unexplained patterns of all relations; `rig` says how small is too small to matter."""
+    """The names and the unexplained patterns of all relations; `rig` gives the size that is too small to matter."""
     pull_N_per_m = rig.drive_stiffness_N_per_m or 0.0
     decided: list[Decided] = []
     outside: list[Outside] = []
-    # a base with a mode of its own changes what an exciter delivers, also where the mode's formula does not fit every run
+    # a base with its own mode changes the vibration of an exciter, also where the mode's formula does not fit every run
     swings = any(answered.name == "base" and answered.chosen.evidence > _SURE for answered in relations.answered)
     for answered in relations.answered:
         idle = answered.name == "drive" and pull_N_per_m * answered.refitted < _MATTERS * rig.static_force_N
@@ -126,7 +126,7 @@ def _outside_cause(answered: Answered, cause: Decided) -> Outside:
 
 
 def _taken(answered: Answered) -> float:
-    """Size of what the chosen causes take."""
+    """Size of the part that the chosen causes explain."""
     return math.sqrt(max(answered.refitted**2 - answered.left**2, 0.0))
 
 

@@ -24,7 +24,7 @@ from diagnosis.relations.relation import (
 )
 from diagnosis.relations.shapes import hats, knots_of
 
-# Waves up to half a line beside the strongest that become columns: far above the noise, a wave shows its period to a part of a
+# Waves up to half a line next to the strongest that become columns: far above the noise, a wave shows its period to a part of a
 # line. With 1 a period of 1.033 mm is read as 1.04 mm, which does not predict the held-out run. With 17 relations take 1.3 times
 # as long.
 _NEARBY = 7
@@ -90,7 +90,7 @@ def _even(run: Prepared) -> tuple[Piece, ...]:
 
 
 def _without_parabola(values: Floats, pieces: tuple[Piece, ...]) -> Floats:
-    """`values` [rows] or [rows, columns] less a parabola in each piece: speed as it was, and the bow of the sensor."""
+    """`values` [rows] or [rows, columns] less a parabola in each piece: the initial speed, and the bow of the sensor."""
     result = np.zeros_like(values)
     for first, last in pieces:
         basis = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, last - first), 2)

@@ -104,7 +104,7 @@ def delivered_log(run: Prepared) -> Floats:
     frequency_Hz = run.commands.frequency_Hz
     seen = 1.0 / (1.0 + _ROLLED_OFF[0] * (frequency_Hz / 1e4) ** 2)
     commanded = row_means(0.5 * ((2.0 * np.pi * frequency_Hz) ** 2 * run.commands.amplitude_m) ** 2 * seen)
-    whole = without_vibration(run.signals, averaged(frequency_Hz))  # a block of 4.5 periods has a mean of its own
+    whole = without_vibration(run.signals, averaged(frequency_Hz))  # a block of 4.5 periods has another mean
     delivered = row_means(whole["base_shake_mps2"] ** 2) - still_mps2**2
     on = (commanded > 0.0) & (delivered > 0.0)
     result = np.zeros(len(commanded))

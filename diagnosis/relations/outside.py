@@ -1,4 +1,4 @@
-"""What no column of the library explains: free functions of one variable, with a variance by marginal likelihood, and bursts."""
+"""Patterns outside the library: free functions of one variable, with a variance by marginal likelihood, and bursts."""
 
 import math
 from typing import NamedTuple
@@ -14,7 +14,7 @@ _SPREADS = np.geomspace(1e-3, 1e2, 26)  # of a free function, relative to the no
 
 
 class Pattern(NamedTuple):
-    """A free function that the relation shows beside what was chosen."""
+    """A free function that the relation shows in addition to the chosen causes."""
 
     what: str  # the variable
     evidence: float  # natural logarithm, against the chosen causes alone
@@ -22,7 +22,7 @@ class Pattern(NamedTuple):
 
 
 def patterns_of(products: Products, runs: list[int], noise: BandNoise, chosen: Found) -> tuple[Pattern, ...]:
-    """Every pattern of the relation beside the chosen causes, fitted to `runs`; the largest evidence first."""
+    """Every pattern of the relation in addition to the chosen causes, fitted to `runs`; the largest evidence first."""
     whole, plain = weighted(products, runs, noise), products.values[runs].sum(axis=(0, 1))
     rows = float(products.lengths[runs].sum())
     model, spreads = model_columns(products, chosen.terms)
@@ -66,7 +66,7 @@ def _likeliest(free: Floats) -> tuple[float, Floats]:
 
 
 def bursts_of(products: Products, runs: list[int], noise: BandNoise, sizes: Floats) -> float:
-    """Mean over median of the local variance of what `sizes` leave: 1 for even noise, more where a few windows hold the rest."""
+    """Mean over median of the local variance of the residual of `sizes`: 1 for even noise, more if a few windows hold it."""
     relation = products.relation
     length = max(round(_WINDOW_S / relation.row_s), 2)
     left, weights = np.append(-sizes, 1.0)[:, None], 1.0 / np.sqrt(noise.variance)

@@ -24,7 +24,7 @@ _FEWEST = 6.0  # degrees of freedom that a band needs; below, it has the varianc
 
 
 class Products(NamedTuple):
-    """Inner products; the last column is what the relation leaves of the rig as described."""
+    """Inner products; the last column is the residual of the rig as described."""
 
     relation: Relation
     terms: tuple[Term, ...]  # nuisances, effects, patterns
@@ -62,7 +62,7 @@ def products_of(relation: Relation) -> Products:
 
 
 def places_of(terms: Sequence[Term]) -> tuple[slice, ...]:
-    """The columns of each term, where the terms stand one after the other."""
+    """The columns of each term, where the terms follow one another."""
     edges = np.cumsum([0, *(term.values[0].shape[1] for term in terms)]).tolist()
     return tuple(slice(first, last) for first, last in pairwise(edges))
 
@@ -108,7 +108,7 @@ def band_of_rows(relation: Relation, length: int, edges: Floats) -> np.ndarray:
 
 
 def turned_piece(relation: Relation, terms: tuple[Term, ...], run: int, piece: tuple[int, int], used: int) -> Floats:
-    """The lowest `used` frequencies of a piece of all columns, [used, columns]; the last column is what is left."""
+    """The lowest `used` frequencies of a piece of all columns, [used, columns]; the last column is the residual."""
     rows = slice(*piece)
     columns = np.concatenate([*(term.values[run][rows].T for term in terms), relation.left[run][None, rows]])
     return np.asarray(dct(columns, axis=1, norm="ortho", overwrite_x=True))[:, :used].T

@@ -1,4 +1,4 @@
-"""One relation between channels as a regression: what it leaves of the rig as described, and the columns that may explain it."""
+"""One relation between channels as a regression: its residual for the rig as described, and the columns that may explain it."""
 
 import math
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from diagnosis.gap.prepare import Prepared
 Piece = tuple[int, int]  # rows [first, last) of a run, without a hole
 # Causes that no effect of the library makes.
 OUTSIDE = frozenset({"acceleration-clock", "logger-clock"})
-# Rows of a piece. Shorter: its lowest frequencies are those of slips, and columns pass for noise. Longer: pieces are lost.
+# Rows of a piece. Shorter: slips have its lowest frequencies, and columns pass for noise. Longer: pieces are lost.
 _SHORTEST = 300
 _SPARE = 1.5  # by which the rows of a thinned relation still resolve more than its highest frequency
 _WAVES = 4  # half waves of a slow drift over a run
@@ -25,7 +25,7 @@ POSITION_HZ = 60.0  # content of a position, or of its second derivative, that i
 # much or as little changes a log evidence by 2.3.
 LARGE = 0.1
 SKEW = 5e-4  # between two recorders of which one is timed by software
-# Time constants of what settles, in lengths of the longest run: steps of 2.5, which a spread of sizes bridges
+# Time constants of settling processes, in lengths of the longest run: steps of 2.5, which a spread of sizes bridges
 SETTLES = (1.0, 0.4, 0.15, 0.06)
 
 
@@ -35,13 +35,13 @@ class Term(NamedTuple):
     Arrays of `values` are [rows of the run, columns]: the relation's unit for each unit of the coefficients.
     """
 
-    cause: str  # an effect of the library, one of OUTSIDE, or what a nuisance or pattern is
+    cause: str  # an effect of the library, one of OUTSIDE, or the meaning of a nuisance or pattern
     form: str
     values: tuple[Floats, ...]
     spread: float  # standard deviation of the coefficients before the data
     sign: int = 0  # of the coefficient where the mechanism has one only
     size: str = ""  # name with unit of the coefficient, as a parameter of an effect has
-    of_run: bool = False  # whether each run has its own coefficients, which no other run tells
+    of_run: bool = False  # whether each run has its own coefficients, which no other run shows
 
 
 class Relation(NamedTuple):
@@ -51,13 +51,13 @@ class Relation(NamedTuple):
     unit: str
     row_s: float  # seconds from row to row
     highest_Hz: float  # of the content that is compared
-    left: tuple[Floats, ...]  # what the rig as described leaves
+    left: tuple[Floats, ...]  # residual of the rig as described
     pieces: tuple[tuple[Piece, ...], ...]
     nuisances: tuple[Term, ...]  # sensors and tolerances
     effects: tuple[Term, ...]
-    patterns: tuple[Term, ...]  # free functions of one variable, for what no effect explains
+    patterns: tuple[Term, ...]  # free functions of one variable, for the part that no effect explains
     resolution: float  # least noise, one standard deviation a row: rounding of a channel is not below it
-    keeps_mean: bool = False  # whether the mean of a piece is compared, not only what varies in it
+    keeps_mean: bool = False  # whether the mean of a piece is compared, not only the variation in it
 
 
 class Missing(NamedTuple):

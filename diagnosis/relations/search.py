@@ -15,7 +15,7 @@ _TRIED_TOGETHER = 40  # terms of which all pairs are tried
 class Reduced(NamedTuple):
     """Products of the terms that are searched, freed of the nuisances and scaled by the spreads of their coefficients.
 
-    A last column of zeros stands for "no column", so that sets of different numbers of columns are one array.
+    A last column of zeros means "no column", so that sets of different numbers of columns are one array.
     """
 
     terms: tuple[Term, ...]

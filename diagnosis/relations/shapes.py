@@ -1,4 +1,4 @@
-"""Shapes of columns: what a channel looks like behind a mode, or as a free function of a variable."""
+"""Shapes of columns: a channel behind a mode, or as a free function of a variable."""
 
 import math
 from collections.abc import Sequence
@@ -42,7 +42,7 @@ def near_slips(position_m: Floats) -> Floats:
 def calmed(values: Floats, near: Floats) -> Floats:
     """`values` [blocks] with the noise of a channel taken off where nothing slips, `near` from `near_slips`.
 
-    A column holds the noise of its channel, and what a relation leaves holds the same noise. Without this the two would be
+    A column holds the noise of its channel, and the residual of a relation holds the same noise. Without this the two would be
     correlated, and causes that filter a channel would be found in noise alone.
     """
     quick, slow = (np.asarray(savgol_filter(values, *window)) for window in (_QUICK, _SLOW))
@@ -87,7 +87,7 @@ def hats(values: Floats, knots: Floats) -> Floats:
 
 
 def knots_of(values: Floats, count: int) -> Floats:
-    """At most `count` knots, each with as much of `values` between it and the next; two knots where they hardly differ."""
+    """At most `count` knots, each with as much of `values` between it and the next; two knots where they are nearly equal."""
     knots = np.unique(np.quantile(values, np.linspace(0.0, 1.0, count)))
     least = 1e-9 * max(float(np.abs(values).max()), 1e-30)
     knots = knots[np.concatenate(([True], np.diff(knots) > least))]

@@ -1,4 +1,4 @@
-"""Shares of what a relation shows on the held-out runs, from fits to the others, with intervals and what chance would show."""
+"""Shares of a relation's residual on the held-out runs, from fits to the others, with intervals and shares by chance."""
 
 import math
 from typing import NamedTuple
@@ -68,7 +68,7 @@ def interval_90(parts: Floats, squares: Floats) -> tuple[float, float]:
 
 
 def _blocks(relation: Relation, terms: tuple[Term, ...], runs: list[int]) -> Floats:
-    """Inner products of the columns and what is left, for each block of 0.5 s, [blocks, columns + 1, columns + 1]."""
+    """Inner products of the columns and the residual, for each block of 0.5 s, [blocks, columns + 1, columns + 1]."""
     length = max(round(_BLOCK_S / relation.row_s), 2)
     mask = np.concatenate([np.full(term.values[0].shape[1], term.of_run) for term in terms] + [np.zeros(1, np.bool_)])
     blocks: list[Floats] = []

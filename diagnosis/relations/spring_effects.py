@@ -1,4 +1,4 @@
-"""The columns of the spring relation: what each effect of spring, clamp, frame and force sensor adds to the force."""
+"""The columns of the spring relation: the force that each effect of spring, clamp, frame and force sensor adds."""
 
 import math
 from collections.abc import Sequence
@@ -81,7 +81,7 @@ def _bent(pull: Sequence[Floats], most_N: float) -> list[Term]:
 
 
 def _drifting(runs: Sequence[Prepared], most_N: float) -> list[Term]:
-    """A zero of the force sensor that moves, anew in each run or on and on. The coefficient is in N."""
+    """A zero of the force sensor that moves, in each run again or steadily. The coefficient is in N."""
     times_s = [(np.arange(len(run.commands.drive)) + 0.5) * BLOCK_S for run in runs]
     whole = [t + run.before_s for t, run in zip(times_s, runs, strict=True)]
     total_s = max(float(t[-1]) for t in whole)

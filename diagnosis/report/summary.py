@@ -15,6 +15,7 @@ from diagnosis.report.words import (
     headline,
     latent_answer,
     remainder_in_words,
+    to_correct,
     wrong_number_in_words,
 )
 from diagnosis.result import Diagnosis
@@ -96,6 +97,9 @@ def _held_out(diagnosis: Diagnosis) -> Iterator[str]:
 def _others(diagnosis: Diagnosis) -> Iterator[str]:
     """Everything else that the runs show."""
     gap = diagnosis.gap
+    yield from dict.fromkeys(
+        f"{finding.where.partition(': ')[2]}: {finding.text}" for finding in to_correct(diagnosis.findings)
+    )
     if diagnosis.verdict in ("partly", "unexplained"):
         yield from [most] if (most := latent_answer(diagnosis)) else []
     if diagnosis.remainder is not None:

@@ -1,9 +1,12 @@
 """A diagnosis in words: verdicts, relations, latent friction, numbers with their units, the meaning of each effect."""
 
 import math
+from collections.abc import Iterable
 from typing import Final
 
+from bridge.log.finding import Finding
 from bridge.units import decimals_of, fixed_digits, interval, name_and_unit, percent, prefixed, quantity
+from diagnosis.evidence.column_checks import WRONG_SIGN, WRONG_UNIT
 from diagnosis.hypotheses.catalogue import CATALOGUE
 from diagnosis.latent.answer import MOST
 from diagnosis.latent.causes import NOISE, SCATTER
@@ -29,8 +32,15 @@ SLOW, SLOWLY = "slow", "varies slowly: these runs cannot separate place from tim
 
 
 def headline(diagnosis: Diagnosis) -> str:
-    """The verdict and the answer in one line."""
-    return f"{diagnosis.verdict}: {answer(diagnosis)}"
+    """The verdict and the answer in one line; a wrong unit or sign comes first, because the answer is then worth little."""
+    wrong = dict.fromkeys(finding.where.partition(": ")[2] for finding in to_correct(diagnosis.findings))
+    doubt = f"doubtful, first correct the unit or sign of {', '.join(wrong)}: " if wrong else ""
+    return f"{doubt}{diagnosis.verdict}: {answer(diagnosis)}"
+
+
+def to_correct(findings: Iterable[Finding]) -> list[Finding]:
+    """Findings about a unit or a sign that only the operator can correct."""
+    return [finding for finding in findings if finding.kind in (WRONG_UNIT, WRONG_SIGN)]
 
 
 def answer(diagnosis: Diagnosis) -> str:

@@ -145,7 +145,7 @@ class BadDevice:
             return [] if turn == 0 else [self._held.pop(), self._held.pop()]
         if fault == "late":
             self._held.append(frame)
-            return [] if turn < 25 else [self._held.pop(0) for _ in range(len(self._held))]
+            return [] if turn < 30 else [self._held.pop(0) for _ in range(len(self._held))]
         return [frame]
 
     def _take_orders(self) -> None:

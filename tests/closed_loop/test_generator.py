@@ -5,12 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridge.config import validate
-from bridge.guard.states import ARM
-from bridge.rig.real import open_node
 from bridge.wire import stickslip_pb2 as wire
-from cockpit.run.device_run import DeviceRun
-from controller.node import ControllerNode
+from tests.closed_loop.in_box import run_in_box
 from tests.system.test_rig import rows, separate
 from tests.unit.bridge.rig.boxes import boxed, table
 
@@ -28,31 +24,14 @@ def test_the_loop_holds_behind_a_generator_that_takes_30_ms_a_line(tmp_path: Pat
         converter = {"sample_rate_Hz": 10_000.0, "samples_per_block": 20}
         device = {"address": f"127.0.0.1:{port}", "waits": True}
         rig = table(device=device, exciter=exciter | {"frequency_max_Hz": 4000.0}, converter=converter)
-        run = validate(DeviceRun, {"name": "box", "rig": rig}, "box")
-        controller, node = ControllerNode(run.controller), open_node(run.rig, tmp_path, 1)
-        states: list[int] = []
-        commands: list[bytes] = []
-        applied_m: list[float] = []
-        try:
-            node.apply_order(ARM)
-            for _ in range(round((CHECKED_S + SETTLED_S + HELD_S) / BLOCK_S)):
-                sensors, _ = node.advance(commands)
-                command = controller.block(sensors.payload)
-                assert command is not None
-                commands = [command.payload]
-                states.append(int(node.applied.guard_state))
-                applied_m.append(float(node.applied.amplitude_m))
-            assert node.problems() == []
-        finally:
-            node.close()
-    armed = states.index(wire.ARMED)
-    assert armed * BLOCK_S < CHECKED_S
-    assert states[-1] == wire.ACTIVE
+        made = run_in_box(tmp_path, rig, CHECKED_S + SETTLED_S + HELD_S)
+    assert made.armed * BLOCK_S < CHECKED_S
+    assert made.states[-1] == wire.ACTIVE
     truth = np.array(rows(record))
-    held = truth[armed + round(SETTLED_S / BLOCK_S) : len(states)]
+    held = truth[made.armed + round(SETTLED_S / BLOCK_S) : len(made.states)]
     ratio = held[:, 1] / held[:, 2]
     assert len(held) * BLOCK_S > 0.9 * HELD_S
     assert np.abs(held[:, 3]).max() < 0.01  # a slip reaches 0.022 m/s
     assert np.mean((ratio > 1.02) & (ratio < 1.5)) > 0.99
-    assert applied_m[-1] == pytest.approx(held[-1, 5], rel=0.05)
-    assert truth[len(states) :, 1].tolist()[-1:] in ([], [0.0])
+    assert made.applied_m[-1] == pytest.approx(held[-1, 5], rel=0.05)
+    assert truth[len(made.states) :, 1].tolist()[-1:] in ([], [0.0])

@@ -20,6 +20,7 @@ from cockpit.judge.verdict_words import headline, in_words
 from cockpit.run.in_process import TimedAction, run_onboard
 from cockpit.run.replay import changes_of
 from cockpit.run.scenario import Scenario, header, load_scenario
+from cockpit.run.simulated.run import simulate
 from controller.node import ControllerNode
 from controller.replay import replay
 from plant.rig.node import PlantNode
@@ -233,6 +234,21 @@ def test_an_operators_stop_is_repeated_in_the_closed_loop_and_no_stick_slip_of_t
     figures = CliRunner().invoke(app, ["replay", str(stopped), "--closed-loop", "--json", "--log", str(again)])
     compared = json.loads(figures.stdout)
     assert compared["was"] == compared["now"]
+
+
+def test_closed_loop_repeats_steps_of_speed_and_load_and_refuses_faults(tmp_path: Path) -> None:
+    steps = "step=[{at_s=2.0, load=1.5}, {at_s=3.0, speed_mps=0.0004}, {at_s=4.0, load=0.8}]"
+    made, again, faulty = tmp_path / "made.mcap", tmp_path / "again.mcap", tmp_path / "faulty.mcap"
+    simulate(scenario(steps, "duration_s=6"), made, {})
+    result = CliRunner().invoke(app, ["replay", str(made), "--closed-loop", "--json", "--log", str(again)])
+    assert result.exit_code == 0, result.stderr
+    assert read_run(made).trace.tobytes() == read_run(again).trace.tobytes()
+    fault = 'fault=[{kind="frozen", target="sensors", from_s=0.5}]'
+    simulate(scenario(fault, "duration_s=1"), faulty, {})
+    result = CliRunner().invoke(app, ["replay", str(faulty), "--closed-loop", "--log", str(tmp_path / "other.mcap")])
+    assert result.exit_code == 7
+    assert "with faults, which are not repeated" in result.stderr
+    assert not (tmp_path / "other.mcap").exists()
 
 
 def test_closed_loop_of_a_run_that_was_cut_short_takes_as_long_as_was_recorded(log: Path, tmp_path: Path) -> None:

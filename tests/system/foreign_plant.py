@@ -98,7 +98,7 @@ class Rig:
         self._prefix = prefix
         self._alive: set[str] = set()
         self._changed = threading.Condition()
-        self._commands: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        self._commands: queue.Queue[bytes] = queue.Queue()
         self._events = 0
         config = zenoh.Config()
         for key, value in (

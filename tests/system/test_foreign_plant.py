@@ -17,8 +17,6 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.topics import TOPICS
 from tests.system.ports import free_endpoint
 
-pytestmark = pytest.mark.realtime
-
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "bridge" / "wire" / "PROTOCOL.md").read_text()
 FOREIGN_PLANT = ROOT / "tests" / "system" / "foreign_plant.py"
@@ -56,6 +54,7 @@ def start() -> Iterator[Start]:
         process.communicate()
 
 
+@pytest.mark.realtime
 def test_a_rig_written_from_the_page_alone_is_controlled_and_recorded(start: Start, tmp_path: Path) -> None:
     log = tmp_path / "foreign.mcap"
     endpoint = free_endpoint()

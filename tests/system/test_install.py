@@ -98,6 +98,7 @@ def test_a_plain_installation_needs_no_extra(tmp_path: Path, plain: Path) -> Non
         "log recover run.mcap --out whole.mcap",
         "plot run.mcap",
         "review run.mcap",
+        "test first.toml --jobs 2 --html tests.html --junit tests.xml",
         "scenarios",
         "explain",
     ]

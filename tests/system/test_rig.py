@@ -22,7 +22,7 @@ from tests.system.ports import free_endpoint
 from tests.unit.bridge.rig.boxes import boxed, table, toml
 
 SEEN = [sys.executable, "-m", "cockpit"]
-DEAD_MAN_S, SLACK_S = 0.1, 0.05
+DEAD_MAN_S, RAMP_S, SLACK_S = 0.1, 0.022, 0.05
 
 
 def written(folder: Path, port: int, **more: Any) -> Path:
@@ -162,7 +162,8 @@ def test_however_the_rigs_process_ends_the_vibration_ends(signal_name: str, answ
         time.sleep(1.0)
         after = [row[1] for row in rows(record)[before:]]
     assert after[0] > 0.0
-    assert 1e-3 * after.index(0.0) <= DEAD_MAN_S + SLACK_S
+    is_killed = signal_name in {"SIGKILL", "SIGSTOP"}
+    assert 1e-3 * after.index(0.0) <= SLACK_S + (DEAD_MAN_S if is_killed else RAMP_S + 2.0 * (answer_s or 0.0))
     assert max(after[after.index(0.0) :]) == 0.0
 
 

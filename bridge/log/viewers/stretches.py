@@ -31,13 +31,17 @@ class Envelope(NamedTuple):
 
 
 def envelope_of(values: Floats, starts: Indices) -> Envelope:
-    """Smallest, mean and largest value of each group along the last axis; `starts`: the first index of each group."""
+    """Smallest, mean and largest value of each group along the last axis; `starts`: the first index of each group.
+
+    A sample that is not a number makes all three NaN; the mean is NaN or infinite too where the sum is.
+    """
     counts = np.diff(starts, append=values.shape[-1])
-    return Envelope(
-        np.minimum.reduceat(values, starts, axis=-1),
-        np.add.reduceat(values, starts, axis=-1) / counts,
-        np.maximum.reduceat(values, starts, axis=-1),
-    )
+    with np.errstate(invalid="ignore", over="ignore"):  # a corrupted block holds inf, -inf or 3e38
+        return Envelope(
+            np.minimum.reduceat(values, starts, axis=-1),
+            np.add.reduceat(values, starts, axis=-1) / counts,
+            np.maximum.reduceat(values, starts, axis=-1),
+        )
 
 
 def fields_of(channel: str) -> list[str]:

@@ -15,7 +15,8 @@ def shared(begin: tuple[str, ...], remedies: Mapping[str, str]) -> tuple[Check, 
 
     """
     blocks = (*begin, "shape")
-    samples = (*blocks, "missing", "filled", "values")
+    readable = (*blocks, "values")
+    samples = (*readable, "missing", "filled")
     moves = (*samples, "positions")
     tone = (*blocks, "channels", "answers")
     vibration = (*tone, "amplitude", "frequency")
@@ -24,13 +25,11 @@ def shared(begin: tuple[str, ...], remedies: Mapping[str, str]) -> tuple[Check, 
         Check("numbers", remedies["numbers"], data.numbers, blocks),
         Check("rate", remedies["rate"], data.rate, blocks),
         Check(
-            "missing", "check the plug and the source of the channel; NaN marks a missing sample", data.missing, blocks
-        ),
-        Check("filled", "mark missing samples as NaN, never as zeros or as the last sample", data.filled, blocks),
-        Check("repeated", remedies["repeated"], data.repeated, blocks),
-        Check(
             "values", "check plug, source, unit and range of the channel, or state it as absent", data.values, blocks
         ),
+        Check("missing", "check plug and source of the channel; NaN marks a missing sample", data.missing, readable),
+        Check("filled", "mark missing samples as NaN, never as zeros or as the last sample", data.filled, readable),
+        Check("repeated", remedies["repeated"], data.repeated, blocks),
         Check("positions", "correct plug, source, sign or unit of the two positions", data.positions, samples),
         Check("force", "correct the sign of drive_force_N: positive pulls the slide forward", data.force, moves),
         Check("slide-acceleration", "correct plug, sign or unit of mass_accel_mps2", data.slide_acceleration, moves),

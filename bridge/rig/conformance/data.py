@@ -1,5 +1,6 @@
 """The checks of blocks and channels."""
 
+import itertools
 import math
 
 import numpy as np
@@ -23,6 +24,9 @@ _FEW = 3  # filled samples that are accepted: numbers that are equal by chance
 _SURE = 10.0  # movement over noise from which its direction is known
 _WINDOW_S = 0.05  # time over which positions are compared
 _TOO_FAST = 1.5  # as for the guard's DRIVE_FAST
+# Correlation of the steps of two channels from which they are one signal. Smaller: two sensors with less noise than motion in
+# common. Larger: rounding to 32 bits hides it.
+_SAME = 0.9999
 _HOLDS = 0.05  # share of equal neighbours up to which a channel has noise, so that a held sample shows
 
 
@@ -138,7 +142,7 @@ def order(session: Session) -> Measured:
 
 
 def values(session: Session) -> Measured:
-    """Each channel changes, in SI units and within its stated range."""
+    """Each channel changes by itself, in SI units and within its stated range."""
     everything = _everything(session)
     for row in _present(session):
         name, known = CHANNELS[row], SENSOR_CHANNELS[CHANNELS[row]]
@@ -150,6 +154,12 @@ def values(session: Session) -> Measured:
             return Measured(False, f"{name} up to {max(abs(low), abs(high)):.3g}", f"{known.largest:g} in SI units")
         if (lowest is not None and low < lowest) or (highest is not None and high > highest):
             return Measured(False, f"{name} from {low:.3g} to {high:.3g}", "the range of the rig file")
+    measured = [row for row in _present(session) if CHANNELS[row] not in session.facts.derived]
+    for first, second in itertools.combinations(measured, 2):
+        steps = np.diff(everything[[first, second]])
+        steps = steps[:, np.isfinite(steps).all(axis=0)]
+        if steps.size and steps.std(axis=1).all() and abs(np.corrcoef(steps)[0, 1]) > _SAME:
+            return Measured(False, f"{CHANNELS[first]} and {CHANNELS[second]} are one signal", "each its own source")
     return Measured(True, "every channel changes", "changes, in SI units")
 
 

@@ -18,6 +18,7 @@ _BEGUN = (
 )
 _HELD = 1.02  # largest amplitude over its limit; the command is 1.05 of it
 _ENDED = 0.2  # share of the amplitude below which a vibration has ended
+_REST_PARTS = 16  # parts of the time at rest in which the strongest tone is looked for
 # Difference of the reported from the delivered amplitude, as a share of the full one. Smaller: a report at the block's end
 # differs from the block's mean by 0.05 on a ramp. Larger: an echo of the order on a ramp of 10 blocks differs by 0.5.
 _REPORT = 0.25
@@ -136,9 +137,12 @@ def enable(session: Session) -> Measured:
 
 
 def safe(session: Session) -> Measured:
-    """`safe` ends the vibration."""
+    """`safe` ends the vibration; the next order begins it again."""
     if "safe" in session.failures:
         return Measured(False, session.failures["safe"], "raises nothing")
+    again = session.stage("before silence") or session.stage("before close")
+    if again and float(np.median(_delivered(session, again[-4:]))) < _ENDED:
+        return Measured(False, "no order acts after it", "the next order acts")
     return _ended(session, session.stage("safe")[-4:])
 
 
@@ -219,15 +223,25 @@ def _tone(session: Session, ordered_Hz: float) -> Tone:
     return strongest(joined(settled(session, f"tone {ordered_Hz:g}"))[BASE], session.facts.rate_Hz)
 
 
-def _delivered(session: Session, stage: Stage) -> Floats:
-    """Measured amplitude in each block, over the steady one."""
+def _delivered(session: Session, stage: Stage, at_Hz: float | None = None) -> Floats:
+    """Measured amplitude in each block, over the steady one; at a frequency, by default the ordered one."""
     facts, ordered_Hz = session.facts, session.facts.tones_Hz[0]
     steady_m = float(np.median(displacements(settled(session, f"tone {ordered_Hz:g}"), ordered_Hz, facts.rate_Hz)))
-    return displacements(stage, ordered_Hz, facts.rate_Hz) / max(steady_m, 1e-15)
+    return displacements(stage, at_Hz or ordered_Hz, facts.rate_Hz) / max(steady_m, 1e-15)
 
 
 def _ended(session: Session, stage: Stage) -> Measured:
     if not stage:
         raise NotSeen("the session has no blocks of it")
-    share = float(np.median(_delivered(session, stage)))
+    share = max(float(np.median(_delivered(session, stage, at_Hz))) for at_Hz in (None, _other_Hz(session, stage)))
     return Measured(share < _ENDED, f"{100.0 * share:.3g} % of the vibration is left", f"{100.0 * _ENDED:g} %")
+
+
+def _other_Hz(session: Session, stage: Stage) -> float | None:
+    """Frequency of the strongest tone in the exciter's range; None if it is as weak as at rest."""
+    limits, rate_Hz, rest = session.facts.limits, session.facts.rate_Hz, session.stage("rest")
+    tone = strongest(joined(stage)[BASE], rate_Hz)
+    parts = (rest[at : at + len(stage)] for at in range(0, len(rest), max(len(rest) // _REST_PARTS, 1)))
+    loudest = max(strongest(joined(part)[BASE], rate_Hz).amplitude for part in parts)
+    is_in_range = limits.frequency_min_Hz <= tone.frequency_Hz <= limits.frequency_max_Hz
+    return tone.frequency_Hz if is_in_range and tone.amplitude > _ANSWERS * loudest else None

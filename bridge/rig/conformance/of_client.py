@@ -18,7 +18,7 @@ from bridge.rig.conformance import exciter
 from bridge.rig.conformance.both import shared
 from bridge.rig.conformance.heard import Block, Stage
 from bridge.rig.conformance.report import Check, Conformance, Measured, judged
-from bridge.rig.conformance.session import REST_S, Facts, Session, tones_and_steps
+from bridge.rig.conformance.session import REST_S, Ended, Facts, Session, tones_and_steps
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.channels import CHANNELS
 from bridge.wire.payloads import parsed
@@ -36,10 +36,6 @@ _LIMITS = TypeAdapter(VibrationLimits)
 _DEFAULT_LIMITS = VibrationLimits(1e-7, None, None, 500.0, 5000.0, [])
 _STOPPED = ("order", "stop")  # stages in which the rig may be in FAULT
 _MAY_VIBRATE = (wire.ARMED, wire.ACTIVE)
-
-
-class _Ended(Exception):
-    """The session cannot continue."""
 
 
 def _header(session: Session) -> Measured:
@@ -81,7 +77,7 @@ def conformance_of_client(bus: BusConfig, lockstep: bool) -> Conformance:
         if lockstep:  # such a rig may wait for a recorder
             links.enter_context(Bus(bus, "recorder", lockstep)).announce()
         client = _Client(link, bus, lockstep)
-        with contextlib.suppress(_Ended):
+        with contextlib.suppress(Ended):
             client.stages()
         return Conformance(client.rig, time.monotonic() - begun_s, judged(CHECKS, client.session))
 
@@ -98,7 +94,7 @@ class _Client:
         if problem:
             self.session.failures["header"] = problem
         self._lockstep = lockstep
-        self._blocks: queue.Queue[Received] = queue.Queue()  # a `SimpleQueue` may wait for ever (`bridge.wire.inbox`)
+        self._blocks: queue.Queue[Received] = queue.Queue()
         self._applied: dict[int, wire.Applied] = {}
         self._send = link.publisher(COMMAND)
         self._newest = facts.tones_Hz[0], 0.0
@@ -118,7 +114,7 @@ class _Client:
         first_Hz, most_m = facts.tones_Hz[0], facts.amplitude_m
         settled_s = facts.ramp_s + facts.answer_s + 0.02
         if "header" in self.session.failures:
-            raise _Ended
+            raise Ended
         try:
             self._collect("first", 0.02, first_Hz, 0.0)
             self._collect("rest", REST_S, first_Hz, 0.0)
@@ -168,7 +164,7 @@ class _Client:
         if self._state == wire.READY:
             self._order(wire.Operator.ACCEPT_GAIN, _MAY_VIBRATE)
         if self._state not in _MAY_VIBRATE:
-            raise _Ended
+            raise Ended
 
     def _collect(self, name: str, for_s: float, frequency_Hz: float, amplitude_m: float | None) -> None:
         """Answer the blocks of a time by a command; None: by no command."""
@@ -180,7 +176,7 @@ class _Client:
                 block = parsed(wire.SensorBlock, received.payload, SENSORS.name)
             except (queue.Empty, Fault):
                 self.session.failures.setdefault("read", f"no block within {_PATIENCE_S:g} s")
-                raise _Ended from None
+                raise Ended from None
             self._run, self._state = block.run, block.guard_state
             if amplitude_m is not None:
                 self._newest = frequency_Hz, amplitude_m
@@ -194,7 +190,7 @@ class _Client:
         cause = self._report(stage)
         if self._state == wire.FAULT and name not in _STOPPED:
             self.session.failures["write"] = f"the guard tripped: {word_of('cause', cause)}"
-            raise _Ended
+            raise Ended
 
     def _keep(self, stage: Stage, block: wire.SensorBlock, at_s: float) -> None:
         session, samples = self.session, self.session.facts.samples
@@ -202,7 +198,7 @@ class _Client:
         for name, row in zip(CHANNELS, rows, strict=True):
             if len(row) != samples:
                 session.bad_block = f"{len(row)} samples of {name}: must be {samples}"
-                raise _Ended
+                raise Ended
         if self._last >= 0 and block.sequence != self._last + 1:
             session.lost += 1
             session.problems.append(f"block {block.sequence} after block {self._last}")

@@ -4,8 +4,8 @@ import time
 
 from bridge.rig.conformance import data, exciter
 from bridge.rig.conformance.both import shared
+from bridge.rig.conformance.device_session import DeviceSession
 from bridge.rig.conformance.report import Check, Conformance, judged
-from bridge.rig.conformance.session import DeviceSession
 from bridge.rig.device import Device
 from bridge.rig.file import DeviceRig
 
@@ -29,7 +29,7 @@ CHECKS = (
     ),
     *_SHARED,
     Check("enable", "end the vibration while the enable line is off", exciter.enable, _VIBRATION),
-    Check("safe", "let `safe` end the vibration, and raise nothing", exciter.safe, _VIBRATION),
+    Check("safe", "let `safe` end the vibration until the next order, and raise nothing", exciter.safe, _VIBRATION),
     Check(
         "watchdog", "let the device end the vibration by itself, or state watchdog_s = 0", exciter.watchdog, _VIBRATION
     ),

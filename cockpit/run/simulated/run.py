@@ -1,7 +1,7 @@
 """A scenario in simulated time, with its faults: the unchanged loops of plant and controller, and the log."""
 
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Generator, Iterable
 from pathlib import Path
 from typing import Any, cast
 
@@ -17,14 +17,15 @@ from bridge.rig.process import GuardedRig
 from bridge.rig.real import notes as device_notes
 from bridge.rig.real import open_node
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.clock import Wait
 from bridge.wire.complaints import BAD_MESSAGE, Complaints
-from bridge.wire.inbox import WAITING, Received
+from bridge.wire.inbox import Received
 from bridge.wire.session import LEASE_S
 from bridge.wire.topics import OPERATOR, SENSORS, TOPICS
 from cockpit.run.device_run import DeviceRun
 from cockpit.run.in_process import TimedAction, actions_of, log_of, run_onboard
 from cockpit.run.scenario import Scenario
-from cockpit.run.simulated.stage import Hub, Player, Receive, Session, Stage, WaitingInbox
+from cockpit.run.simulated.stage import Hub, Player, Receive, Session, Stage
 from cockpit.run.step import configurations, with_speeds
 from controller.app import ControllerProcess
 from controller.config import ControllerConfig
@@ -134,25 +135,23 @@ class SimulatedRun:
         self._rig_node = node
         process = GuardedRig(node, cast(Any, Session(self._hub, "plant")), None)
 
-        def work() -> None:
+        def loop() -> Generator[Wait]:
             process.event("START", _GRANTED)
             for code, text in self.notes():
                 process.event(code, text)
-            process.realtime(max(left, 0), self._stop)
+            yield from process.loop(max(left, 0), self._stop)
             process.end()
 
         self._hub.announce("plant")
-        self._players["plant"] = stage.enter(Player("plant", work))
+        self._players["plant"] = stage.enter(Player("plant", loop()))
 
     def _begin_controller(self) -> None:
-        stage = self._stage
-        inbox = WaitingInbox(WAITING, stage)
         session = cast(Any, Session(self._hub, "controller"))
         self._hub.down.discard("controller")
         self._loop_node = node = self.controller_node()
-        process = ControllerProcess(self._config, node, session, lockstep=False, inbox=inbox)
+        process = ControllerProcess(self._config, node, session, lockstep=False)
         self._hub.announce("controller")
-        self._players["controller"] = stage.enter(Player("controller", lambda: process.loop(self._stop, _GRANTED)))
+        self._players["controller"] = self._stage.enter(Player("controller", process.loop(self._stop, _GRANTED)))
 
     def _disturb(self, table: FaultTable) -> None:
         """Freeze, kill or restart a process now."""
@@ -167,7 +166,7 @@ class SimulatedRun:
                 stage.cue(stage.now_ns + for_ns + round(_LINKED_S * 1e9), lambda: hub.announce(role))
             return
         hub.forget(role)
-        stage.remove(player)
+        player.leave()
         if table.kind == "restarted":
             begin = self._begin_controller if role == "controller" else lambda: self._begin_plant(first=False)
             stage.cue(stage.now_ns + for_ns, begin)

@@ -1,100 +1,71 @@
-"""Threads that take turns on a simulated clock: one runs at a time, and time passes only while all of them wait.
+"""Loops that take turns on a simulated clock: one runs at a time, and time passes only while all of them wait.
 
 So the loops of the processes, which sleep and wait for messages, run unchanged and always in the same order. Messages arrive at
 once and in order, unless the link of sender or receiver is down.
 """
 
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Generator, Iterable
 from functools import partial
 
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.clock import time
-from bridge.wire.inbox import Inbox, Received
+from bridge.wire.clock import Wait, time
+from bridge.wire.inbox import Received
 from bridge.wire.topics import Topic
 
 Receive = Callable[[Received], None]
 
 
 class _Left(BaseException):
-    """Raised inside a killed player where it waits, to end its thread."""
+    """Raised inside a killed player where it waits, to end its loop."""
 
 
 class Player:
-    """A thread with the loop `work` of one process; `name` is its role."""
+    """The loop of one process; `name` is its role."""
 
-    def __init__(self, name: str, work: Callable[[], object]) -> None:
+    def __init__(self, name: str, loop: Generator[Wait]) -> None:
         self.name = name
         self.over = False
         self.failed: BaseException | None = None
-        self.wakes_ns = 0  # time at which the thread continues
-        self.hears = False  # a message for this role wakes the thread before `wakes_ns`
+        self.wakes_ns = 0  # time at which the loop continues
+        self.hears = False  # a message for this role wakes the loop before `wakes_ns`
         self.frozen_until_ns = 0
-        self._killed = False
-        self._work = work
-        self._go, self._done = threading.Semaphore(0), threading.Semaphore(0)
-        self._thread = threading.Thread(target=self._play, name=name, daemon=True)
-        self._thread.start()
+        self._loop = loop
 
-    def _play(self) -> None:
-        self._go.acquire()
+    def turn(self, now_ns: int) -> None:
+        """Let the loop run until it waits again or ends."""
+        self.hears = False
         try:
-            if not self._killed:
-                self._work()
-        except _Left:
-            pass
+            wait = next(self._loop)
+        except StopIteration:
+            self.over = True
         except BaseException as error:  # the stage passes it to `on_failure`
-            self.failed = error
-        self.over = True
-        self._done.release()
-
-    def turn(self) -> None:
-        """Let the thread run until it waits again or ends; called by the stage."""
-        self._go.release()
-        self._done.acquire()
-
-    def pause(self) -> None:
-        """Give the turn back; called by the player itself."""
-        if not self._killed:  # a killed player ends without another turn
-            self._done.release()
-            self._go.acquire()
-        if self._killed:
-            raise _Left
+            self.over, self.failed = True, error
+        else:
+            # at least 1 ns for a positive time: a loop that waits for a deadline would otherwise never reach it
+            self.wakes_ns = now_ns + max(round(wait.for_s * 1e9), 1 if wait.for_s > 0.0 else 0)
+            self.hears = wait.hears
 
     def leave(self) -> None:
-        """End the thread at its wait."""
-        self._killed = True
-        self.turn()
+        """End the loop at once, as a signal ends a process: its remaining steps wait for nothing."""
+        while not self.over:
+            try:
+                self._loop.throw(_Left)
+            except (_Left, StopIteration):
+                self.over = True
 
     @property
     def next_ns(self) -> int:
-        """Time at which the thread continues, unless a message wakes it."""
+        """Time at which the loop continues, unless a message wakes it."""
         return max(self.wakes_ns, self.frozen_until_ns)
 
 
-class WaitingInbox(Inbox):
-    """An inbox whose `get` waits in simulated time."""
-
-    def __init__(self, limit: int, stage: "Stage") -> None:
-        Inbox.__init__(self, limit)
-        self._stage = stage
-
-    def get(self, timeout_s: float = 0.0) -> Received | None:
-        """The oldest message, or None if no message arrived within `timeout_s`."""
-        received = super().get()
-        if received is None and timeout_s:
-            self._stage.wait(timeout_s, hears=True)
-            received = super().get()
-        return received
-
-
 class Stage:
-    """The clock and the players. `play` runs them from the calling thread."""
+    """The clock and the players. `play` runs them."""
 
     def __init__(self) -> None:
         self.now_ns = 0
         self.players: list[Player] = []
-        self._on_stage: Player | None = None
         self._cues: list[tuple[int, Callable[[], None]]] = []
 
     def enter(self, player: Player) -> Player:
@@ -108,16 +79,8 @@ class Stage:
         self._cues.append((t_ns, act))
         self._cues.sort(key=lambda cue: cue[0])
 
-    def wait(self, for_s: float, hears: bool = False) -> None:
-        """Let simulated time pass; called by the player whose turn it is. With `hears` a message for it ends the wait early."""
-        player = self._on_stage
-        if player is None:  # no player has the turn: a test or a warm-up
-            self.now_ns += round(for_s * 1e9)
-            return
-        # at least 1 ns for a positive time: a loop that waits for a deadline would otherwise never reach it
-        passes_ns = max(round(for_s * 1e9), 1 if for_s > 0.0 else 0)
-        player.wakes_ns, player.hears = self.now_ns + passes_ns, hears
-        player.pause()
+    def _pass(self, for_s: float) -> None:
+        self.now_ns += round(for_s * 1e9)
 
     def heard(self, name: str) -> None:
         """Wake a player that waits for the message that has arrived."""
@@ -125,19 +88,12 @@ class Stage:
             if player.name == name and player.hears:
                 player.wakes_ns = min(player.wakes_ns, self.now_ns)
 
-    def remove(self, player: Player) -> None:
-        """End a player at once, as a signal ends a process."""
-        if not player.over:
-            before, self._on_stage = self._on_stage, player
-            player.leave()
-            self._on_stage = before
-
     def play(self, until: Callable[[], bool], at_end: Callable[[], None], on_failure: Callable[[Player], None]) -> None:
         """Let the players take turns until `until`, called before each turn, returns True or all have ended.
 
         `at_end` is called before the remaining players are removed, `on_failure` with a player that ended with an error.
         """
-        with time.simulated(lambda: self.now_ns, self.wait):
+        with time.simulated(lambda: self.now_ns, self._pass):
             try:
                 while not until() and (active := [player for player in self.players if not player.over]):
                     following = min(active, key=lambda player: player.next_ns)
@@ -147,16 +103,13 @@ class Stage:
                         act()
                         continue
                     self.now_ns = max(self.now_ns, following.next_ns)
-                    following.hears = False
-                    self._on_stage = following
-                    following.turn()
-                    self._on_stage = None
+                    following.turn(self.now_ns)
                     if following.failed is not None:
                         on_failure(following)
             finally:
                 at_end()
                 for player in self.players:
-                    self.remove(player)
+                    player.leave()
 
 
 class Hub:

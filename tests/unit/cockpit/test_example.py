@@ -57,7 +57,15 @@ def test_json_lists_the_runs() -> None:
         "runs": ["run-01.parquet", "run-02.parquet"],
         "held_out": ["run-02.parquet"],
         "seed": 1,
+        "effects": None,
     }
+
+
+def test_a_chosen_fault_is_stated_with_its_size() -> None:
+    result = example("made", "--effect", "drive-backlash")
+    assert "2 runs of a rig with drive-backlash, gap_m = 0.0001, 1 of them held out" in result.stdout
+    table = json.loads(example("again", "--effect", "drive-backlash", "--json").stdout)
+    assert table["effects"] == {"drive-backlash": {"gap_m": 1e-4}}
 
 
 @pytest.mark.parametrize("existing", ["folder", "file", "link"])

@@ -38,7 +38,7 @@ STOP = wire.Operator(action=wire.Operator.STOP, who="test").SerializeToString()
 def test_a_repeated_block_is_not_fresh() -> None:
     controller, bus = process()
     stop = threading.Event()
-    thread = threading.Thread(target=controller.loop, args=(stop, ""), daemon=True)
+    thread = threading.Thread(target=controller.realtime, args=(stop, ""), daemon=True)
     bus.publish(SENSORS, block(0))
     thread.start()
     wait_for(lambda: "STALE" in bus.codes())
@@ -55,7 +55,7 @@ def test_a_stall_until_the_end_of_the_run_is_reported(monkeypatch: pytest.Monkey
     monkeypatch.setattr(realtime, "was_paused", lambda *_: True)
     bus.publish(SENSORS, block(0))
     bus.leave()
-    controller.loop(threading.Event(), "")
+    controller.realtime(threading.Event(), "")
     assert bus.codes() == ["START", "PAUSED", "END"]
 
 
@@ -69,7 +69,7 @@ def test_a_slip_at_a_drive_that_seems_at_rest_is_an_event() -> None:
         sensors["drive_force_N"] = 10.0 - 11700.0 * 0.02 * slid_s + chance.normal(0.0, 0.02, 20)
         bus.publish(SENSORS, sensors.tobytes())
     bus.leave()
-    controller.loop(threading.Event(), "")
+    controller.realtime(threading.Event(), "")
     assert bus.codes() == ["START", "DRIVE_UNSEEN", "END"]
 
 
@@ -97,7 +97,7 @@ def test_without_blocks_the_command_ramps_at_the_slew_limit() -> None:
     bus.publish(SENSORS, block(0))
     controller._node._state["allowed_m"] = 3e-8
     controller._node._state["allowed_Hz"] = 2600.0
-    thread = threading.Thread(target=controller.loop, args=(threading.Event(), ""), daemon=True)
+    thread = threading.Thread(target=controller.realtime, args=(threading.Event(), ""), daemon=True)
     thread.start()
     wait_for(lambda: len(bus.sent[COMMAND.name]) >= 40)
     bus.leave()
@@ -118,7 +118,7 @@ def test_a_stop_is_taken_however_full_the_inbox_is() -> None:
     stop = threading.Event()
     timer = threading.Timer(PATIENCE_S, stop.set)
     timer.start()  # ends the loop if the END of the plant is dropped
-    controller.loop(stop, "")
+    controller.realtime(stop, "")
     timer.cancel()
     assert controller._inbox.dropped == 44
     assert bus.codes() == ["START", "FLOOD", "OPERATOR", "END"]
@@ -128,7 +128,7 @@ def test_a_rig_that_repeats_its_last_block_is_stale() -> None:
     controller, bus = process()
     controller._node._state["allowed_m"] = 3e-8
     controller._node._state["allowed_Hz"] = 2600.0
-    thread = threading.Thread(target=controller.loop, args=(threading.Event(), ""), daemon=True)
+    thread = threading.Thread(target=controller.realtime, args=(threading.Event(), ""), daemon=True)
     bus.publish(SENSORS, block(0))
     thread.start()
     for _ in range(2000):
@@ -157,13 +157,13 @@ def test_a_leaving_controller_ramps_the_amplitude_down_first(why: str) -> None:
     if why == "stop":
         timer = threading.Timer(0.01, stop.set)
         timer.start()
-        controller.loop(stop, "")
+        controller.realtime(stop, "")
         timer.join()
     else:
         for number in (1001, 1002, 1003, 1004):
             bus.publish(SENSORS, block(number, 2.0))
         with pytest.raises(Fault, match="CONFIG: sensors: blocks are 2 ms apart"):
-            controller.loop(stop, "")
+            controller.realtime(stop, "")
     assert commanded_m(bus)[0] == pytest.approx(2.9e-8)
     assert commanded_m(bus)[-1] == 0.0
     assert max(abs(np.diff(commanded_m(bus)))) < 1.001e-9
@@ -178,7 +178,7 @@ def test_samples_of_nan_are_reported_at_once_and_counted() -> None:
             made["base_accel_mps2"][0, 7] = np.nan
         bus.publish(SENSORS, made.tobytes())
     bus.leave()
-    controller.loop(threading.Event(), "")
+    controller.realtime(threading.Event(), "")
     assert bus.codes() == ["START", "NOT_FINITE", "NOT_FINITE", "END"]
     assert "block 2 holds a sample" in wire.Event.FromString(bus.sent[CONTROLLER_EVENT.name][1]).text
 
@@ -188,7 +188,7 @@ def test_a_controller_in_lockstep_refuses_a_rig_that_does_not_wait() -> None:
     controller = ControllerProcess(CONFIG, ControllerNode(CONFIG), bus, lockstep=True)
     bus.publish(PLANT_EVENT, wire.Event(source="plant", code="START", text="SCHED_FIFO 50").SerializeToString())
     with pytest.raises(Fault, match=r"CONFIG: event/plant: START 'SCHED_FIFO 50': must be 'lockstep'"):
-        controller.loop(threading.Event(), "")
+        controller.realtime(threading.Event(), "")
 
 
 def test_undecodable_messages_are_dropped_and_reported_once_a_second() -> None:
@@ -200,7 +200,7 @@ def test_undecodable_messages_are_dropped_and_reported_once_a_second() -> None:
         bus.publish(OPERATOR, b"\x08\x07")
     bus.publish(ANNOUNCE, b"\xff" * (1 << 17))
     bus.leave()
-    controller.loop(threading.Event(), "")
+    controller.realtime(threading.Event(), "")
     assert len(bus.sent[COMMAND.name]) == 50
     reported = [(event.code, event.text) for event in bus.events()]
     assert [code for code, _ in reported] == ["START", *["BAD_MESSAGE"] * 5, "END"]
@@ -220,7 +220,7 @@ def test_blocks_of_foreign_senders_are_dropped_and_reported() -> None:
         for foreign in (2**62, number + 10**6, max(number - 1, 0)):
             bus.publish(SENSORS, block(foreign))
     bus.leave()
-    controller.loop(threading.Event(), "")
+    controller.realtime(threading.Event(), "")
     assert [commanded.block for commanded in bus.commands()] == list(range(60))
     codes = bus.codes()
     assert codes.count("FOREIGN") <= 2
@@ -231,7 +231,7 @@ def test_blocks_of_foreign_senders_are_dropped_and_reported() -> None:
 @pytest.mark.slow
 def test_an_end_does_not_end_the_controller_while_the_rig_stays() -> None:
     controller, bus = process()
-    thread = threading.Thread(target=controller.loop, args=(threading.Event(), ""), daemon=True)
+    thread = threading.Thread(target=controller.realtime, args=(threading.Event(), ""), daemon=True)
     bus.publish(SENSORS, block(0))
     thread.start()
     bus.publish(PLANT_EVENT, END)
@@ -249,7 +249,7 @@ def test_a_rig_that_leaves_without_an_end_is_reported_and_waited_for(link_cut: b
     controller, bus = process()
     bus.link_cut = link_cut
     stop = threading.Event()
-    thread = threading.Thread(target=controller.loop, args=(stop, ""), daemon=True)
+    thread = threading.Thread(target=controller.realtime, args=(stop, ""), daemon=True)
     for number in range(1000, 1003):
         bus.publish(SENSORS, block(number))
     thread.start()
@@ -293,7 +293,7 @@ def test_another_rig_in_the_place_of_the_first_is_refused() -> None:
 
     def loop() -> None:
         try:
-            controller.loop(threading.Event(), "")
+            controller.realtime(threading.Event(), "")
         except Fault as fault:
             faults.append(fault)
 
@@ -319,7 +319,7 @@ def test_a_jump_of_the_clock_is_reported() -> None:
         made["t_ns"] += 3_600_000 * MS if number >= 10 else 0
         bus.publish(SENSORS, made.tobytes())
     bus.leave()
-    controller.loop(threading.Event(), "")
+    controller.realtime(threading.Event(), "")
     assert bus.codes() == ["START", "CLOCK", "END"]
     assert "sensors: block 10: t_ns is 3.6e+06 ms off the time that the block number gives" in bus.events()[1].text
 
@@ -331,7 +331,7 @@ def test_a_flood_of_stops_is_applied_and_answered_sparsely() -> None:
         bus.publish(OPERATOR, STOP)
     bus.publish(SENSORS, block(1))
     bus.leave()
-    controller.loop(threading.Event(), "")
+    controller.realtime(threading.Event(), "")
     assert [event.text for event in bus.events() if event.code == "OPERATOR"] == [
         "STOP by test",
         "STOP by test (255 times, 256 in all)",

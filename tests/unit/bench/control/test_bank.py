@@ -53,7 +53,7 @@ def test_a_file_without_scenarios_and_a_misspelt_key_are_refused(tmp_path: Path)
     with pytest.raises(Fault, match="scenario"):
         load_bank(tmp_path)
     path.write_text(
-        '[rig]\nfile = "paper-c45-c45"\n[[scenario]]\nname = "a"\ndescription = "b"\nbank.expects = "blind"\n'
+        '[rig]\nfile = "paper-c45-c45"\n[[sweep]]\n[sweep.values.a]\ndescription = "b"\nbank.expects = "blind"\n'
     )
     with pytest.raises(Fault, match="expects"):
         load_bank(tmp_path)

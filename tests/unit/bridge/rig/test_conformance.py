@@ -9,7 +9,7 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 import pytest
 
-from bridge.rig.conformance import session
+from bridge.rig.conformance import device_session
 from bridge.rig.conformance.of_device import CHECKS, conformance
 from bridge.rig.conformance.report import Conformance
 from bridge.rig.device import Device, DeviceBlock, DeviceError
@@ -30,7 +30,7 @@ def tried(monkeypatch: pytest.MonkeyPatch) -> Tried:
             samples_per_block=rig.converter.samples_per_block,
         )
         device: Any = adapter(facts)
-        monkeypatch.setattr(session, "time", device.device)
+        monkeypatch.setattr(device_session, "time", device.device)
         return conformance(device, rig)
 
     return made
@@ -136,6 +136,29 @@ class Feeds(Right):
         return super().read()
 
 
+class Latches(Right):
+    """After `safe` it ignores orders."""
+
+    is_safe = False
+
+    def safe(self) -> None:
+        super().safe()
+        self.is_safe = True
+
+    def write(self, frequency_Hz: float, amplitude: float) -> None:
+        super().write(frequency_Hz, 0.0 if self.is_safe else amplitude)
+
+
+class OpensOnce(Right):
+    times = 0
+
+    def open(self) -> None:
+        self.times += 1
+        if self.times > 1:
+            raise DeviceError("the address is in use")
+        super().open()
+
+
 class Hangs(Right):
     def read(self) -> DeviceBlock | None:
         while True:
@@ -159,6 +182,11 @@ def _fill(value: float | None) -> Callable[[np.ndarray, int], None]:
     return fill
 
 
+def _swap_bytes(samples: np.ndarray, _: int) -> None:
+    with np.errstate(invalid="ignore"):
+        samples[:] = samples.astype(">f4").view("<f4")
+
+
 def _nothing(*_: object) -> None:
     pass
 
@@ -171,6 +199,10 @@ def _never_zero(self: Any, frequency_Hz: float, amplitude: float) -> None:
     self.device.ordered_s = self.device.now_s
     if amplitude > 0.0:
         Right.write(self, frequency_Hz, amplitude)
+
+
+def _turned_down(self: Any) -> None:
+    self.device.order(500.0, self.device.ordered_m)
 
 
 def _transposed(self: Any) -> DeviceBlock | None:
@@ -220,7 +252,13 @@ MISTAKES: dict[str, tuple[type[Right], str]] = {
     "amplitude peak to peak": (ordered(lambda f, a: (f, a / 2.0)), "amplitude"),
     "vibrates after safe": (changed(safe=_nothing, close=Right.safe), "safe"),
     "safe raises": (changed(safe=_raises, close=lambda self: setattr(self, "is_open", False)), "safe"),
+    "safe lowers the frequency alone": (
+        changed(safe=_turned_down, close=lambda self: (Right.safe(self), setattr(self, "is_open", False))),
+        "safe",
+    ),
+    "ignores orders after safe": (Latches, "safe"),
     "vibrates after close": (changed(close=lambda self: setattr(self, "is_open", False)), "close"),
+    "cannot be opened again": (OpensOnce, "close"),
     "close raises": (changed(close=_raises), "close"),
     "does not open": (changed(open=_raises), "open"),
     "ignores an amplitude of 0": (changed(write=_never_zero), "zero"),
@@ -238,6 +276,8 @@ MISTAKES: dict[str, tuple[type[Right], str]] = {
     "fills with the last sample": (samples_changed(_fill(None)), "filled"),
     "NaN": (samples_changed(_fill(np.nan)), "missing"),
     "a dead channel": (samples_changed(lambda samples, _: samples[0].fill(1.5)), "values"),
+    "one position twice": (samples_changed(lambda samples, _: np.copyto(samples[4], samples[3])), "values"),
+    "bytes in the other order": (samples_changed(_swap_bytes), "values"),
     "block too short": (changed(read=_short), "shape"),
     "samples first": (changed(read=_transposed), "shape"),
     "float32": (changed(read=_narrow), "shape"),
@@ -317,6 +357,7 @@ WIRED = {
     name: {"source": 4 - row, "scale": float(1.0 / Volts.V_PER_SI[row])} for row, name in enumerate(table()["channels"])
 }
 ABSENT = table()["channels"] | {name: {"absent": True} for name in ("drive_force_N", "mass_accel_mps2")}
+DERIVED = table()["channels"] | {"drive_force_N": {"derive": "11700.0 * (drive_position_m - mass_position_m)"}}
 RIGHT: dict[str, tuple[type[Right], dict[str, Any]]] = {
     "SI units": (Right, {}),
     "volts": (
@@ -326,6 +367,7 @@ RIGHT: dict[str, tuple[type[Right], dict[str, Any]]] = {
     "called": (Called, {}),
     "slow": (Slow, {}),
     "at rest, without two channels and a line": (changed(moves=False), {"channels": ABSENT, "exciter": {}}),
+    "with a derived force": (Right, {"channels": DERIVED}),
     "51.2 kHz": (Right, {"converter": {"sample_rate_Hz": 51_200.0, "samples_per_block": 128}}),
 }
 

@@ -91,17 +91,17 @@ def slow_accelerometer(data: Columns) -> None:
         (spike_of_nan, "not-finite", "mass_accel_mps2: 2 samples are no finite number, first row 8", "", 3998),
         (repeated_time, "time", "t_s: 1 row is not later than the row before, first row 101", "", 3999),
         (dead_sensor, "constant", "mass_accel_mps2: is 0 in every row; not used", "mass_accel_mps2", 4000),
-        (accel_in_other_unit, "units", "mass_accel_mps2: reaches", "mass_accel_mps2", 4000),
+        (accel_in_other_unit, "wrong-unit", "mass_accel_mps2: reaches", "mass_accel_mps2", 4000),
         (clipped_force, "clipped", "drive_force_N: ", "", 4000),
         (hole_in_time, "time-gap", "t_s: 1 gap in time, first at 0.4995 s, the longest 0.1", "", 4000),
         (
             drive_in_mm,
-            "units",
+            "wrong-unit",
             "drive_position_m: travels 1: the drive moves by 0.001 m in this time",
             "drive_position_m",
             4000,
         ),
-        (mass_in_mm, "units", "mass_position_m: travels 1: the drive moves by 0.001 m", "mass_position_m", 4000),
+        (mass_in_mm, "wrong-unit", "mass_position_m: travels 1: the drive moves by 0.001 m", "mass_position_m", 4000),
         (twice_as_fast, "units", "moves at 0.001 m/s on average, but drive_velocity_mps = 0.0005", "", 4000),
         (force_the_other_way, "sign", "drive_force_N: pulls against the drive's motion", "drive_force_N", 4000),
         (no_value, "outlier", "2 outliers, first row 501 = -9999: no measurement; left out", "", 3998),
@@ -165,7 +165,7 @@ def test_a_speed_without_a_drive_position_may_be_in_mm(tmp_path: Path) -> None:
     manifest = MANIFEST.replace("drive_velocity_mps = 0.0005", "drive_velocity_mps = 0.5")
     assert (
         "0.5 m/s, 1e+03 times rig.stribeck_velocity_mps"
-        in kinds(load_evidence(folder(tmp_path, data, manifest)))["units"]
+        in kinds(load_evidence(folder(tmp_path, data, manifest)))["wrong-unit"]
     )
 
 
@@ -275,15 +275,15 @@ def test_positions_in_mm_are_reported_where_the_drive_goes_to_and_fro(tmp_path: 
     """The drive returns to its start, and no velocity is stated."""
     data = columns()
     to_and_fro_m = 2e-3 * (1.0 - np.abs(np.linspace(-1.0, 1.0, 4000)))
-    for scale, kind in ((1.0, None), (1000.0, "units")):
+    for scale, kind in ((1.0, None), (1000.0, "wrong-unit")):
         data["drive_position_m"] = scale * to_and_fro_m
         manifest = MANIFEST.replace("drive_velocity_mps = 0.0005", "")
         reported = kinds(load_evidence(folder(tmp_path, data, manifest)))
         assert list(reported) == ([kind] if kind else [])
-    assert "drive_position_m: 2 m/s, 4e+03 times rig.stribeck_velocity_mps: is it in mm?" in reported["units"]
+    assert "drive_position_m: 2 m/s, 4e+03 times rig.stribeck_velocity_mps: is it in mm?" in reported["wrong-unit"]
     data["drive_position_m"], data["mass_position_m"] = to_and_fro_m, 1000.0 * to_and_fro_m
     reported = kinds(load_evidence(folder(tmp_path, data, manifest)))
-    assert "mass_position_m: travels 2: the drive moves by 0.002 m" in reported["units"]
+    assert "mass_position_m: travels 2: the drive moves by 0.002 m" in reported["wrong-unit"]
 
 
 def test_a_mapped_column_that_one_run_lacks_is_reported_and_one_that_all_lack_is_refused(tmp_path: Path) -> None:
@@ -314,9 +314,11 @@ def measured() -> Path:
     ("key", "value", "kind", "expected"),
     [
         ("channels.mass_accel_mps2.scale", -1.0, "sign", "mass_accel_mps2: has the wrong sign: the mass seems"),
-        ("channels.mass_accel_mps2.scale", 0.10197, "units", "shows a drive stiffness of 1.1e+05 N/m"),
-        ("rig.drive_stiffness_N_per_m", 11.7, "units", "but rig.drive_stiffness_N_per_m = 11.7: check the units"),
+        ("channels.mass_accel_mps2.scale", 0.10197, "wrong-unit", "shows a drive stiffness of 1.1e+05 N/m"),
+        ("rig.drive_stiffness_N_per_m", 11.7, "wrong-unit", "but rig.drive_stiffness_N_per_m = 11.7: check the units"),
         ("rig.drive_stiffness_N_per_m", 6000.0, "", ""),
+        ("rig.mass_kg", 1500.0, "wrong-unit", "rig.mass_kg: = 1500 times the largest acceleration"),
+        ("rig.mass_kg", 3.0, "", ""),
     ],
 )
 def test_a_force_that_contradicts_the_acceleration_reveals_a_wrong_sign_or_unit(
@@ -339,7 +341,7 @@ def test_a_force_that_contradicts_the_acceleration_reveals_a_wrong_sign_or_unit(
     evidence = load_evidence(tmp_path)
     by_kind = {finding.kind: f"{finding.where}: {finding.text}" for finding in evidence.findings}
     assert expected in by_kind.get(kind, "")
-    assert {"sign", "units"} & by_kind.keys() == ({kind} if kind else set())
+    assert {"sign", "wrong-unit"} & by_kind.keys() == ({kind} if kind else set())
     assert ("mass_accel_mps2" in evidence.runs[0].columns) == (kind != "sign")
 
 

@@ -197,6 +197,10 @@ def test_friction_over_speed_and_over_stick_time() -> None:
     assert [round(1e3 * level.speed_mps, 1) for level in seen.at_speeds] == [0.2, 0.5, 2.0]
     assert "dwell_N_per_decade" not in seen.numbers
     assert any("the speed may be the cause; stop the drive" in line for line in limits_of_look(seen))
+    assert not {"period_s", "slope_N_per_s", "dwell_s"} & seen.numbers.keys(), "a mean over speeds belongs to none"
+    periods_s = [level.period_s.value for level in seen.at_speeds if level.period_s is not None]
+    assert periods_s == sorted(periods_s, reverse=True)
+    assert periods_s[0] > 5.0 * periods_s[2]
     halted = ageing((5e-4,), (0.0, 1.0, 4.0))
     assert halted.numbers["dwell_N_per_decade"].value == pytest.approx(1.0, rel=0.05)
     assert halted.numbers["stiffness_N_per_m"].value == pytest.approx(1e4, rel=0.1)

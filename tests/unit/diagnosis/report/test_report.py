@@ -322,6 +322,16 @@ def test_runs_in_which_nothing_moves_are_in_the_summary():
     assert "in run-01.csv, run-03.csv the drive does not move: friction and drive are not tested there" in lines["else"]
 
 
+@pytest.mark.parametrize("kind", ["wrong-unit", "sign"])
+def test_a_wrong_unit_or_sign_comes_before_the_answer(kind):
+    text = "largest value 1.2e+04 N, 828 times rig.static_force_N = 14.49: the unit cannot be right; not used"
+    wrong = tuple(Finding(kind, f"run-0{number}.csv: drive_force_N", text) for number in (1, 2))
+    lines = by_label(made_up.diagnosis()._replace(findings=wrong))
+    assert lines["answer"].startswith("doubtful, first correct the unit or sign of drive_force_N: effect: ")
+    assert lines["else"].startswith(f"drive_force_N: {text};")
+    assert lines["else"].count("largest value") == 1
+
+
 def test_vibrations_that_no_model_has_are_in_the_summary_with_their_runs():
     picked_up = tuple(Finding(PICK_UP, f"run-0{i}.csv: drive_force_N", "vibrates with 0.3 N") for i in (1, 2, 4))
     findings = (*picked_up[:2], Finding(DISTORTED, "run-02.csv: base_accel_mps2", "moves at 5000 Hz"), picked_up[2])
