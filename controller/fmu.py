@@ -70,6 +70,6 @@ def model(name: str, config: ControllerConfig) -> Model:
     for row, fields in inputs.items():
         made.variables.extend(variables_of(parts[row], places[row], "input", {field: field for field in fields}))
     for row, prefix in ((4, "command"), (5, "trace")):
-        names = {field: f"{prefix}.{field}" for field in parts[row].dtype.names if field != _OF_A_CLOCK}
+        names = {field: f"{prefix}.{field}" for field in parts[row].dtype.names or () if field != _OF_A_CLOCK}
         made.variables.extend(variables_of(parts[row], places[row], "output", names))
     return made

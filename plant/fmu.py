@@ -39,10 +39,10 @@ def _layout(samples: int) -> np.dtype[Any]:
 def _rows(io: Any, at: int, field: str, names: tuple[str, ...]) -> list[Variable]:
     """The rows of a field of the record `io`, which is at `at` in the memory, as outputs."""
     [whole] = variables_of(io, at, "output", {field: field})
-    count = whole.count // len(names)
+    count = whole.length // len(names)
     rows = enumerate(names)
     return [
-        whole._replace(name=name, at=whole.at + 8 * count * row, count=count, unit=unit_of(name)) for row, name in rows
+        whole._replace(name=name, at=whole.at + 8 * count * row, length=count, unit=unit_of(name)) for row, name in rows
     ]
 
 

@@ -54,8 +54,8 @@ def _add_variables(root: Xml.Element, variables: list[Variable]) -> None:
     outputs = [str(reference) for reference, v in enumerate(variables) if v.causality == "output"]
     for v, common, number in _words(variables):
         element = Xml.SubElement(rows, v.type, common | number)
-        if v.count > 1:
-            Xml.SubElement(element, "Dimension", start=str(v.count))
+        if v.length > 1:
+            Xml.SubElement(element, "Dimension", start=str(v.length))
     for kind in ("Output", "InitialUnknown"):
         for reference in outputs:
             Xml.SubElement(structure, kind, valueReference=reference)

@@ -73,13 +73,13 @@ def _constants(model: Model, token: str) -> str:
     text = "".join(f"#define {name} {value}\n" for name, value in defines.items())
     text += f"int stickslip_kernel({', '.join(['void *'] * len(places))});\n"
     text += _array("unsigned char start", map(str, memory))
-    return text + _array("Variable variables", (f"{{{v.at}, {v.count}, {v.type}, {_access(v)}}}" for v in rows))
+    return text + _array("Variable variables", (f"{{{v.at}, {v.length}, {v.type}, {_access(v)}}}" for v in rows))
 
 
 def _access(v: Variable) -> str:
     if v.causality in {"output", "independent"}:
         return "MEAN" if v.is_mean else "OUTPUT"
-    return "FINITE" if v.type == "Float64" and v.count == 1 else "INPUT"
+    return "FINITE" if v.type == "Float64" and v.length == 1 else "INPUT"
 
 
 def _array(declaration: str, values: Iterable[str]) -> str:

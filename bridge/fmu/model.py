@@ -18,10 +18,10 @@ class Variable(NamedTuple):
     causality: str  # input, output or parameter
     at: int  # place in the memory, in bytes
     type: str  # a value of TYPES
-    count: int = 1
+    length: int = 1
     start: str | None = None  # of an input or a parameter
     unit: str = ""
-    is_mean: bool = False  # an output without arrays: the mean of `count` values
+    is_mean: bool = False  # an output without arrays: the mean of `length` values
 
 
 _TIME = Variable("time", "independent", 0, "Float64", unit="s")
@@ -58,8 +58,8 @@ class Model(NamedTuple):
         """The model for FMI 2: an output has its last value, and its mean as `NAME_mean`."""
         variables: list[Variable] = []
         for v in self.variables:
-            last = v._replace(at=v.at + 8 * (v.count - 1), count=1)
-            variables += [last] if v.count == 1 else [last, v._replace(name=f"{v.name}_mean", is_mean=True)]
+            last = v._replace(at=v.at + 8 * (v.length - 1), length=1)
+            variables += [last] if v.length == 1 else [last, v._replace(name=f"{v.name}_mean", is_mean=True)]
         return self._replace(variables=variables)
 
 
