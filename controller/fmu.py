@@ -18,14 +18,7 @@ carray: Any = vars(numba)["carray"]
 _BY_TIME = -1  # t_ns of a block that comes one block length after the last
 # fields of a sensor block that the rig's guard sets; a rig without a guard leaves them as they are
 OF_GUARD = (
-    "run",
-    "guard_state",
-    "check_Hz",
-    "check_gain",
-    "applied_Hz",
-    "applied_m",
-    "applied_block",
-    "fallback",
+    *("run", "guard_state", "check_Hz", "check_gain", "applied_Hz", "applied_m", "applied_block", "fallback"),
     "guard_limit",
 )
 _ANNOUNCED = ("announced_from_ns", "announced_mps", "announced_count")  # `controller.announced`
@@ -66,29 +59,17 @@ def model(name: str, config: ControllerConfig) -> Model:
     """
     params, state = build(config)
     samples = config.samples_per_block
-    sensors, io, command, trace = (
-        sensor_block(samples).blank(),
-        record(_layout(samples)),
-        COMMAND.blank(),
-        TRACE.blank(),
-    )
+    sensors, io = sensor_block(samples).blank(), record(_layout(samples))
     sensors["applied_block"] = io["sequence"] = NO_BLOCK
     io["t_ns"], io["events"], io["block_ns"] = _BY_TIME, BLOCK, round(config.block_s * 1e9)
-    parts = [params, state, sensors, io, command, trace]
-    made = Model(name, "A controller that vibrates a base so that a slide does not stick", __name__, "any", samples,
-                 config.block_s, 1, parts, [])  # fmt: skip
-    _, at_state, at_sensors, at_io, at_command, at_trace = made.places()
-    frame = {field: field for field in (*CHANNELS, "events", "gap_blocks", "sequence", "t_ns")}
-    results = ((command, at_command, COMMAND), (trace, at_trace, TRACE))
-    names = [{field: f"{layout.message.DESCRIPTOR.name.lower()}.{field}" for field in layout.dtype.names or ()}
-             for *_, layout in results]  # fmt: skip
-    del names[1][_OF_A_CLOCK]
-    return made._replace(
-        variables=[
-            *variables_of(io, at_io, "input", frame, any_number=True),
-            *variables_of(sensors, at_sensors, "input", {field: field for field in OF_GUARD}, any_number=True),
-            *variables_of(state, at_state, "input", {field: field for field in _ANNOUNCED}, any_number=True),
-            *(row for (part, at, _), fields in zip(results, names, strict=True)
-              for row in variables_of(part, at, "output", fields)),
-        ]
-    )  # fmt: skip
+    parts = [params, state, sensors, io, COMMAND.blank(), TRACE.blank()]
+    about = "A controller that vibrates a base so that a slide does not stick"
+    made = Model(name, about, __name__, "any", samples, config.block_s, 1, parts, [])
+    places = made.places()
+    inputs = {3: (*CHANNELS, "events", "gap_blocks", "sequence", "t_ns"), 2: OF_GUARD, 1: _ANNOUNCED}
+    for row, fields in inputs.items():
+        made.variables.extend(variables_of(parts[row], places[row], "input", {field: field for field in fields}))
+    for row, prefix in ((4, "command"), (5, "trace")):
+        names = {field: f"{prefix}.{field}" for field in parts[row].dtype.names or () if field != _OF_A_CLOCK}
+        made.variables.extend(variables_of(parts[row], places[row], "output", names))
+    return made

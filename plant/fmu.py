@@ -39,10 +39,10 @@ def _layout(samples: int) -> np.dtype[Any]:
 def _rows(io: Any, at: int, field: str, names: tuple[str, ...]) -> list[Variable]:
     """The rows of a field of the record `io`, which is at `at` in the memory, as outputs."""
     [whole] = variables_of(io, at, "output", {field: field})
-    count = whole.count // len(names)
+    count = whole.length // len(names)
     rows = enumerate(names)
     return [
-        whole._replace(name=name, at=whole.at + 8 * count * row, count=count, unit=unit_of(name)) for row, name in rows
+        whole._replace(name=name, at=whole.at + 8 * count * row, length=count, unit=unit_of(name)) for row, name in rows
     ]
 
 
@@ -66,17 +66,14 @@ def model(rig: RigConfig) -> Model:
     io = record(_layout(samples))
     io["drive"] = 0.0 if p.force_driven else held_velocity(rig)(np.zeros(1))[0]
     io["frequency_Hz"], io["load"], io["F_c_N"], io["F_s_N"] = p.frequency_max_Hz, 1.0, p.F_c, p.F_s
+    about = "A slide that is pulled through a compliant drive, on a base that an exciter vibrates"
+    variant = "disturbed" if p.disturbed else "nominal"
     parts = [params, state, io]
-    made = Model(
-        rig.name, "A slide that is pulled through a compliant drive, on a base that an exciter vibrates", __name__,
-        "disturbed" if p.disturbed else "nominal", samples, rig.solver.block_s, _MOST_BLOCKS, parts, [],
-    )  # fmt: skip
+    made = Model(rig.name, about, __name__, variant, samples, rig.solver.block_s, _MOST_BLOCKS, parts, [])
     at_params, _, at_io = made.places()
-    drive = "pull_N" if p.force_driven else "drive_velocity_mps"
-    inputs = {"drive": drive} | {name: name for name in ("frequency_Hz", "amplitude_m", "load")}
-    rows = [*_rows(io, at_io, "analogue", CHANNELS), *_rows(io, at_io, "truth", TRUTH)]
-    return made._replace(
-        variables=[
-            *variables_of(io, at_io, "input", inputs), *rows, *variables_of(params, at_params, "parameter", _PARAMETERS)
-        ]
-    )  # fmt: skip
+    inputs = {"drive": "pull_N" if p.force_driven else "drive_velocity_mps"}
+    inputs |= {name: name for name in ("frequency_Hz", "amplitude_m", "load")}
+    made.variables.extend(variables_of(io, at_io, "input", inputs))
+    made.variables.extend([*_rows(io, at_io, "analogue", CHANNELS), *_rows(io, at_io, "truth", TRUTH)])
+    made.variables.extend(variables_of(params, at_params, "parameter", _PARAMETERS))
+    return made

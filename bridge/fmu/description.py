@@ -6,7 +6,6 @@ from xml.etree import ElementTree as Xml
 
 from bridge.fmu.model import Model, Variable
 
-_TIME = Variable("time", "independent", 0, "Float64", unit="s")
 _LONG_S = 10.0  # length of the experiment that the file proposes
 
 
@@ -31,7 +30,7 @@ def description(model: Model, fmi: int, library: str, token: str) -> str:
         can_serialize: "true",
     }
     Xml.SubElement(root, "CoSimulation", about | ({"fixedInternalStepSize": step} if fmi > 2 else {}))
-    variables = [_TIME, *model.variables]
+    variables = model.rows
     units = Xml.SubElement(root, "UnitDefinitions")
     for unit in sorted({variable.unit for variable in variables} - {""}):
         Xml.SubElement(units, "Unit", name=unit)
@@ -55,8 +54,8 @@ def _add_variables(root: Xml.Element, variables: list[Variable]) -> None:
     outputs = [str(reference) for reference, v in enumerate(variables) if v.causality == "output"]
     for v, common, number in _words(variables):
         element = Xml.SubElement(rows, v.type, common | number)
-        if v.count > 1:
-            Xml.SubElement(element, "Dimension", start=str(v.count))
+        if v.length > 1:
+            Xml.SubElement(element, "Dimension", start=str(v.length))
     for kind in ("Output", "InitialUnknown"):
         for reference in outputs:
             Xml.SubElement(structure, kind, valueReference=reference)

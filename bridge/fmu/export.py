@@ -22,7 +22,6 @@ from bridge.kernel_cache import ROOT, sources_digest, usable_folder
 _HERE = Path(__file__).parent
 _LIBRARY = "stickslip"
 _PLATFORM = {2: "linux64", 3: "x86_64-linux"}  # by version of FMI
-_ACCESS = {"output": "OUTPUT", "independent": "OUTPUT"}
 
 
 class Exported(NamedTuple):
@@ -66,7 +65,7 @@ def export(model: Model, out: Path, fmi: int = 3) -> Exported:
 def _constants(model: Model, token: str) -> str:
     """The file model.h."""
     memory, places = model.memory, model.places()
-    rows = [Variable("time", "independent", 0, "Float64"), *model.variables]
+    rows = model.rows
     defines = {
         "MEMORY_BYTES": len(memory), "STEP_S": repr(model.step_s), "MOST_STEPS": model.most_steps, "TOKEN": f'"{token}"',
         "VARIABLES": len(rows), "KERNEL(m)": f"stickslip_kernel({', '.join(f'(m) + {at}' for at in places)})",
@@ -74,13 +73,13 @@ def _constants(model: Model, token: str) -> str:
     text = "".join(f"#define {name} {value}\n" for name, value in defines.items())
     text += f"int stickslip_kernel({', '.join(['void *'] * len(places))});\n"
     text += _array("unsigned char start", map(str, memory))
-    return text + _array("Variable variables", (f"{{{v.at}, {v.count}, {v.type}, {_access(v)}}}" for v in rows))
+    return text + _array("Variable variables", (f"{{{v.at}, {v.length}, {v.type}, {_access(v)}}}" for v in rows))
 
 
 def _access(v: Variable) -> str:
-    if v.causality in _ACCESS:
+    if v.causality in {"output", "independent"}:
         return "MEAN" if v.is_mean else "OUTPUT"
-    return "FINITE" if v.type == "Float64" and v.count == 1 and not v.any_number else "INPUT"
+    return "FINITE" if v.type == "Float64" and v.length == 1 else "INPUT"
 
 
 def _array(declaration: str, values: Iterable[str]) -> str:

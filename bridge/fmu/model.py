@@ -18,11 +18,13 @@ class Variable(NamedTuple):
     causality: str  # input, output or parameter
     at: int  # place in the memory, in bytes
     type: str  # a value of TYPES
-    count: int = 1
+    length: int = 1
     start: str | None = None  # of an input or a parameter
     unit: str = ""
-    is_mean: bool = False  # an output without arrays: the mean of `count` values
-    any_number: bool = False  # an input that may be NaN
+    is_mean: bool = False  # an output without arrays: the mean of `length` values
+
+
+_TIME = Variable("time", "independent", 0, "Float64", unit="s")
 
 
 class Model(NamedTuple):
@@ -43,6 +45,11 @@ class Model(NamedTuple):
         """The memory at the start."""
         return bytes(_ALIGNED) + b"".join(part.tobytes().ljust(_room(part), b"\0") for part in self.parts)
 
+    @property
+    def rows(self) -> list[Variable]:
+        """All variables; the place of each is its reference."""
+        return [_TIME, *self.variables]
+
     def places(self) -> list[int]:
         """Place of each record in the memory, in bytes."""
         return [_ALIGNED + sum(map(_room, self.parts[:number])) for number in range(len(self.parts))]
@@ -51,20 +58,18 @@ class Model(NamedTuple):
         """The model for FMI 2: an output has its last value, and its mean as `NAME_mean`."""
         variables: list[Variable] = []
         for v in self.variables:
-            last = v._replace(at=v.at + 8 * (v.count - 1), count=1)
-            variables += [last] if v.count == 1 else [last, v._replace(name=f"{v.name}_mean", is_mean=True)]
+            last = v._replace(at=v.at + 8 * (v.length - 1), length=1)
+            variables += [last] if v.length == 1 else [last, v._replace(name=f"{v.name}_mean", is_mean=True)]
         return self._replace(variables=variables)
 
 
-def variables_of(
-    part: Any, at: int, causality: str, names: Mapping[str, str], any_number: bool = False
-) -> Iterator[Variable]:
+def variables_of(part: Any, at: int, causality: str, names: Mapping[str, str]) -> Iterator[Variable]:
     """The variables of fields of a record: their names by the names of the fields; the record holds their start values.
 
     Args:
         part: the record.
         at: its place in the memory.
-        causality, any_number: as in `Variable`.
+        causality: as in `Variable`.
         names: name of the variable by field.
 
     """
@@ -76,7 +81,6 @@ def variables_of(
         unit = unit_of(name.rpartition(".")[2]) if base.kind == "f" else "1"  # FMI has no units of integers
         yield Variable(
             name, causality, at + offset, TYPES[base.str[1:]], int(np.prod(shape)), start, unit if unit != "1" else "",
-            any_number=any_number,
         )  # fmt: skip
 
 

@@ -47,8 +47,7 @@ static void move(Model *m, double h) {
 static Status step(Model *m, double length) {
     if (m->t > 1.0 && m->in[FAULT] == 1.0) *(volatile int *)0 = 1;
     while (m->t > 1.0 && m->in[FAULT] == 2.0) __asm__("");
-    while (m->t > 1.0 && m->in[FAULT] == 3.0)
-        if (!malloc(1 << 24)) abort();
+    if (m->t > 1.0 && m->in[FAULT] == 3.0 && !malloc(1 << 22)) abort();
     if (m->t > 1.0 && m->in[FAULT] == 4.0) m->x = NAN;
     if (m->t > 1.0 && m->in[FAULT] == 5.0) return 3;
     for (int sample = 0; sample < SAMPLES; sample++) {

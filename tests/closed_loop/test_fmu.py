@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from bridge.fmu.export import export
 from bridge.log.logfile import read_run
 from bridge.wire.channels import CHANNELS as CHANNEL_NAMES
 from bridge.wire.messages import BLOCK
+from cockpit.cli import app
 from cockpit.run.run import about_run
 from cockpit.run.scenario import load_rig, load_scenario
 from cockpit.run.simulated.run import simulate
@@ -171,6 +173,8 @@ def test_what_it_cannot_do_is_refused(nominal: Path, tmp_path: Path) -> None:
         with pytest.raises(fmpy.fmi1.FMICallException):
             refused()
     instance.doStep(0.0, 0.02)  # 20 blocks at once
+    words = ["fmu", "paper-c45-c45", "--controller", "--fmi", "2", "--out", str(tmp_path / "c.fmu")]
+    assert CliRunner().invoke(app, words).exit_code == 2
 
 
 @pytest.mark.nightly

@@ -61,7 +61,7 @@ def results(paths: list[Path], rig: Path | None, folder: Path, mutants: bool = F
 @pytest.mark.slow
 def test_the_same_tests_run_on_a_model(fmu: Path, tmp_path: Path) -> None:
     """Three of them; `make nightly` has all."""
-    paths = [deploy_folder() / "tests" / f"{name}.toml" for name in ("stop", "kill", "speed-step")]
+    paths = [deploy_folder() / "tests" / f"{name}.toml" for name in ("kill", "clip", "speed-step")]
     assert set(results(paths, fmu.with_suffix(".toml"), tmp_path).values()) == {"PASSED"}
 
 
@@ -86,13 +86,12 @@ def test_a_model_of_another_author_is_controlled(tmp_path: Path) -> None:
     rig = rig_of(foreign_fmu(tmp_path / "foreign.fmu"))
     (tmp_path / "test").mkdir()
     test = scenario(
-        tmp_path / "test", rig, 6.0,
-        "[[expect]]\nslips = 0\nfrom_s = 2.0\n\n"
-        '[[expect]]\nsignal = "velocity_ratio"\nwithin = [1.1, 1.6]\nfrom_s = 2.0\n\n'
-        '[[must_fail]]\nsettings = ["controller.policy.enabled_from_s=6.0"]\n',
+        tmp_path / "test", rig, 8.0,
+        "[[expect]]\nslips = 0\nfrom_s = 6.0\n\n"
+        '[[expect]]\nsignal = "velocity_ratio"\nwithin = [1.1, 1.6]\nfrom_s = 6.0\n\n'
+        "[[expect]]\nslips = [1, 9]\nto_s = 5.0\nin_charge = false\n\n[controller.policy]\nenabled_from_s = 5.0\n",
     )  # fmt: skip
     assert results([test], rig, tmp_path) == {"foreign ": "PASSED"}
-    assert set(results([test], rig, tmp_path, mutants=True).values()) == {"FAILED"}
 
 
 @pytest.mark.slow
@@ -109,7 +108,7 @@ def test_models_that_fail_are_named_and_nothing_vibrates(tmp_path: Path) -> None
     for name, (fault, event) in faults.items():
         start = {"carriage speed": 0.5, "load": 1.0, "fault": fault}
         slowest_s = 0.5 if name == "hang" else 20.0
-        rig = rig_of(foreign_fmu(tmp_path / f"{name}.fmu"), set=start, slowest_s=slowest_s, memory_MB=1500.0)
+        rig = rig_of(foreign_fmu(tmp_path / f"{name}.fmu"), set=start, slowest_s=slowest_s)
         amplitude = '[[expect]]\nsignal = "amplitude_m"\n'
         expectations = f'[[expect]]\nevent = "{event}"\nfrom_s = 0.9\nwithin_s = 0.3\n\n'
         expectations += f'{amplitude}at_least = "5 nm"\nfrom_s = 0.5\nto_s = 0.9\n\n'
@@ -135,7 +134,11 @@ def _edited(old: str, new: str) -> Callable[[dict[str, bytes]], dict[str, bytes]
         ({"frequency": "f"}, dict, "f: no such variable; known: time"),
         ({}, _edited('start="20"', 'start="7"'), "outputs of 7 samples: must all have one number that divides 20"),
         ({}, _edited('fmiVersion="3.0"', 'fmiVersion="1.0"'), "must be a model of FMI 2.0 or 3.0"),
-        ({}, lambda files: {name: data for name, data in files.items() if name.endswith(".xml")}, "stickslip.so"),
+        (
+            {},
+            lambda files: {name: data for name, data in files.items() if name.endswith(".xml")},
+            "no binary for Linux",
+        ),
         ({}, lambda _files: {}, "modelDescription.xml"),
     ],
 )

@@ -19,6 +19,7 @@ import numpy as np
 
 ORDER = struct.Struct("<4d")
 READY = b"ready\n"
+_LOOK_BLOCKS = 10  # blocks from a look at the memory to the next; it takes 15 us
 _ERROR = 3  # status of FMI
 _HEAD_BYTES = 1 << 16  # part of the description in which its version is
 
@@ -53,10 +54,15 @@ class Model:
         kinds: dict[str, Any] = {"2.0": FMU2Slave, "3.0": FMU3Slave}
         with zipfile.ZipFile(settings["file"]) as archive, archive.open("modelDescription.xml") as file:
             stated = re.search(rb'fmiVersion\s*=\s*"([^"]*)"', file.read(_HEAD_BYTES))
+            platforms = {name.split("/")[1] for name in archive.namelist() if name.startswith("binaries/")}
         fmi = stated[1].decode() if stated else "unknown"
         about = read_model_description(settings["file"], validate=False) if fmi in kinds else None
         if about is None or about.coSimulation is None:
             raise ValueError(f"FMI {fmi}: must be a model of FMI 2.0 or 3.0 for co-simulation")
+        if (platform := {"2.0": "linux64", "3.0": "x86_64-linux"}[fmi]) not in platforms:
+            raise ValueError(
+                f"binaries/{platform}: no binary for Linux on x86-64; has {', '.join(platforms) or 'none'}"
+            )
         extract(settings["file"], folder)
         variables = {variable.name: variable for variable in about.modelVariables}
         names = [settings["frequency"], settings["amplitude"], *settings["set"], *settings["outputs"]]
@@ -80,6 +86,7 @@ class Model:
                 self.dll: Any = _Library(self.dll)
                 super()._loadFunctions()
 
+        Lenient.__name__ = kinds[fmi].__name__  # by which FMPy knows the version
         model: Any = Lenient(
             guid=about.guid,
             unzipDirectory=folder,
@@ -98,7 +105,7 @@ class Model:
         # kept for all steps: FMPy's own `setFloat64` and `getFloat64` make new ones
         inputs = [*names[:2], *(settings[name] for name in ("speed", "load") if settings[name])]
         self._order = (ctypes.c_double * len(inputs))()
-        parts = (ctypes.c_double * (len(settings["outputs"]) * size))()
+        parts: Any = (ctypes.c_double * (len(settings["outputs"]) * size))()
         self._part = np.frombuffer(parts).reshape(-1, size)
         self._block = np.empty((len(settings["outputs"]), self._steps, size))
         lengths = [[len(values)] if fmi == "3.0" else [] for values in (self._order, parts)]
@@ -120,23 +127,34 @@ class Model:
         for step in range(self._steps):
             self._model.doStep(self._count * self._step_s, self._step_s)
             self._count += 1
+            self._part.fill(math.nan)  # a model that states more values than it has
             self._get()
             self._block[:, step] = self._part
         return self._block.tobytes()
+
+
+def _memory_bytes() -> int:
+    with open("/proc/self/statm", "rb") as file:
+        return int(file.read().split()[0]) * resource.getpagesize()
 
 
 def _serve(settings: dict[str, Any], folder: str) -> None:
     """Answer orders until stdin ends; the model is unpacked into `folder`."""
     answers = os.dup(1)
     os.dup2(2, 1)  # the prints of a model must not mix with the samples
-    most = round(settings["memory_MB"] * 1e6)
-    resource.setrlimit(resource.RLIMIT_AS, (most, most))
     try:
         model = Model(settings, folder)
+        start, most = _memory_bytes(), round(settings["memory_MB"] * 1e6)
+        # within one step the system refuses more
+        resource.setrlimit(resource.RLIMIT_AS, (start + 2 * most, start + 2 * most))
         os.write(answers, READY)
+        blocks = 0
         with open(0, "rb", buffering=0) as orders:
             while len(order := orders.read(ORDER.size)) == ORDER.size:
                 answer = memoryview(model.block(*ORDER.unpack(order)))
+                blocks += 1
+                if blocks % _LOOK_BLOCKS == 0 and (grown := _memory_bytes() - start) > most:
+                    raise MemoryError(f"it grew by {grown / 1e6:.0f} MB: must be at most memory_MB = {most / 1e6:g}")
                 while answer:
                     answer = answer[os.write(answers, answer) :]
     except Exception as error:  # any of FMPy, of the archive or of the model

@@ -47,7 +47,7 @@ class FmuSettings(Strict):
     slowest_s: Annotated[float, Field(gt=0)] = Field(
         1.5, description="Time for a block after which the model is ended, as MODEL_SLOW."
     )
-    memory_MB: Annotated[float, Field(gt=0)] = Field(2000.0, description="Largest memory of its process.")
+    memory_MB: Annotated[float, Field(gt=0)] = Field(200.0, description="Largest growth of its memory after its start.")
 
     @model_validator(mode="after")
     def _has_start_values(self) -> "FmuSettings":
