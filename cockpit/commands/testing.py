@@ -20,7 +20,9 @@ def run_tests(
             metavar="[PATH]...", help=r"Scenarios with \[\[expect]], or folders; the shipped tests if not given."
         ),
     ] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes to use; not given: all cores, or 1 with --rig.")] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Processes to use; not given: all cores, or 1 with --rig.")
+    ] = None,
     mutants: Annotated[
         bool,
         typer.Option("--mutants", help=r"Run with each defect of \[\[must_fail]], under which a test has to fail."),
