@@ -214,3 +214,42 @@ def test_an_unknown_case_names_a_similar_one(tmp_path: Path) -> None:
     folder = folder_of(tmp_path, one=GOOD + SWEEP)
     status, text = call(f"{folder}/one.toml:tigt")
     assert (status, "no such case; perhaps tight" in text) == (2, True), text
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ('[[expect]]\nname = "stroke"\nslips = 0\n', "expect: name = stroke: is used twice"),
+        ('[[sweep]]\nkey = "seed"\nvalues = []\n', "values: is empty"),
+        (
+            '[[fault]]\nkind = "stuck"\ntarget = "mass_accel_mps2"\n[rig.channels.mass_accel_mps2]\nabsent = true\n',
+            "fault.0: mass_accel_mps2: is absent in this rig",
+        ),
+    ],
+)
+def test_a_test_of_nothing_is_refused(tmp_path: Path, text: str, line: str) -> None:
+    folder = Path(folder_of(tmp_path, one=GOOD + text))
+    test = folder / "one.toml"
+    test.write_text(test.read_text().replace('rig = { file = "paper-c45-c45" }', 'rig.file = "paper-c45-c45"'))
+    status, output = call(str(folder))
+    assert (status, line in output) == (2, True), output
+
+
+@pytest.mark.parametrize(
+    ("rig", "text", "why"),
+    [
+        (
+            "rig.channels.mass_accel_mps2.absent = true",
+            'signal = "mass_accel_mps2"\nwithin = [-50.0, 50.0]',
+            "mass_accel_mps2 is not in the log",
+        ),
+        ("rig.drive.profile = [[0.0, 0.0]]", "slips = 0", "the drive rests in the whole window"),
+        ("", "slips = [0, 1000]", "is one a block or more, and cannot fail"),
+        ("", 'signal = "drive_velocity_mps"\nwithin = [-1.0, 1.0]', "perhaps in another unit"),
+    ],
+)
+def test_an_expectation_that_cannot_fail_is_untested(tmp_path: Path, rig: str, text: str, why: str) -> None:
+    head = HEAD.replace('rig = { file = "paper-c45-c45" }', f'rig.file = "paper-c45-c45"\n{rig}')
+    (tmp_path / "one.toml").write_text(f"{head}[[expect]]\n{text}\n")
+    status, output = call("one.toml")
+    assert (status, why in output) == (14, True), output
