@@ -20,6 +20,8 @@ from cockpit.judge.judged import judge_tables
 from cockpit.judge.setup import plant_of
 
 _IN_CHARGE = (wire.ARMED, wire.ACTIVE)
+# Range of a signal at rest over its noise. 10: an hour of samples exceeds it. 100: with noise of 50 nm, 5 um of travel are rest.
+_STILL = 15.0
 
 
 class Samples(NamedTuple):
@@ -62,11 +64,20 @@ class Record:
 
     @cached_property
     def damage(self) -> str:
-        """The first damage of the log in words; empty for a whole one."""
-        findings = damage_findings(self.run.damage, self.run.path)
+        """The first damage of the log in words; empty for a whole one.
+
+        Messages that an injected fault spoiled are no damage: the log holds them as they came, and their samples are missing.
+        """
+        damage = self.run.damage
+        faults = value_at(self._plant, "fault")
+        if any(
+            value_at(row, "kind") in {"corrupted", "truncated"} for row in (faults if isinstance(faults, list) else ())
+        ):
+            damage = damage._replace(bad_records=0)
+        findings = damage_findings(damage, self.run.path)
         if self.run.checksums.changed:
             return "its bytes were changed after it was written"
-        return findings[0].text if findings else "" if self.run.damage.whole else "it was not closed"
+        return findings[0].text if findings else "" if damage.whole else "it was not closed"
 
     @cached_property
     def events(self) -> dict[str, list[float]]:
@@ -105,9 +116,17 @@ class Record:
             return "arm the rig: arm = true in the scenario, and --arm for a real rig"
         return "controller.policy.enabled_from_s must be earlier, or the window later"
 
+    def rests(self, from_s: float, to_s: float) -> bool:
+        """Whether the position of the drive stays within its noise in a window; False if one is unknown."""
+        position, channel = self.samples("drive_position_m"), channels_of(self._plant)["drive_position_m"]
+        if position is None:
+            return False
+        inside = position.values[(position.t_s > from_s) & (position.t_s <= to_s)]
+        return bool(len(inside)) and float(np.ptp(inside)) < _STILL * max(channel.noise, channel.step)
+
     def samples(self, name: str) -> Samples | None:
         """Samples of a signal; None if the log does not contain it."""
-        if not holds(self.run, name):
+        if not holds(self.run, name) or value_at(self._plant, f"rig.channels.{name}.absent"):
             return None
         signal = SIGNALS[name]
         t_s, values = samples_of(self.run, signal)

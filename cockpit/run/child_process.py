@@ -20,7 +20,9 @@ from bridge.faults import Fault, install
 from bridge.plain import StepReport, no_report, print_line
 from bridge.wire import realtime
 
-_PARENT_CHECK_S = 0.25  # interval at which the death of the parent is noticed
+# Interval at which the death of the parent is noticed. 0.25: the exciter vibrated up to 0.25 s after a SIGKILL of its test,
+# longer than a dead man of 0.1 s. 0.01: a hundred wake-ups a second in each process of a run.
+_PARENT_CHECK_S = 0.05
 # Work that takes longer prints a line. Larger: the operator waits without a message. Smaller: on a busy computer short runs
 # print it too.
 _LONG_S = 2.0

@@ -32,6 +32,7 @@ class DeviceRun(RunTables):
             raise ValueError(
                 "arm = true: a real rig is armed by an operator alone; leave it out, and use `stickslip arm`"
             )
+        self.refuse_faults_of(absent(self.rig.channels))
         controller, converter = self.controller, self.rig.converter
         blocks = {"block_s": converter.block_s, "samples_per_block": converter.samples_per_block}
         for name, of_rig in blocks.items():

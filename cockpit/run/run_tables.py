@@ -3,6 +3,7 @@
 import json
 import math
 import platform
+from collections.abc import Collection
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -72,6 +73,9 @@ class RunTables(Sweeps):
             if 0.0 < self.duration_s <= table.from_s:
                 line = f"fault: {table.in_words()}: from_s = {table.from_s:g}: must be before the end of the run"
                 raise ValueError(f"{line}, duration_s = {self.duration_s:g}; begin it earlier, or run longer")
+        names = [table.name for table in self.expect if table.name]
+        if twice := [name for number, name in enumerate(names) if name in names[:number]]:
+            raise ValueError(f"expect: name = {twice[0]}: is used twice; give each expectation a different name")
         for kind, tables in (("step", self.step), ("expect", self.expect)):
             for number, table in enumerate(tables):
                 if late := table.after(self.duration_s or math.inf):
@@ -79,6 +83,12 @@ class RunTables(Sweeps):
                     raise ValueError(f"{line}; set an earlier time, or run longer")
         configurations(self.controller, self.step)  # raises for a setting that no controller has
         return self
+
+    def refuse_faults_of(self, absent: Collection[str]) -> None:
+        """Raise ValueError for a fault of a channel that the rig does not have: it would change nothing."""
+        for number, table in enumerate(self.fault):
+            if missing := {table.target, table.other} & {*absent}:
+                raise ValueError(f"fault.{number}: {min(missing)}: is absent in this rig; choose another target")
 
     @property
     def simulated_only(self) -> str:

@@ -35,6 +35,7 @@ class Scenario(RunTables):
             if of_rig != of_controller:
                 raise ValueError(f"controller.{name} = {of_controller}: must equal rig.solver.{name} = {of_rig}")
         refuse_out_of_travel(self.rig, self.duration_s)
+        self.refuse_faults_of(absent(self.rig.channels))
         rig = self.rig.model_copy(update={"drive": with_speeds(self.rig.drive, self.step)})
         try:
             controller = within(seeing(controller, absent(self.rig.channels)), self.rig.vibration_limits)

@@ -37,6 +37,8 @@ class SweepTable(Strict):
             isinstance(self.values, dict) and all(isinstance(row, dict) for row in self.values.values())
         ):
             raise ValueError("key: missing: values must then be tables of keys with a name each; add the key")
+        if not self.values:
+            raise ValueError("values: is empty: must have a value for each case; add one, or leave out [[sweep]]")
         return self
 
     def named(self) -> list[tuple[str, dict[str, Any]]]:

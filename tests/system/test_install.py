@@ -89,6 +89,8 @@ def plain(tmp_path: Path) -> Path:
 
 
 def test_a_plain_installation_needs_no_extra(tmp_path: Path, plain: Path) -> None:
+    guide = (ROOT / "docs/guides/your-first-test.md").read_text(encoding="utf-8")
+    (tmp_path / "first.toml").write_text(guide.split("```toml\n")[1].split("```")[0])
     lines = [
         f"run --in-process {SHORT} --log run.mcap",
         f"run --lockstep {SHORT} --log bus.mcap --endpoint {free_endpoint()}",

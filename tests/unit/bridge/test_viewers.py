@@ -1,5 +1,6 @@
 """Additions of the recorder for viewers: the topics scope and log, the comments in the descriptors."""
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from mcap.reader import make_reader
 from bridge.log.check.log_check import check_log
 from bridge.log.logfile import read_run
 from bridge.log.runlog import RunLog
+from bridge.log.viewers.stretches import envelope_of
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.channels import CHANNELS
 from bridge.wire.messages import SCOPE, TRACE, sensor_block
@@ -55,6 +57,16 @@ def test_scope_has_the_smallest_mean_and_largest_sample_of_each_stretch(log: Pat
         for which, figure in {"min": np.min, "max": np.max, "mean": np.mean}.items():
             values = [getattr(said, f"{name[:at]}_{which}{name[at:]}") for said, _ in scope]
             np.testing.assert_allclose(values, [figure(stretch) for stretch in each], rtol=2e-6, err_msg=name)
+
+
+def test_a_corrupted_sample_makes_no_warning() -> None:
+    values = np.array([[np.inf, -np.inf, 3e38, 3e38, np.nan, 1.0]], np.float32)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        least, mean, most = envelope_of(values, np.array([0, 2, 4]))
+    np.testing.assert_array_equal(least, np.float32([[-np.inf, 3e38, np.nan]]))
+    np.testing.assert_array_equal(most, np.float32([[np.inf, 3e38, np.nan]]))
+    np.testing.assert_array_equal(mean, [[np.nan, np.inf, np.nan]])
 
 
 def test_scope_names_mode_and_limits_in_force(log: Path) -> None:

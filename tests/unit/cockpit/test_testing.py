@@ -1,6 +1,7 @@
 """`stickslip test`: results, exit status, kept logs, JUnit XML, mutants and old logs."""
 
 import json
+import multiprocessing
 from pathlib import Path
 from xml.etree import ElementTree as Xml
 
@@ -8,6 +9,7 @@ import jsonschema
 import pytest
 from typer.testing import CliRunner
 
+from bridge.faults import Fault
 from bridge.log.logfile import read_run
 from bridge.pages import STYLE
 from cockpit.cli import app
@@ -109,6 +111,13 @@ def test_an_old_log_is_judged_without_a_run(tmp_path: Path) -> None:
     assert (status, UNTESTED in text) == (14, True)
 
 
+def test_an_expectation_that_no_defect_breaks_is_listed(tmp_path: Path) -> None:
+    status, text = call(folder_of(tmp_path, two=GOOD + "[[expect]]\nslips = 0\n" + MUTANT.format(1.7)), "--mutants")
+    assert status == 0
+    assert "unshown  two: slips 0: no defect made it fail" in text
+    assert "unshown  two: stroke" not in text
+
+
 def test_a_mutant_must_make_a_test_fail(tmp_path: Path) -> None:
     folder = folder_of(tmp_path, found=GOOD + MUTANT.format(1.7), missed=GOOD + MUTANT.format(1.25), without=GOOD)
     status, text = call(folder, "--mutants")
@@ -140,7 +149,21 @@ def test_the_shipped_tests_pass_and_each_of_their_defects_is_found() -> None:
 @pytest.mark.nightly
 def test_all_shipped_tests_and_defects() -> None:
     assert call()[0] == 0
-    assert call("--mutants")[0] == 0
+    status, text = call("--mutants")
+    assert (status, "unshown" in text) == (0, False)
+
+
+@pytest.mark.slow
+def test_a_killed_process_ends_the_tests_with_a_fault(tmp_path: Path) -> None:
+    cases, _ = cases_of([Path(folder_of(tmp_path, one=GOOD + SWEEP))], [])
+
+    def kill(_share: float) -> None:
+        for process in multiprocessing.active_children():
+            process.kill()
+
+    with pytest.raises(Fault, match="a process of the tests was killed"):
+        run_tests(cases, 2, None, kill)
+    assert not multiprocessing.active_children()
 
 
 SWEEP = """
@@ -178,15 +201,55 @@ def test_each_value_of_a_sweep_is_a_test(tmp_path: Path) -> None:
         ('key = "seed"\nvalues = [1, 1]', "seed=1: is used twice"),
         ("values = [1]", "key: missing"),
         ('key = "expect.3.at_most"\nvalues = [1]', "expect is a list: must be expect.0 to expect.1"),
-        ('key = "sed"\nvalues = [1]', "sed = 1: unknown key; perhaps seed"),
+        ('key = "sed"\nvalues = [1, 2, 3]', "sed = 1: unknown key; perhaps seed"),
     ],
 )
 def test_a_wrong_sweep_is_an_error(tmp_path: Path, sweep: str, error: str) -> None:
     status, text = call(folder_of(tmp_path, one=f"{GOOD}[[sweep]]\n{sweep}\n"))
     assert (status, error in text) == (2, True), text
+    assert text.count("ERROR    one") == 1  # for all cases of a sweep
 
 
 def test_an_unknown_case_names_a_similar_one(tmp_path: Path) -> None:
     folder = folder_of(tmp_path, one=GOOD + SWEEP)
     status, text = call(f"{folder}/one.toml:tigt")
     assert (status, "no such case; perhaps tight" in text) == (2, True), text
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ('[[expect]]\nname = "stroke"\nslips = 0\n', "expect: name = stroke: is used twice"),
+        ('[[sweep]]\nkey = "seed"\nvalues = []\n', "values: is empty"),
+        (
+            '[[fault]]\nkind = "stuck"\ntarget = "mass_accel_mps2"\n[rig.channels.mass_accel_mps2]\nabsent = true\n',
+            "fault.0: mass_accel_mps2: is absent in this rig",
+        ),
+    ],
+)
+def test_a_test_of_nothing_is_refused(tmp_path: Path, text: str, line: str) -> None:
+    folder = Path(folder_of(tmp_path, one=GOOD + text))
+    test = folder / "one.toml"
+    test.write_text(test.read_text().replace('rig = { file = "paper-c45-c45" }', 'rig.file = "paper-c45-c45"'))
+    status, output = call(str(folder))
+    assert (status, line in output) == (2, True), output
+
+
+@pytest.mark.parametrize(
+    ("rig", "text", "why"),
+    [
+        (
+            "rig.channels.mass_accel_mps2.absent = true",
+            'signal = "mass_accel_mps2"\nwithin = [-50.0, 50.0]',
+            "mass_accel_mps2 is not in the log",
+        ),
+        ("rig.drive.profile = [[0.0, 0.0]]", "slips = 0", "the drive rests in the whole window"),
+        ("", "slips = [0, 1000]", "is one a block or more, and cannot fail"),
+        ("", 'signal = "drive_velocity_mps"\nwithin = [-1.0, 1.0]', "perhaps in another unit"),
+    ],
+)
+def test_an_expectation_that_cannot_fail_is_untested(tmp_path: Path, rig: str, text: str, why: str) -> None:
+    head = HEAD.replace('rig = { file = "paper-c45-c45" }', f'rig.file = "paper-c45-c45"\n{rig}')
+    (tmp_path / "one.toml").write_text(f"{head}[[expect]]\n{text}\n")
+    status, output = call("one.toml")
+    assert (status, why in output) == (14, True), output

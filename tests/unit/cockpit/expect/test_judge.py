@@ -54,6 +54,7 @@ def changed(run: RunData, topic: str, **columns: Any) -> RunData:
         ({"signal": "time_to_slip_s", "at_least": 0.1}, UNTESTED),  # no slip is ahead: each sample is unknown
         ({"signal": "amplitude_m", "at_most": "5 mm"}, UNTESTED),  # more than the stroke: it cannot fail
         ({"signal": "drive_force_N", "within": [-500.0, 500.0]}, UNTESTED),
+        ({"signal": "drive_force_N", "at_least": 500.0, "never": True}, UNTESTED),  # the sensor ends before
         (AMPLITUDE | {"to_s": 2.5}, UNTESTED),  # after the end of the log
         ({"event": "FROZEN", "within_s": 1.0, "from_s": 1.5}, UNTESTED),
         ({"event": "FROZEN", "never": True, "from_s": 5.0, "to_s": 6.0}, UNTESTED),
@@ -92,6 +93,15 @@ def test_without_a_controller_in_charge_nothing_passes(run: RunData, table: dict
     alone = changed(run, "applied", guard_state=never)
     assert of(alone, **table).result == UNTESTED
     assert of(alone, **table, in_charge=False).result == PASSED
+
+
+def test_a_window_before_control_passes_nothing(run: RunData) -> None:
+    late = changed(run, "applied", guard_state=lambda column: column.__setitem__(slice(0, 1000), wire.DISARMED))
+    early = {"signal": "amplitude_m", "at_most": "28 nm", "to_s": 0.9}
+    assert "no controller was in charge until 0.9 s; controller.policy.enabled_from_s" in of(late, **early).why
+    assert of(late, **early | {"to_s": 1.2}).result == PASSED
+    never = changed(run, "applied", guard_state=lambda column: column.__setitem__(slice(None), wire.DISARMED))
+    assert "arm the rig: arm = true in the scenario" in of(never, **early).why
 
 
 def test_half_a_window_without_a_controller_is_no_proof_of_its_effect(run: RunData) -> None:

@@ -6,7 +6,8 @@ import pytest
 
 from bridge.config import validate
 from bridge.faults import Fault
-from cockpit.expect.tables import ExpectTable, MutantTable
+from bridge.wire.words import words
+from cockpit.expect.tables import STATES, ExpectTable, MutantTable
 
 
 @pytest.mark.parametrize(
@@ -32,6 +33,10 @@ from cockpit.expect.tables import ExpectTable, MutantTable
         ({"event": "FROZN", "within_s": 1.0}, "event = FROZN: no such event; perhaps FROZEN"),
         ({"event": "FROZEN"}, "must have either within_s or never = true"),
         ({"state": "guard"}, "is_in: missing"),
+        (
+            {"state": "guard", "is_in": [row.word for row in words() if row.column == STATES["guard"].column]},
+            "is_in: names every word of guard, so it cannot fail",
+        ),
         ({"state": "guard", "is_in": "ARMD"}, "is_in = ARMD: no such word; perhaps ARMED"),
         ({"signal": "amplitude_m", "at_most": 1.0, "until_s": 1.0, "never": True}, "has no meaning with never"),
         ({"sginal": "amplitude_m", "at_most": 1.0}, "unknown key; perhaps signal"),
