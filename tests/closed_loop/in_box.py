@@ -35,8 +35,8 @@ def run_in_box(folder: Path, rig: dict[str, Any], seconds: float, **controller: 
             command = control.block(sensors.payload)
             assert command is not None
             commands = [command.payload]
-            made.states.append(int(node.applied.guard_state))
-            made.applied_m.append(float(node.applied.amplitude_m))
+            made.states.append(int(node.applied["guard_state"]))
+            made.applied_m.append(float(node.applied["amplitude_m"]))
         assert node.problems() == []
     finally:
         node.close()
