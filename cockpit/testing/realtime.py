@@ -47,9 +47,16 @@ def run_in_real_time(run: DeviceRun, name: str, settings: list[str], log: Path, 
     Raises Fault: NOT_JUDGED if the rig was not armed, QUARANTINED if the log does not show that the vibration ended.
 
     """
-    if any(step.settings for step in run.step):
-        line = f"{name}: step.settings: the controller of a real rig is a separate process"
-        raise Fault("NOT_JUDGED", f"{line}; test it without --rig")
+    for refused, why in (
+        (any(step.settings for step in run.step), "step.settings: the controller of a real rig is a separate process"),
+        (any(fault.kind == "restarted" for fault in run.fault), "fault: a process of this test cannot be restarted"),
+        (
+            run.controller.policy.enabled_from_s > 0.0,
+            "controller.policy.enabled_from_s: counts from before the rig is armed",
+        ),
+    ):
+        if refused:
+            raise Fault("NOT_JUDGED", f"{name}: {why}; test it without --rig")
     bus = run.bus.model_copy(update={"endpoint": _free_endpoint()})
     rig_security(bus)
     changed = [*settings, "duration_s=0.0", "fault=[]", "step=[]", "expect=[]", "must_fail=[]"]
