@@ -66,11 +66,7 @@ class Record:
     def damage(self) -> str:
         """The first damage of the log in words; empty for a whole one.
 
-<<<<<<< HEAD
-        Messages that an injected fault spoiled are no damage: the log holds them unchanged, and their samples are missing.
-=======
         Messages that an injected fault spoiled do not count: the log holds them unchanged, and their samples are missing.
->>>>>>> h/hilu
         """
         damage = self.run.damage
         faults = value_at(self._plant, "fault")
