@@ -56,8 +56,8 @@ class _TruthNode(PlantNode):
         self._drive_m = drive_m
         fastest_mps = float(speeds[np.abs(speeds).argmax()])
         rad_per_s = 2.0 * math.pi * max(float(self.applied["frequency_Hz"]), 1.0)  # at rest it is 0
-        amplitude_m = self.vibration_mps / rad_per_s
-        self._truths.append((self._now_ns() * 1e-9, amplitude_m, self.vibration_mps, drive_mps, fastest_mps))
+        v_a_mps = self.vibration_mps
+        self._truths.append((self._now_ns() * 1e-9, v_a_mps / rad_per_s, v_a_mps, drive_mps, fastest_mps))
         self._observe(self)
         return sent
 

@@ -19,6 +19,7 @@ TARGETS = {
     BUS: ("blocks", "commands", LINK),
     PROCESS: ("controller", "plant", "recorder"),
 }
+_GROUPS = {target: group for group, targets in TARGETS.items() for target in targets}
 
 
 class InjectionKind(NamedTuple):
@@ -43,4 +44,4 @@ KINDS = {
 
 def group_of(target: str) -> str | None:
     """The group of a target; None for an unknown target."""
-    return next((group for group, targets in TARGETS.items() if target in targets), None)
+    return _GROUPS.get(target)
