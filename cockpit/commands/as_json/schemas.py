@@ -68,10 +68,8 @@ def scenario() -> dict[str, Any]:
         "description": "Name of a rig in deploy/rigs, or a .toml file; the other keys here override its keys.",
     }
     known["RigConfig"]["properties"] = {"file": file} | known["RigConfig"]["properties"]
-    schema["anyOf"] = [
-        {"required": schema.pop("required")},
-        {"required": ["sweep"]},
-    ]  # a sweep may give the rig of each case
+    # a sweep may give the rig of each case
+    schema["anyOf"] = [{"required": schema.pop("required")}, {"required": ["sweep"]}]
     return _with_pairs_and_effects(schema)
 
 
