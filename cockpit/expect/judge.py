@@ -231,7 +231,13 @@ class _Judge:
         gap = self._gap(blocks) if (blocks := self._blocks()) is not None else "the log holds no block"
         late = next((row for row in sorted(times) if row[0] > self._to_s), None)
         after = f"; the next {late[1]} is at {late[0]:.4f} s" if late is not None else ""
-        return self._made(UNTESTED if gap else FAILED, gap or f"no {names}{after}", None, late[0] if late else None)
+        others = [
+            word for word, at_s in self._record.events.items() if any(self._from_s <= t_s <= self._to_s for t_s in at_s)
+        ]
+        only = f", only {', '.join(others)}" if others else ""
+        return self._made(
+            UNTESTED if gap else FAILED, gap or f"no {names}{only}{after}", None, late[0] if late else None
+        )
 
     def _blocks(self) -> Samples | None:
         """The blocks of the log, whose gaps are gaps of the log."""

@@ -72,6 +72,12 @@ def test_a_failure_has_value_limit_and_time(run: RunData) -> None:
     assert "1 of 1500 samples, the first at 1.5000 s" in result.why
 
 
+def test_a_missing_event_names_those_that_the_window_holds(run: RunData) -> None:
+    result = of(run, event="FROZEN", within_s=0.5)
+    assert result.why.startswith("no FROZEN, only ")
+    assert "VIBRATION_BEGAN" in result.why
+
+
 @pytest.mark.parametrize("table", [AMPLITUDE, RATIO, {"slips": 0}, {"surges": 0}, {"event": "FROZEN", "never": True}])
 def test_a_log_cut_short_passes_nothing(run: RunData, table: dict[str, Any]) -> None:
     parts = {name: getattr(run, name) for name in ("sensors", "applied", "command", "trace", "state")}
