@@ -50,5 +50,5 @@ def test_steps_sweeps_and_defects_fit_the_first_example(first: Path) -> None:
 @pytest.mark.slow
 def test_the_example_in_python_passes(first: Path) -> None:
     (text,) = (text for kind, text in BLOCKS if kind == "python")
-    first.with_name("test_axis.py").write_text(text)
-    assert pytest.main(["-q", "-p", "no:cacheprovider", "--rootdir", ".", "-c", "/dev/null", "test_axis.py"]) == 0
+    first.with_name("test_guide.py").write_text(text)
+    assert pytest.main(["-q", "-p", "no:cacheprovider", "--rootdir", ".", "-c", "/dev/null", "test_guide.py"]) == 0

@@ -83,12 +83,14 @@ def test_a_failed_test_keeps_its_log_and_names_the_replay(tmp_path: Path, monkey
 def test_a_quarantined_rig_is_reported_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "test_axis.py").write_text(
+    (tmp_path / "test_quarantined.py").write_text(
         "from bridge.faults import Fault\ndef test_quarantined(rig):\n    raise Fault('QUARANTINED', 'axis: look at it')\n"
     )
     monkeypatch.chdir(tmp_path)
     assert (
-        pytest.main(["-q", "-p", "no:cacheprovider", "--rootdir", str(tmp_path), "-c", "/dev/null", "test_axis.py"])
+        pytest.main(
+            ["-q", "-p", "no:cacheprovider", "--rootdir", str(tmp_path), "-c", "/dev/null", "test_quarantined.py"]
+        )
         == 1
     )
     out = capsys.readouterr().out
